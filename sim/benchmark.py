@@ -1,0 +1,59 @@
+"""How fast this machine simulates: one core, the physics of the main Fuzzy-PI job."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.controllers import CONTROLLERS
+from sim.scenario import SCENARIOS
+from sim.simulate import PHYSICS_RATE, Backend, lanes, prepare, simulate
+
+
+@dataclass(frozen=True, slots=True)
+class BenchmarkResult:
+    """us_per_step_per_walker [us]; real_time_factor_per_core: simulated over elapsed seconds."""
+
+    us_per_step_per_walker: float
+    real_time_factor_per_core: float
+    lanes: int
+    backend: str
+    walkers: int
+    simulated_seconds: float
+    elapsed_seconds: float
+
+
+def measure(
+    *, repeats: int = 3, walkers: int = 24, backend: Backend = "auto", robot: str = "szabadka2"
+) -> BenchmarkResult:
+    """Time whole walks (control, physics, objectives) of the six scenarios in this thread.
+
+    The walkers are the published optimum A; every scenario counts with its share of the job. The
+    fastest of `repeats` passes is reported: anything slower is the machine's other work.
+    """
+    controller = CONTROLLERS["fuzzy-pi"]
+    design = controller.published["A"]
+    used = prepare(robot, backend=backend)
+    width = lanes() if used == "native" else 1
+    count = walkers if used == "native" else 1
+    designs = np.tile(np.array(list(design.values())), (count, 1))
+    scenarios = SCENARIOS if used == "native" else SCENARIOS[:1]
+    simulated = count * sum(scenario.duration for scenario in scenarios)
+    passes = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        for scenario in scenarios:
+            simulate(scenario, "fuzzy-pi", list(design), designs, robot=robot, backend=backend)
+        passes.append(time.perf_counter() - start)
+    elapsed = min(passes)
+    return BenchmarkResult(
+        us_per_step_per_walker=elapsed / (simulated * PHYSICS_RATE) * 1e6,
+        real_time_factor_per_core=simulated / elapsed,
+        lanes=width,
+        backend=used,
+        walkers=count,
+        simulated_seconds=simulated,
+        elapsed_seconds=elapsed,
+    )

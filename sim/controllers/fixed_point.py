@@ -1,0 +1,43 @@
+"""Design values to the integers that the microcontroller computes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from sim.errors import SimulationInputError
+
+FRACTION_BITS: Final = 16
+"""Fractional bits of proportional gains and table index scales."""
+
+INTEGRAL_BITS: Final = 20
+"""Fractional bits of the integrator: at 500 Hz the smallest gain still keeps three digits."""
+
+CONTROL_PERIOD: Final = 0.002
+"""One control tick [s]."""
+
+
+def required(design: Mapping[str, float], name: str, *, low: float, high: float) -> float:
+    """A design's value, checked against what the controller can represent."""
+    try:
+        value = float(design[name])
+    except KeyError:
+        raise SimulationInputError(
+            f"{name}: missing from the design, which has {', '.join(sorted(design)) or 'nothing'}"
+        ) from None
+    except (TypeError, ValueError):
+        raise SimulationInputError(f"{name}: {design[name]!r} is not a number") from None
+    if not low <= value <= high:
+        raise SimulationInputError(f"{name}: {value:g} is outside [{low:g}, {high:g}]")
+    return value
+
+
+def to_fixed(value: float, fraction_bits: int) -> int:
+    """Nearest fixed-point number, as its integer."""
+    return math.floor(value * (1 << fraction_bits) + 0.5)
+
+
+def integral_gain(gain: float) -> int:
+    """PWM counts per (error count x second) -> fixed point per tick."""
+    return to_fixed(gain * CONTROL_PERIOD, INTEGRAL_BITS)

@@ -1,0 +1,137 @@
+"""Mamdani inference as in Matlab's Fuzzy Logic Toolbox (optimization page, section 3).
+
+min AND, max aggregation, min implication of the firing strength times the rule's weight, centroid
+on 101 points; where no rule fires, the mean of the output range. Universes are normalised: inputs
+and output are given as shares of their range.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+N_POINTS: Final = 101
+"""Samples of the output universe, from -1 to 1."""
+
+Floats = NDArray[np.float64]
+
+
+class Shape(IntEnum):
+    """Membership functions that share their half-height points (Matlab's mf2mf)."""
+
+    TRIANGLE = 1
+    GAUSS = 2
+    PI = 3
+
+
+@dataclass(frozen=True, slots=True)
+class FuzzySet:
+    """A symmetric membership function: its peak, and the triangle's distance from peak to foot."""
+
+    peak: float
+    half_width: float
+
+    def membership(self, x: Floats, shape: Shape = Shape.TRIANGLE) -> Floats:
+        """Degree of membership of every x, in [0, 1]; (n,) -> (n,)."""
+        distance = np.abs(x - self.peak) / self.half_width
+        if shape is Shape.TRIANGLE:
+            return np.maximum(0.0, 1.0 - distance)
+        if shape is Shape.GAUSS:
+            # exp(-d^2 / (2 sigma^2)) is one half where the triangle is, at half the half-width.
+            return np.exp(-4.0 * math.log(2.0) * distance**2)
+        inner = 1.0 - 2.0 * distance**2
+        outer = 2.0 * np.maximum(0.0, 1.0 - distance) ** 2
+        return np.where(distance <= 0.5, inner, outer)
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """IF every antecedent (input -> set name) THEN consequent; inputs left out don't matter."""
+
+    antecedents: Mapping[str, str]
+    consequent: str
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mamdani:
+    """A fuzzy inference system with one output.
+
+    inputs: by name, the sets by name; outputs: the output's sets by name, all of one shape.
+    """
+
+    inputs: Mapping[str, Mapping[str, FuzzySet]]
+    outputs: Mapping[str, FuzzySet]
+    rules: Sequence[Rule]
+    output_shape: Shape = Shape.TRIANGLE
+
+    def degrees(self, grid: Mapping[str, Floats]) -> list[Floats]:
+        """Per input, how far each rule's antecedent holds: (n_rules, n_i), 1 where left out."""
+        return [
+            np.stack(
+                [
+                    self.inputs[name][rule.antecedents[name]].membership(values)
+                    if name in rule.antecedents
+                    else np.ones(len(values))
+                    for rule in self.rules
+                ]
+            )
+            for name, values in grid.items()
+        ]
+
+    def consequents(self) -> list[int]:
+        """By rule, the index of the output set that it speaks of."""
+        names = list(self.outputs)
+        return [names.index(rule.consequent) for rule in self.rules]
+
+    def output_memberships(self) -> Floats:
+        """(n_sets, 101) membership of the points of the output universe."""
+        points = output_points()
+        return np.stack([s.membership(points, self.output_shape) for s in self.outputs.values()])
+
+    def infer(self, grid: Mapping[str, Floats]) -> Floats:
+        """Crisp output in [-1, 1] over the product of the inputs' values.
+
+        grid: by input, in the order of `inputs`, the values (n_i,), inside the range.
+        Returns (n_1, n_2, ...).
+        """
+        degrees = self.degrees(grid)
+        shape = tuple(d.shape[1] for d in degrees)
+        levels = np.zeros((len(self.outputs), *shape))
+        for k, (rule, target) in enumerate(zip(self.rules, self.consequents(), strict=True)):
+            strength: Floats = np.ones((1,) * len(shape))
+            for axis, degree in enumerate(degrees):
+                along = [-1 if i == axis else 1 for i in range(len(shape))]
+                strength = np.minimum(strength, degree[k].reshape(along))
+            np.maximum(levels[target], strength * rule.weight, out=levels[target])
+        return centroid(levels, self.output_memberships())
+
+
+def output_points() -> Floats:
+    """(101,) samples of the output universe, symmetric to the bit."""
+    return np.arange(-(N_POINTS // 2), N_POINTS // 2 + 1) / (N_POINTS // 2)
+
+
+def centroid(levels: Floats, memberships: Floats) -> Floats:
+    """Centre of area of the clipped sets' union.
+
+    levels: (n_sets, ...); memberships: (n_sets, 101). Returns (...), 0 where nothing fires.
+    Sums run over the points in order, so that the compiled version gives the same bits.
+    """
+    flat = levels.reshape(len(levels), -1)
+    moment = np.zeros(flat.shape[1])
+    area = np.zeros(flat.shape[1])
+    for k, point in enumerate(output_points()):
+        union = np.minimum(flat[0], memberships[0, k])
+        for level, membership in zip(flat[1:], memberships[1:, k], strict=True):
+            np.maximum(union, np.minimum(level, membership), out=union)
+        moment += point * union
+        area += union
+    crisp = np.divide(moment, area, out=np.zeros_like(moment), where=area > 0.0)
+    return crisp.reshape(levels.shape[1:])

@@ -1,0 +1,1 @@
+"""Foot trajectories, inverse kinematics and the smoothing of desired angles."""

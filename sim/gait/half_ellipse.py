@@ -1,0 +1,25 @@
+"""The foot's closed curve: a straight support phase and a half-ellipse swing (table 3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def half_ellipse(
+    phase: Floats, *, stride: float, height: float, duty_factor: float
+) -> tuple[Floats, Floats]:
+    """Foot position in its leg's frame.
+
+    phase: (...) share of the cycle since the start of support, in [0, 1); stride, height [m];
+    duty_factor: support's share of the cycle.
+    Returns forward (...) from +stride/2 to -stride/2 and back, and lift (...) >= 0 [m].
+    """
+    supporting = phase < duty_factor
+    support = phase / duty_factor
+    swing = np.pi * (phase - duty_factor) / (1.0 - duty_factor)
+    forward = np.where(supporting, 0.5 - support, -0.5 * np.cos(swing)) * stride
+    lift = np.where(supporting, 0.0, np.sin(swing)) * height
+    return forward, lift

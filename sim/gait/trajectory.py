@@ -1,0 +1,87 @@
+"""A scenario's desired joint angles: foot curve -> inverse kinematics -> hold -> FIR filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.errors import UnreachablePose
+from sim.gait.half_ellipse import half_ellipse
+from sim.gait.inverse_kinematics import leg_angles
+from sim.robot import Robot
+from sim.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Desired angles (T, J) [rad] at the control rate; row 0 is the pose at rest.
+
+    miss: (L,) largest distance by which a leg's target lies outside its reach [m].
+    """
+
+    angles: Floats
+    miss: Floats
+
+    @property
+    def reachable(self) -> bool:
+        """Every target can be reached."""
+        return not self.miss.any()
+
+
+def n_ticks(scenario: Scenario) -> int:
+    """Control ticks of the whole walk."""
+    return max(1, round(scenario.duration / CONTROL_PERIOD))
+
+
+def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
+    """The whole walk's desired angles, filtered as the robot's controller receives them."""
+    ticks = np.arange(n_ticks(scenario))
+    # Signals of a slow trajectory source are held between its updates (stepped, section 5.4).
+    updates = np.floor(ticks * (CONTROL_PERIOD * scenario.trajectory_rate) + 1e-9)
+    time = np.where(
+        scenario.trajectory_rate * CONTROL_PERIOD >= 1.0,
+        ticks * CONTROL_PERIOD,
+        updates / scenario.trajectory_rate,
+    )
+    columns, misses = [], []
+    for leg, data in zip(robot.legs, robot.description.legs, strict=True):
+        # A right turn shortens the right legs' stride; a negative turn the left legs'.
+        inner = max(0.0, -leg.side * scenario.turn)
+        forward, lift = half_ellipse(
+            np.mod(time / scenario.cycle_time + data.phase, 1.0),
+            stride=scenario.stride * (1.0 - inner),
+            height=scenario.height,
+            duty_factor=scenario.duty_factor,
+        )
+        sole = (data.contact or robot.description.contact).sole
+        angles, miss = leg_angles(
+            leg,
+            forward,
+            np.full_like(forward, scenario.radius - abs(leg.hip[1])),
+            lift - (scenario.withers - sole),
+        )
+        columns.append(angles)
+        misses.append(float(miss.max()))
+    angles = low_pass(np.concatenate(columns, axis=1), scenario.fir_ms)
+    return Trajectory(angles, np.array(misses))
+
+
+def low_pass(angles: Floats, fir_ms: int) -> Floats:
+    """Moving average over the last `fir_ms` ms, (T, J) -> (T, J), at rest before t = 0."""
+    taps = max(1, round(fir_ms * 1e-3 / CONTROL_PERIOD))
+    at_rest = np.repeat(angles[:1], taps - 1, axis=0)
+    windows = np.lib.stride_tricks.sliding_window_view(np.concatenate([at_rest, angles]), taps, 0)
+    return np.asarray(windows.mean(axis=-1))
+
+
+def require_reachable(robot: Robot, scenario: Scenario) -> None:
+    """Raise UnreachablePose for the leg that misses by most."""
+    trajectory = desired_angles(robot, scenario)
+    if not trajectory.reachable:
+        worst = int(np.argmax(trajectory.miss))
+        raise UnreachablePose(scenario.name, robot.legs[worst].name, float(trajectory.miss[worst]))

@@ -1,0 +1,76 @@
+"""The 500 Hz log of a walk: what the kernel kept of it, and all that follows from that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.kernel.walk import WalkSetup
+from sim.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkLog:
+    """What happened at every control tick (500 Hz) of one walk; T ticks, J joints, L legs.
+
+    time (T,) [s]; base_position (T, 3) [m], base_orientation (T, 4) quaternion x y z w,
+    base_velocity (T, 6) linear [m/s] and angular [rad/s] in the body frame;
+    joint_angle, desired_angle (T, J) [rad]; joint_velocity (T, J) [rad/s];
+    current (T, J) [A]; voltage (T, J) [V]; load_torque (T, J) [N m];
+    foot_force (T, L, 3) [N], world frame; supply (T,) [V].
+    """
+
+    time: NDArray[np.float64]
+    base_position: NDArray[np.float64]
+    base_orientation: NDArray[np.float64]
+    base_velocity: NDArray[np.float64]
+    joint_angle: NDArray[np.float64]
+    joint_velocity: NDArray[np.float64]
+    desired_angle: NDArray[np.float64]
+    current: NDArray[np.float64]
+    voltage: NDArray[np.float64]
+    load_torque: NDArray[np.float64]
+    foot_force: NDArray[np.float64]
+    supply: NDArray[np.float64]
+
+
+def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> WalkLog:
+    """Currents, torques, forces and supply of every tick, from its state and duty.
+
+    states: see `walk.WalkResult`; rows after an early end stay NaN.
+    """
+    # Logs are rare: they alone need CasADi in a process that has a compiled kernel.
+    from sim.kernel.physics_step import physics_model  # noqa: PLC0415
+
+    observe = physics_model(robot).observe
+    n, feet, ticks = robot.n_joints, len(robot.legs), len(states)
+    position, orientation, angle, twist, rate, _ = np.split(
+        states, np.cumsum([3, 4, n, 6, n]), axis=1
+    )
+    walked = int(np.isfinite(states).all(axis=1).sum())
+    seen = [np.full((ticks, observe.numel_out(k)), np.nan) for k in range(5)]
+    if walked:
+        rows = states[:walked].T
+        parts = observe.map(walked)(
+            rows[: 7 + n], rows[7 + n : 13 + 2 * n], rows[13 + 2 * n :], setup.parameters
+        )
+        for target, part in zip(seen, parts, strict=False):
+            target[:walked] = np.array(part).T
+    current, voltage, load, force, supply = seen
+    return WalkLog(
+        time=np.arange(ticks, dtype=np.float64) * CONTROL_PERIOD,
+        base_position=position,
+        base_orientation=orientation,
+        base_velocity=twist,
+        joint_angle=angle,
+        joint_velocity=rate,
+        desired_angle=setup.desired / robot.description.sensors.angle_counts,
+        current=current,
+        voltage=voltage,
+        load_torque=load,
+        foot_force=force.reshape(ticks, feet, 3),
+        supply=supply[:, 0],
+    )

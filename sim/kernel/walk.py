@@ -1,0 +1,109 @@
+"""What a kernel is given and gives back: one walk, whoever computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.base import Drive
+from sim.kernel.parameters import BodyInertia
+from sim.outcome import Status
+from sim.robot import Robot
+
+Floats = NDArray[np.float64]
+
+CODE_LIMIT = 65535
+"""Largest coded error or current; the robot's integers have 16 bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """Integers of sensors and PWM for a batch, and physics steps a control tick."""
+
+    angle_counts: float
+    current_counts: float
+    duty_per_count: float
+    angle_step: int
+    current_step: int
+    pwm_step: int
+    pwm_counts: int
+    substeps: int
+
+    @classmethod
+    def of(cls, robot: Robot, substeps: int) -> Coding:
+        """Resolutions of a robot's sensors and bridges."""
+        d = robot.description
+        return cls(
+            angle_counts=d.sensors.angle_counts,
+            current_counts=d.sensors.current_counts,
+            duty_per_count=d.pwm.full_scale / (d.supply.nominal_voltage * d.pwm.counts),
+            angle_step=d.sensors.angle_step,
+            current_step=d.sensors.current_step,
+            pwm_step=d.pwm.step,
+            pwm_counts=d.pwm.counts,
+            substeps=substeps,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkSetup:
+    """One walk to be computed.
+
+    start (7+J,): initial q, at rest; parameters (P,), see `parameters.Layout`; desired (T, J)
+    int32 coded angles; fall_height [m] and fall_cosine: below either the robot has fallen.
+    """
+
+    start: Floats
+    parameters: Floats
+    desired: NDArray[np.int32]
+    drive: Drive
+    fall_height: float
+    fall_cosine: float = 0.5**0.5
+
+    @property
+    def ticks(self) -> int:
+        """T."""
+        return len(self.desired)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkResult:
+    """sums (5,): `physics_step.TERMS` summed over physics steps; end (7+J,): final q.
+
+    states (T, 7+J + 6+J + J): q, v and duty at every control tick after its control, NaN after an
+    early end; None if not asked for. `observation.observe` tells the rest.
+    """
+
+    status: Status
+    sums: Floats
+    end: Floats
+    states: Floats | None = field(default=None, repr=False)
+
+
+class Kernel(Protocol):
+    """Computes walks. Thread-safe; a walk's result does not depend on its neighbours."""
+
+    @property
+    def backend(self) -> str:
+        """`native` or `reference`."""
+
+    @property
+    def lanes(self) -> int:
+        """Walks that are stepped together."""
+
+    @property
+    def body(self) -> BodyInertia:
+        """The unloaded body's inertia."""
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the whole robot without load [kg]."""
+
+    def walk(
+        self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
+    ) -> tuple[WalkResult, ...]:
+        """All walks, in order."""

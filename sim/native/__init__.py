@@ -1,0 +1,1 @@
+"""C code: compiled at first use, cached, loaded with ctypes."""

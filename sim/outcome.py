@@ -1,0 +1,93 @@
+"""What one simulated walk is worth: objectives and a status."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import SimulationInputError
+
+
+class Status(IntEnum):
+    """How a walk ended. A result like any other: a bad design is not an error.
+
+    The integer is what arrays and the kernel carry, `label` is what people and JSON see.
+    """
+
+    OK = 0
+    DIVERGED = 1
+    FELL = 2
+    UNREACHABLE = 3
+    STALLED = 4
+
+    @property
+    def label(self) -> str:
+        """Lower-case name, as printed and stored."""
+        return self.name.lower()
+
+    @property
+    def phrase(self) -> str:
+        """One sentence that a user can act on."""
+        return _PHRASES[self]
+
+    @classmethod
+    def from_label(cls, label: str) -> Status:
+        """Inverse of `label`; KeyError for an unknown one."""
+        return cls[label.upper()]
+
+
+_PHRASES: Final = {
+    Status.OK: "walked to the end",
+    Status.DIVERGED: "a state became infinite or undefined; check gains and contact stiffness",
+    Status.FELL: "the body sank below half its withers or tilted over 45 degrees",
+    Status.UNREACHABLE: "the foot trajectory leaves the leg's reach; reduce stride or withers",
+    Status.STALLED: "the robot did not move forward, so energy per metre has no value",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """One thing to be minimized (thesis table 4.1)."""
+
+    name: str
+    unit: str
+    description: str
+
+
+OBJECTIVES: Final[tuple[Objective, ...]] = (
+    Objective("torque", "N m", "f1: rms over time of the sum of the absolute gear torques"),
+    Objective("acceleration", "m/s2", "f2: rms of the norm of the body's linear acceleration"),
+    Objective("angular_acceleration", "rad/s2", "f3: rms of the body's angular acceleration"),
+    Objective("energy", "J/m", "f4: electrical energy of the motors per metre walked"),
+    Objective("reciprocal_speed", "s/m", "f5: one over the mean forward speed"),
+    Objective("height_loss", "m", "f6: height of the body at the end less that at the start"),
+)
+"""Columns of every objectives array, in order."""
+
+OBJECTIVE_NAMES: Final = tuple(objective.name for objective in OBJECTIVES)
+N_OBJECTIVES: Final = len(OBJECTIVES)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """Results of a batch of designs in one scenario.
+
+    objectives: (n, 6) float64, columns as in `OBJECTIVES`; a value that does not exist
+        (the design did not walk) is NaN.
+    statuses: (n,) uint8, values of `Status`.
+    """
+
+    objectives: NDArray[np.float64]
+    statuses: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        n = len(self.statuses)
+        if self.objectives.shape != (n, N_OBJECTIVES) or self.statuses.shape != (n,):
+            raise SimulationInputError(
+                f"an outcome of {n} designs needs objectives of shape ({n}, {N_OBJECTIVES}),"
+                f" not {self.objectives.shape}"
+            )

@@ -1,0 +1,128 @@
+"""The robot as typed data: legs, drives, supply, sensors, contact.
+
+The numbers live in a TOML file beside the robot's URDF (see sim/robot/szabadka2); these classes
+say what they mean, in which unit, and what is refused.
+"""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+JOINTS_PER_LEG = 3
+"""Coxa, femur, tibia."""
+
+
+class _Data(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Motor(_Data):
+    """A DC motor (thesis 2.2.5)."""
+
+    torque_constant: float = Field(gt=0.0, description="K_M [N m/A]; also the back-EMF's [V s/rad]")
+    resistance: float = Field(gt=0.0, description="R [ohm]")
+    inductance: float = Field(gt=0.0, description="L [H]")
+    rotor_inertia: float = Field(gt=0.0, description="J_M [kg m2]")
+    viscous_friction: float = Field(ge=0.0, description="B_M [N m s/rad], motor side")
+
+
+class Gearhead(_Data):
+    """A planetary gearhead; its losses are viscous friction on the output side."""
+
+    ratio: float = Field(gt=0.0, description="r_G [1]")
+    nominal_torque: float = Field(gt=0.0, description="M_NG [N m]")
+    nominal_speed: float = Field(gt=0.0, description="omega_NG [rad/s], motor side")
+    efficiency: float = Field(gt=0.0, le=1.0, description="eta at the nominal point [1]")
+
+
+class DriveTrain(_Data):
+    """Motor, gearhead and bevel gear of one joint, by the names of its parts."""
+
+    motor: str
+    gearhead: str
+    bevel: float = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
+
+
+class Supply(_Data):
+    """One battery for all motors."""
+
+    voltage: float = Field(gt=0.0, description="open-circuit voltage [V]")
+    resistance: float = Field(ge=0.0, description="internal resistance [ohm]")
+    nominal_voltage: float = Field(
+        gt=0.0, description="supply at which the PWM's full scale is given [V]"
+    )
+
+
+class Pwm(_Data):
+    """Coded control signal: integer counts, full scale at the nominal supply."""
+
+    counts: int = Field(gt=0, le=32767, description="full scale [counts]")
+    full_scale: float = Field(gt=0.0, description="motor voltage at full scale [V]")
+    step: int = Field(default=1, ge=1, description="resolution [counts]")
+
+
+class Sensors(_Data):
+    """Coded readings (thesis table 4.4): integers, in steps of the converter's resolution."""
+
+    angle_counts: float = Field(gt=0.0, description="code of one radian [counts/rad]")
+    angle_step: int = Field(default=1, ge=1, description="encoder resolution [counts]")
+    current_counts: float = Field(gt=0.0, description="code of one ampere [counts/A]")
+    current_step: int = Field(default=16, ge=1, description="resolution of the ADC [counts]")
+
+
+class Contact(_Data):
+    """Sole on ground (thesis 2.2.6): spring and damper, friction with a linear zone."""
+
+    stiffness: float = Field(gt=0.0, description="k [N/m]")
+    damping: float = Field(ge=0.0, description="c [N s/m]")
+    sole: float = Field(ge=0.0, description="length of the sole's spring below the tibia [m]")
+    friction: float = Field(ge=0.0, description="mu [1]")
+    slip_velocity: float = Field(gt=0.0, description="v_lin: full friction from here on [m/s]")
+
+
+class Leg(_Data):
+    """One leg: joints `<name>_coxa`, `_femur`, `_tibia` and frame `<name>_foot` of the URDF."""
+
+    name: str
+    phase: float = Field(ge=0.0, lt=1.0, description="start of support, share of the cycle [1]")
+    drives: tuple[str, str, str] = Field(description="drive train of coxa, femur, tibia")
+    contact: Contact | None = Field(default=None, description="this foot's own contact")
+
+    @property
+    def joints(self) -> tuple[str, str, str]:
+        """Names of the joints in the URDF."""
+        return (f"{self.name}_coxa", f"{self.name}_femur", f"{self.name}_tibia")
+
+    @property
+    def foot(self) -> str:
+        """Name of the frame at the tibia's end."""
+        return f"{self.name}_foot"
+
+
+class RobotDescription(_Data):
+    """All of a robot that its URDF does not say."""
+
+    name: str
+    description: str = ""
+    load_height: float = Field(description="height of a load over the body's centre [m]")
+    motors: dict[str, Motor]
+    gearheads: dict[str, Gearhead]
+    drives: dict[str, DriveTrain]
+    supply: Supply
+    pwm: Pwm
+    sensors: Sensors
+    contact: Contact
+    legs: tuple[Leg, ...] = Field(min_length=3)
+
+    @model_validator(mode="after")
+    def _names_exist(self) -> RobotDescription:
+        for name, drive in self.drives.items():
+            if drive.motor not in self.motors:
+                raise ValueError(f"drives.{name}.motor: no motor {drive.motor!r} is described")
+            if drive.gearhead not in self.gearheads:
+                raise ValueError(f"drives.{name}.gearhead: no gearhead {drive.gearhead!r}")
+        for k, leg in enumerate(self.legs):
+            for drive_name in leg.drives:
+                if drive_name not in self.drives:
+                    raise ValueError(f"legs.{k}.drives: no drive {drive_name!r} is described")
+        return self

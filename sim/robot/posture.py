@@ -1,0 +1,38 @@
+"""A robot at rest: forward kinematics of the feet and the height at which it stands."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.robot.robot import Robot
+
+Floats = NDArray[np.float64]
+
+
+def feet_below_body(robot: Robot, joints: Floats) -> Floats:
+    """Height of every tibia's end in the body frame, joints (J,) -> (L,) [m], mostly negative."""
+    angles = joints.reshape(-1, 3)
+    return np.array(
+        [
+            leg.hip[2] + leg.femur * np.sin(theta1) + leg.tibia * np.sin(theta1 + theta2)
+            for leg, (_, theta1, theta2) in zip(robot.legs, angles, strict=True)
+        ]
+    )
+
+
+def resting_height(robot: Robot, joints: Floats, weight: float) -> float:
+    """Height [m] of a level body at which the feet's springs carry the weight [N].
+
+    The springs' force is piecewise linear in height; feet are loaded from the lowest up until the
+    balance leaves the next one in the air.
+    """
+    contacts = robot.contacts()
+    reach = np.array([c.sole for c in contacts]) - feet_below_body(robot, joints)
+    stiffness = np.array([c.stiffness for c in contacts])
+    order = np.argsort(-reach)
+    reach, stiffness = reach[order], stiffness[order]
+    # Height at which the n lowest feet balance the weight, for every n.
+    heights = (np.cumsum(stiffness * reach) - weight) / np.cumsum(stiffness)
+    next_reach = np.append(reach[1:], -np.inf)
+    return float(heights[np.argmax(heights >= next_reach)])

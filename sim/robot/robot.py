@@ -1,0 +1,173 @@
+"""A robot ready to be simulated: description, leg geometry, and numbers by joint and by foot."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Final
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from sim.errors import RobotFileError, SimulationInputError
+from sim.robot.description import JOINTS_PER_LEG, Contact, RobotDescription
+
+SHIPPED: Final = ("szabadka2",)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class LegGeometry:
+    """What inverse kinematics needs of a leg.
+
+    hip: coxa axis in the body frame (3,) [m]; side: +1 left, -1 right;
+    coxa, femur, tibia: link lengths [m].
+    """
+
+    name: str
+    hip: tuple[float, float, float]
+    side: float
+    coxa: float
+    femur: float
+    tibia: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointDrive:
+    """Motors and gears by joint, in joint order, referred to the joint; arrays (J,).
+
+    torque: r K_M [N m/A], also the back-EMF [V s/rad]; resistance [ohm]; inductance [H];
+    armature: J_M r^2 [kg m2]; motor_friction: B_M r^2, gear_friction: B_G at eta = 0
+    [N m s/rad], to be multiplied by 1 - eta; efficiency: eta [1].
+    """
+
+    torque: Floats
+    resistance: Floats
+    inductance: Floats
+    armature: Floats
+    motor_friction: Floats
+    gear_friction: Floats
+    efficiency: Floats
+
+    @property
+    def viscous(self) -> Floats:
+        """(J,) viscous friction at the joint [N m s/rad], eq. 2.8 and the gearhead's."""
+        return self.motor_friction + (1.0 - self.efficiency) * self.gear_friction
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """A robot description with its URDF; immutable, hence shared between threads."""
+
+    description: RobotDescription
+    urdf: str
+    legs: tuple[LegGeometry, ...]
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Joints in the order of every joint array: leg by leg, coxa, femur, tibia."""
+        return tuple(name for leg in self.description.legs for name in leg.joints)
+
+    @property
+    def n_joints(self) -> int:
+        """J."""
+        return JOINTS_PER_LEG * len(self.legs)
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Each foot's contact parameters, its own or the robot's."""
+        return tuple(leg.contact or self.description.contact for leg in self.description.legs)
+
+    def drives(self) -> JointDrive:
+        """Motor and gear numbers by joint."""
+        d = self.description
+        rows = []
+        for leg in d.legs:
+            for name in leg.drives:
+                drive = d.drives[name]
+                motor, gear = d.motors[drive.motor], d.gearheads[drive.gearhead]
+                ratio = gear.ratio * drive.bevel
+                rows.append(
+                    (
+                        ratio * motor.torque_constant,
+                        motor.resistance,
+                        motor.inductance,
+                        motor.rotor_inertia * ratio**2,
+                        motor.viscous_friction * ratio**2,
+                        gear.nominal_torque * gear.ratio / gear.nominal_speed * drive.bevel**2,
+                        gear.efficiency,
+                    )
+                )
+        return JointDrive(*np.array(rows).T.copy())
+
+
+@lru_cache(maxsize=8)
+def load_robot(name: str) -> Robot:
+    """A robot that ships with gaitswarm. Raises SimulationInputError for an unknown name."""
+    if name not in SHIPPED:
+        raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
+    folder = resources.files("sim.robot") / name
+    return parse_robot(
+        (folder / "robot.toml").read_text(encoding="utf-8"),
+        (folder / "robot.urdf").read_text(encoding="utf-8"),
+    )
+
+
+def parse_robot(toml: str, urdf: str) -> Robot:
+    """A robot from the text of its two files. Raises RobotFileError that names the field."""
+    try:
+        description = RobotDescription.model_validate(tomllib.loads(toml))
+    except tomllib.TOMLDecodeError as error:
+        raise RobotFileError(f"robot.toml: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise RobotFileError(f"robot.toml: {where}: {first['msg']}") from error
+    joints = _joint_origins(urdf)
+    return Robot(description, urdf, tuple(_geometry(leg.name, joints) for leg in description.legs))
+
+
+def _joint_origins(urdf: str) -> dict[str, tuple[float, float, float]]:
+    """Origin of every joint in its parent's frame, by the name of the joint and of its child."""
+    try:
+        # Robot files are the user's own; no network input is ever parsed here.
+        root = ET.fromstring(urdf)  # noqa: S314
+    except ET.ParseError as error:
+        raise RobotFileError(f"robot.urdf: {error}") from error
+    origins: dict[str, tuple[float, float, float]] = {}
+    for joint in root.findall("joint"):
+        origin, child = joint.find("origin"), joint.find("child")
+        text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+        try:
+            x, y, z = (float(part) for part in text.split())
+        except ValueError as error:
+            raise RobotFileError(
+                f"robot.urdf: joint {joint.get('name')!r}: origin {text!r} is not three numbers"
+            ) from error
+        origins[joint.get("name", "")] = (x, y, z)
+        if child is not None:
+            origins[child.get("link", "")] = (x, y, z)
+    return origins
+
+
+def _geometry(leg: str, origins: dict[str, tuple[float, float, float]]) -> LegGeometry:
+    names = {part: f"{leg}_{part}" for part in ("coxa", "femur", "tibia", "foot")}
+    for name in names.values():
+        if name not in origins:
+            raise RobotFileError(f"robot.urdf: leg {leg!r} has no joint or frame {name!r}")
+    hip = origins[names["coxa"]]
+    if hip[1] == 0.0:
+        raise RobotFileError(f"robot.urdf: {names['coxa']}: a hip must lie left or right of y = 0")
+    return LegGeometry(
+        name=leg,
+        hip=hip,
+        side=math.copysign(1.0, hip[1]),
+        coxa=math.hypot(*origins[names["femur"]]),
+        femur=math.hypot(*origins[names["tibia"]]),
+        tibia=math.hypot(*origins[names["foot"]]),
+    )

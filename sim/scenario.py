@@ -1,0 +1,130 @@
+"""Walking scenarios (thesis table 4.2) and the gait parameters that a design may set."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from sim.errors import SimulationInputError
+from sim.variables import Variable
+
+ScenarioName = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=60,
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        description="Name of the scenario, unique in its job.",
+        examples=["normal-fast"],
+    ),
+]
+
+
+class Scenario(BaseModel):
+    """One walk to be judged: gait, posture, load and ground. All fields have units.
+
+    Fields that table 4.2 does not give have the defaults that docs/model.md explains.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: ScenarioName
+    cycle_time: float = Field(
+        ge=0.2, le=10.0, description="Duration of a walking cycle [s].", examples=[1.5]
+    )
+    radius: float = Field(
+        gt=0.0,
+        le=1.0,
+        description="Lateral distance of the feet from the body's long axis [m].",
+        examples=[0.16],
+    )
+    withers: float = Field(
+        gt=0.0, le=1.0, description="Height of the coxa axes over the ground [m].", examples=[0.15]
+    )
+    load: float = Field(
+        default=0.0, ge=0.0, le=50.0, description="Extra mass carried on the body [kg]."
+    )
+    turn: float = Field(
+        default=0.0,
+        ge=-1.0,
+        le=1.0,
+        description="Share by which the inner legs' stride is shortened [1]; right turns positive.",
+    )
+    slope: float = Field(
+        default=0.0, ge=-45.0, le=45.0, description="Inclination of the ground [deg], up positive."
+    )
+    stride: float = Field(
+        default=0.16, gt=0.0, le=1.0, description="Length of a foot's stroke on the ground [m]."
+    )
+    height: float = Field(
+        default=0.03, ge=0.0, le=0.5, description="Height of the swing half-ellipse [m]."
+    )
+    duty_factor: float = Field(
+        default=0.56, ge=0.1, le=0.95, description="Support phase's share of the cycle [1]."
+    )
+    fir_ms: int = Field(
+        default=12, ge=0, le=1000, description="Length of the low-pass FIR filter [ms]."
+    )
+    trajectory_rate: float = Field(
+        default=500.0,
+        ge=1.0,
+        le=500.0,
+        description="Rate at which the desired angles are updated [Hz].",
+    )
+    cycles: float = Field(
+        default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."
+    )
+
+    @property
+    def duration(self) -> float:
+        """Simulated time [s]."""
+        return self.cycles * self.cycle_time
+
+
+GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
+    Variable(name="cycle_time", low=0.9, high=1.7, unit="s", description="Walking cycle."),
+    Variable(name="stride", low=0.10, high=0.18, unit="m", description="Stroke on the ground."),
+    Variable(name="height", low=0.01, high=0.04, unit="m", description="Height of the swing."),
+    Variable(name="duty_factor", low=0.45, high=0.75, unit="1", description="Support share."),
+    Variable(
+        name="fir_ms",
+        low=4,
+        high=300,
+        unit="ms",
+        kind="integer",
+        description="Low-pass FIR filter of the desired angles.",
+    ),
+    Variable(
+        name="trajectory_rate",
+        low=20.0,
+        high=500.0,
+        unit="Hz",
+        description="Update rate of the desired angles.",
+    ),
+)
+"""Gait parameters that a design may set beside the controller's (thesis table 3.2).
+
+A value set by a design replaces the scenario's own in every scenario.
+"""
+
+GAIT_VARIABLE_NAMES: Final = frozenset(variable.name for variable in GAIT_VARIABLES)
+
+SCENARIOS: Final[tuple[Scenario, ...]] = (
+    Scenario(name="normal-fast", cycle_time=1.5, radius=0.16, withers=0.15),
+    Scenario(name="normal-slow", cycle_time=2.2, radius=0.16, withers=0.15),
+    Scenario(name="loaded-fast", cycle_time=1.5, radius=0.145, withers=0.20, load=2.0),
+    Scenario(name="loaded-slow", cycle_time=2.2, radius=0.145, withers=0.20, load=2.0),
+    Scenario(name="slope-fast", cycle_time=1.5, radius=0.20, withers=0.14, slope=10.0),
+    Scenario(name="turn-right-fast", cycle_time=1.5, radius=0.16, withers=0.15, turn=0.5),
+)
+"""The six scenarios of table 4.2, in its order."""
+
+
+def find_scenario(name: str) -> Scenario:
+    """Preset by name, or by its number 1..6 in table 4.2."""
+    for number, scenario in enumerate(SCENARIOS, start=1):
+        if name in (scenario.name, str(number)):
+            return scenario
+    known = ", ".join(f"{k} {s.name}" for k, s in enumerate(SCENARIOS, start=1))
+    raise SimulationInputError(f"unknown scenario {name!r}; known are {known}")

@@ -1,0 +1,225 @@
+"""The entry point: a batch of designs in one scenario -> objectives and statuses."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from sim.controllers import CONTROLLERS, Drive
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.errors import SimulationInputError
+from sim.gait.trajectory import desired_angles, require_reachable
+from sim.kernel.native import native_kernel
+from sim.kernel.observation import WalkLog, walk_log
+from sim.kernel.parameters import gravity_on, pack_parameters
+from sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup
+from sim.native.compilation import target
+from sim.outcome import N_OBJECTIVES, Outcome, Status
+from sim.robot import Robot, load_robot
+from sim.robot.posture import resting_height
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
+
+Backend = Literal["auto", "native", "reference"]
+
+PHYSICS_RATE: Final = 5000
+"""Physics steps a second [Hz]; the control rate is 500 Hz."""
+
+SHORTEST_WALK: Final = 1e-3
+"""Distance [m] under which a robot counts as not walking: energy per metre has no value."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulation:
+    """Outcome of every design and, if asked for, every walk's log, in the order of the designs.
+
+    A design that was never simulated (unreachable) has no log; one that ended early has NaN after.
+    """
+
+    outcome: Outcome
+    logs: tuple[WalkLog | None, ...] = ()
+
+
+def simulate(
+    scenario: Scenario,
+    controller: str,
+    variables: Sequence[str],
+    designs: NDArray[np.float64],
+    *,
+    robot: str = "szabadka2",
+    log: bool = False,
+    backend: Backend = "auto",
+    physics_rate: int = PHYSICS_RATE,
+) -> Simulation:
+    """Let every design walk through a scenario.
+
+    designs: (n, len(variables)); columns are controller variables (all of them) and gait
+        variables (any of them, replacing the scenario's value).
+    backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first
+        that works on this machine (with a warning if it is the slow one).
+
+    Raises SimulationInputError that names the variable for a design that cannot be simulated.
+    """
+    _check_arguments(controller, variables, designs, physics_rate)
+    machine = load_robot(robot)
+    kernel = _kernel(machine, backend)
+    substeps = round(physics_rate * CONTROL_PERIOD)
+    statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
+    objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
+    setups: dict[int, WalkSetup] = {}
+    courses: dict[tuple[float, ...], _Course | None] = {}
+    for index, row in enumerate(designs.tolist()):
+        design = dict(zip(variables, row, strict=True))
+        gait = {name: design.pop(name) for name in variables if name in GAIT_VARIABLE_NAMES}
+        drive = CONTROLLERS[controller].compile(design)  # type: ignore[index]
+        key = tuple(gait.values())
+        if key not in courses:
+            courses[key] = _course(machine, kernel, with_gait(scenario, gait), 1.0 / physics_rate)
+        course = courses[key]
+        if course is not None:
+            setups[index] = course.driven_by(drive)
+    results = kernel.walk(list(setups.values()), Coding.of(machine, substeps), log=log)
+    logs: list[WalkLog | None] = [None] * len(designs)
+    for (index, setup), result in zip(setups.items(), results, strict=True):
+        statuses[index], objectives[index] = _judge(setup, result, substeps, 1.0 / physics_rate)
+        if result.states is not None:
+            logs[index] = walk_log(machine, setup, result.states)
+    return Simulation(Outcome(objectives, statuses), tuple(logs) if log else ())
+
+
+def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
+    """The scenario with some gait parameters replaced. Raises SimulationInputError."""
+    if not gait:
+        return scenario
+    values: dict[str, float] = dict(gait)
+    if "fir_ms" in values:
+        if not float(values["fir_ms"]).is_integer():
+            raise SimulationInputError(f"fir_ms: {values['fir_ms']:g} is not a whole number of ms")
+        values["fir_ms"] = int(values["fir_ms"])
+    try:
+        return Scenario.model_validate(scenario.model_dump() | values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise SimulationInputError(f"{where}: {first['msg']}") from error
+
+
+def check_reach(
+    scenario: Scenario, variables: Sequence[str], design: Sequence[float], *, robot: str
+) -> None:
+    """Raise UnreachablePose if the gait of this design leaves the legs' reach in this scenario."""
+    gait = {
+        name: value
+        for name, value in zip(variables, design, strict=True)
+        if name in GAIT_VARIABLE_NAMES
+    }
+    require_reachable(load_robot(robot), with_gait(scenario, gait))
+
+
+def prepare(robot: str = "szabadka2", *, backend: Backend = "auto") -> str:
+    """Build (or find in the cache) the kernel; returns the backend in use, native or reference."""
+    return _kernel(load_robot(robot), backend).backend
+
+
+def lanes() -> int:
+    """Walkers that the kernel steps together; chunks of a batch should be multiples of it."""
+    return target().lanes
+
+
+def _check_arguments(
+    controller: str, variables: Sequence[str], designs: NDArray[np.float64], physics_rate: int
+) -> None:
+    if controller not in CONTROLLERS:
+        raise SimulationInputError(
+            f"controller: unknown {controller!r}; known are {', '.join(CONTROLLERS)}"
+        )
+    known = {v.name for v in CONTROLLERS[controller].variables} | GAIT_VARIABLE_NAMES
+    for name in variables:
+        if name not in known:
+            raise SimulationInputError(
+                f"{name}: not a variable of {controller}; known are {', '.join(sorted(known))}"
+            )
+    if designs.ndim != 2 or designs.shape[1] != len(variables):
+        raise SimulationInputError(
+            f"designs: shape {designs.shape} does not match {len(variables)} variables"
+        )
+    if not np.isfinite(designs).all():
+        row, column = np.argwhere(~np.isfinite(designs))[0]
+        raise SimulationInputError(f"{variables[column]}: not a finite number in design {row}")
+    if physics_rate < 1000 or physics_rate % round(1.0 / CONTROL_PERIOD):
+        raise SimulationInputError(
+            f"physics_rate: {physics_rate} Hz is not a multiple of the control rate from 1000 Hz"
+        )
+
+
+def _kernel(robot: Robot, backend: Backend) -> Kernel:
+    if backend != "reference":
+        native = native_kernel(robot)
+        if native is not None:
+            return native
+        if backend == "native":
+            raise SimulationInputError("backend: no C compiler found for the native kernel")
+        warnings.warn(
+            "no C compiler found: simulating with the interpreter, some hundred times slower;"
+            " install gcc or clang, or `pip install gaitswarm[compiler]`",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    # The native kernel does without CasADi and Pinocchio, which are slow to import.
+    from sim.kernel.reference import reference_kernel  # noqa: PLC0415
+
+    return reference_kernel(robot)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Course:
+    """All of a walk but its drive: designs of one gait share it."""
+
+    start: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+    desired: NDArray[np.int32]
+    fall_height: float
+
+    def driven_by(self, drive: Drive) -> WalkSetup:
+        return WalkSetup(self.start, self.parameters, self.desired, drive, self.fall_height)
+
+
+def _course(robot: Robot, kernel: Kernel, scenario: Scenario, timestep: float) -> _Course | None:
+    """None for a gait out of the legs' reach."""
+    trajectory = desired_angles(robot, scenario)
+    if not trajectory.reachable:
+        return None
+    joints = trajectory.angles[0]
+    weight = (kernel.total_mass + scenario.load) * -gravity_on(scenario.slope)[2]
+    codes = np.rint(trajectory.angles * robot.description.sensors.angle_counts)
+    return _Course(
+        start=np.concatenate(
+            [[0.0, 0.0, resting_height(robot, joints, weight), 0.0, 0.0, 0.0, 1.0], joints]
+        ),
+        parameters=pack_parameters(robot, kernel.body, scenario, timestep),
+        desired=codes.astype(np.int32),
+        fall_height=0.5 * scenario.withers,
+    )
+
+
+def _judge(
+    setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
+) -> tuple[Status, NDArray[np.float64]]:
+    """Status and objectives f1..f6 (table 4.1) from the sums over physics steps."""
+    objectives = np.full(N_OBJECTIVES, np.nan)
+    if result.status is not Status.OK:
+        return result.status, objectives
+    steps = setup.ticks * substeps
+    objectives[:3] = np.sqrt(result.sums[:3] / steps)
+    objectives[5] = result.end[2] - setup.start[2]
+    distance = result.sums[4] * timestep
+    if distance < SHORTEST_WALK:
+        return Status.STALLED, objectives
+    objectives[3] = result.sums[3] * timestep / distance
+    objectives[4] = steps * timestep / distance
+    return Status.OK, objectives

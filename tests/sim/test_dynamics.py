@@ -1,0 +1,194 @@
+"""The symbolic physics against Pinocchio, and its conservation laws."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sim.kernel.parameters import gravity_on, pack_parameters
+from sim.kernel.physics_step import PhysicsModel, physics_model
+from sim.robot import Robot, load_robot, parse_robot
+from sim.scenario import SCENARIOS, Scenario
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("szabadka2")
+
+
+@pytest.fixture(scope="module")
+def model(robot: Robot) -> PhysicsModel:
+    return physics_model(robot)
+
+
+class Oracle:
+    """Pinocchio's view of the robot, in our order of joints."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+        joints = [self.model.joints[self.model.getJointId(n)] for n in robot.joint_names]
+        self.q_index = [*range(7), *(joint.idx_q for joint in joints)]
+        self.v_index = [*range(6), *(joint.idx_v for joint in joints)]
+        armature = np.zeros(self.model.nv)
+        armature[self.v_index[6:]] = robot.drives().armature
+        self.model.armature = armature
+        self.data = self.model.createData()
+
+    def q(self, ours: np.ndarray) -> np.ndarray:
+        theirs = np.empty(self.model.nq)
+        theirs[self.q_index] = ours
+        return theirs
+
+    def v(self, ours: np.ndarray) -> np.ndarray:
+        theirs = np.empty(self.model.nv)
+        theirs[self.v_index] = ours
+        return theirs
+
+    def contact_forces(self, q: np.ndarray, v: np.ndarray) -> tuple[Any, np.ndarray]:
+        """Spatial forces for pin.aba and world forces (L, 3), written anew from eq. 2.13."""
+        pin.forwardKinematics(self.model, self.data, self.q(q), self.v(v))
+        pin.updateFramePlacements(self.model, self.data)
+        external = [pin.Force.Zero() for _ in range(self.model.njoints)]
+        world = []
+        for leg, contact in zip(self.robot.description.legs, self.robot.contacts(), strict=True):
+            frame = self.model.getFrameId(leg.foot)
+            place = self.data.oMf[frame]
+            speed = pin.getFrameVelocity(
+                self.model, self.data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            ).linear
+            depth = contact.sole - place.translation[2]
+            force = np.zeros(3)
+            if depth > 0.0:
+                normal = max(0.0, contact.stiffness * depth - contact.damping * speed[2])
+                slip = max(float(np.hypot(*speed[:2])), contact.slip_velocity)
+                force = np.array([*(-contact.friction * normal * speed[:2] / slip), normal])
+            joint = self.model.frames[frame].parentJoint
+            lever = self.model.frames[frame].placement.translation
+            local = self.data.oMi[joint].rotation.T @ force
+            external[joint] = pin.Force(local, np.cross(lever, local))
+            world.append(force)
+        return external, np.array(world)
+
+
+def random_state(rng: np.random.Generator, joints: int) -> tuple[np.ndarray, np.ndarray]:
+    """A pose near walking height with any attitude, and violent velocities."""
+    quaternion = rng.normal(size=4)
+    q = np.concatenate(
+        [
+            rng.uniform([-1, -1, 0.0], [1, 1, 0.2]),
+            quaternion / np.linalg.norm(quaternion),
+            rng.uniform(-1.5, 1.5, joints),
+        ]
+    )
+    return q, rng.normal(size=6 + joints) * 3.0
+
+
+def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
+    robot: Robot, model: PhysicsModel
+) -> None:
+    oracle = Oracle(robot)
+    rng = np.random.default_rng(7)
+    drive, supply = robot.drives(), robot.description.supply
+    slope = Scenario(name="steep", cycle_time=1.5, radius=0.16, withers=0.15, slope=20.0)
+    oracle.model.gravity.linear = gravity_on(slope.slope)
+    p = pack_parameters(robot, model.body, slope, 2e-4)
+    touching, worst = 0, 0.0
+    for _ in range(1000):
+        q, v = random_state(rng, robot.n_joints)
+        duty = rng.uniform(-1.0, 1.0, robot.n_joints)
+        current, voltage, load, forces, battery, found = (
+            np.array(part).ravel() for part in model.observe(q, v, duty, p)
+        )
+        # The battery's equation, solved here by its fixed point instead of in closed form.
+        assert battery[0] == pytest.approx(
+            supply.voltage - supply.resistance * float(duty @ current), rel=1e-12
+        )
+        expected = (duty * battery[0] - drive.torque * v[6:]) / drive.resistance
+        np.testing.assert_allclose(current, expected, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(voltage, duty * battery[0], rtol=1e-12)
+        torque = drive.torque * current - drive.viscous * v[6:]
+        external, world = oracle.contact_forces(q, v)
+        touching += int((world[:, 2] > 0).any())
+        tau = np.zeros(oracle.model.nv)
+        tau[oracle.v_index[6:]] = torque
+        reference = pin.aba(oracle.model, oracle.data, oracle.q(q), oracle.v(v), tau, external)
+        reference = reference[oracle.v_index]
+        worst = max(worst, float(np.abs(found - reference).max() / np.abs(reference).max()))
+        np.testing.assert_allclose(forces.reshape(-1, 3), world, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            load, torque - drive.armature * reference[6:], rtol=1e-7, atol=1e-7
+        )
+    assert touching > 200
+    assert worst < 1e-10
+
+
+def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -> None:
+    oracle = Oracle(robot)
+    rng = np.random.default_rng(3)
+    loaded = SCENARIOS[2]
+    assert loaded.load == 2.0
+    at = pin.SE3(np.eye(3), np.array([0.0, 0.0, robot.description.load_height]))
+    oracle.model.appendBodyToJoint(1, pin.Inertia(loaded.load, np.zeros(3), np.zeros((3, 3))), at)
+    oracle.data = oracle.model.createData()
+    p = pack_parameters(robot, model.body, loaded, 2e-4)
+    drive = robot.drives()
+    for _ in range(20):
+        q, v = random_state(rng, robot.n_joints)
+        q[2] = 5.0
+        current, *_, found = (
+            np.array(part).ravel() for part in model.observe(q, v, np.zeros(18), p)
+        )
+        tau = np.zeros(oracle.model.nv)
+        tau[oracle.v_index[6:]] = drive.torque * current - drive.viscous * v[6:]
+        reference = pin.aba(oracle.model, oracle.data, oracle.q(q), oracle.v(v), tau)
+        np.testing.assert_allclose(found, reference[oracle.v_index], rtol=1e-9, atol=1e-9)
+
+
+def lossless() -> Robot:
+    """The robot without friction, and with motors that neither drive nor brake."""
+    folder = resources.files("sim.robot") / "szabadka2"
+    toml = (folder / "robot.toml").read_text(encoding="utf-8")
+    for line, replacement in (
+        ("efficiency = 0.6", "efficiency = 1.0"),
+        ("resistance = 4.09", "resistance = 1e15"),
+        ("resistance = 1.9 ", "resistance = 1e15 "),
+        ("resistance = 1.9\n", "resistance = 1e15\n"),
+        ("viscous_friction = 3.7659e-7", "viscous_friction = 0.0"),
+        ("viscous_friction = 1.1851415e-6", "viscous_friction = 0.0"),
+    ):
+        toml = toml.replace(line, replacement)
+    return parse_robot(toml, (folder / "robot.urdf").read_text(encoding="utf-8"))
+
+
+def energy_drift(robot: Robot, timestep: float) -> float:
+    """Relative drift of the energy over a tumbling free flight of 0.2 s."""
+    model, oracle = physics_model(robot), Oracle(robot)
+    q, v = random_state(np.random.default_rng(11), robot.n_joints)
+    q[2] = 10.0
+    p = pack_parameters(robot, model.body, SCENARIOS[0], timestep)
+
+    def energy() -> float:
+        inertia = pin.crba(oracle.model, oracle.data, oracle.q(q))
+        inertia = np.triu(inertia) + np.triu(inertia, 1).T
+        kinetic = 0.5 * oracle.v(v) @ inertia @ oracle.v(v)
+        return float(kinetic + pin.computePotentialEnergy(oracle.model, oracle.data, oracle.q(q)))
+
+    before = energy()
+    for _ in range(round(0.2 / timestep)):
+        q, v, *_ = (np.array(part).ravel() for part in model.step(q, v, np.zeros(18), p))
+    assert abs(np.linalg.norm(q[3:7]) - 1.0) < 1e-12
+    return abs(energy() - before) / abs(before)
+
+
+def test_energy_is_conserved_without_contact_and_friction() -> None:
+    robot = lossless()
+    assert not robot.drives().viscous.any()
+    coarse, fine = energy_drift(robot, 2e-4), energy_drift(robot, 1e-4)
+    # First-order integration: what drift there is halves with the step.
+    assert coarse < 1e-3
+    assert fine < 0.6 * coarse

@@ -1,0 +1,125 @@
+"""Fuzzy inference against scikit-fuzzy, and the integers that the robot runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import skfuzzy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.controllers import CONTROLLERS
+from sim.controllers.fuzzy_pi import inference_system, quantised_table, table_axes, table_bytes
+from sim.controllers.mamdani import FuzzySet, Shape, output_points
+from sim.controllers.native_inference import infer
+
+WEIGHTS = st.floats(0.1, 1.0)
+
+
+def scikit_fuzzy_union(e: float, c: float, w: tuple[float, ...], shape: Shape) -> np.ndarray:
+    """Table 4.3 written once more, with scikit-fuzzy's own functions."""
+    y = output_points()
+    sigma = 0.25 / np.sqrt(2 * np.log(2))
+
+    def output(peak: float) -> np.ndarray:
+        if shape is Shape.TRIANGLE:
+            return skfuzzy.trimf(y, [peak - 0.5, peak, peak + 0.5])
+        if shape is Shape.GAUSS:
+            return skfuzzy.gaussmf(y, peak, sigma)
+        return skfuzzy.pimf(y, peak - 0.5, peak, peak, peak + 0.5)
+
+    def holds(x: float, peak: float) -> float:
+        return float(skfuzzy.trimf(np.array([x]), [peak - 1, peak, peak + 1])[0])
+
+    zero, positive, negative = holds(e, 0.0), holds(e, 1.0), holds(e, -1.0)
+    small, large = holds(c, 0.0), holds(c, 1.0)
+    fw1, fw23, fw4, fw56 = w
+    fired = [
+        (fw1 * zero, 0.0),
+        (fw23 * positive, 0.5),
+        (fw23 * negative, -0.5),
+        (fw4 * min(zero, small), 0.0),
+        (fw56 * min(negative, large), 1.0),
+        (fw56 * min(positive, large), -1.0),
+    ]
+    return np.max([np.minimum(level, output(peak)) for level, peak in fired], axis=0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(-1, 1),
+    st.floats(0, 1),
+    st.tuples(WEIGHTS, WEIGHTS, WEIGHTS, WEIGHTS),
+    st.sampled_from(Shape),
+)
+def test_inference_agrees_with_scikit_fuzzy(
+    e: float, c: float, weights: tuple[float, float, float, float], shape: Shape
+) -> None:
+    system = inference_system(*weights, shape)
+    ours = system.infer({"error": np.array([e]), "current": np.array([c])})[0, 0]
+    y = output_points()
+    union = scikit_fuzzy_union(e, c, weights, shape)
+    assert ours == pytest.approx(float(y @ union / union.sum()), abs=1e-12)
+    # scikit-fuzzy integrates between the points where we sum over them, as Matlab does.
+    assert ours == pytest.approx(float(skfuzzy.defuzz(y, union, "centroid")), abs=0.03)
+
+
+@pytest.mark.parametrize("shape", Shape)
+def test_membership_functions_share_their_half_height_points(shape: Shape) -> None:
+    member = FuzzySet(0.3, 0.4)
+    x = np.array([0.1, 0.3, 0.5])
+    np.testing.assert_allclose(member.membership(x, shape), [0.5, 1.0, 0.5], atol=1e-12)
+
+
+def test_where_no_rule_fires_the_output_is_the_middle_of_its_range() -> None:
+    system = inference_system(0.0, 0.0, 0.0, 0.0, Shape.TRIANGLE)
+    assert system.infer({"error": np.array([0.4]), "current": np.array([0.2])})[0, 0] == 0.0
+
+
+@pytest.mark.parametrize("shape", Shape)
+def test_compiled_inference_has_the_same_bits(shape: Shape) -> None:
+    error, current = table_axes()
+    grid = {"error": error, "current": current}
+    system = inference_system(0.187, 0.961, 0.789, 0.927, shape)
+    np.testing.assert_array_equal(infer(system, grid), system.infer(grid))
+
+
+def test_table_is_odd_in_the_error_and_follows_it() -> None:
+    table = quantised_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).astype(int)
+    assert table.shape == (1024, 64)
+    assert not table[512].any()
+    np.testing.assert_array_equal(table[1:512], -table[:512:-1])
+    assert (table[513:, 0] >= 0).all()
+    assert table[-1, 0] == table.max() > 50
+
+
+def test_high_current_reverses_the_drive() -> None:
+    table = quantised_table(0.2, 0.3, 0.2, 1.0, Shape.TRIANGLE).astype(int)
+    assert table[-1, 0] > 0 > table[-1, 63]
+
+
+def test_quantisation_error_is_half_a_step() -> None:
+    error, current = table_axes()
+    exact = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).infer(
+        {"error": error, "current": current}
+    )
+    table = quantised_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
+    assert np.abs(exact - table / 127).max() <= 0.5 / 127 + 1e-12
+
+
+def test_table_memory_follows_equation_5_1() -> None:
+    assert table_bytes((10, 6), 8) == 64 * 1024
+    assert table_bytes((8, 8), 8) == 64 * 1024
+    assert table_bytes((6, 6, 6), 8, outputs=2) == 512 * 1024
+    drive = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    assert drive.table is not None
+    assert drive.table.nbytes == table_bytes((10, 6), 8)
+
+
+def test_drive_scales_are_those_of_the_ranges() -> None:
+    drive = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    assert (5837 * drive.error_gain + (1 << 15)) >> 16 == 511
+    assert (20111 * drive.current_gain + (1 << 15)) >> 16 == 63
+    assert (127 * drive.output_gain + (1 << 15)) >> 16 == 781
+    # 0.171 PWM counts per count and second, at 500 Hz, in 20 fractional bits.
+    assert drive.integral_gain == round(0.171 * 0.002 * 2**20)

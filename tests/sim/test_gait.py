@@ -1,0 +1,133 @@
+"""Foot curves, inverse kinematics, smoothing, and the pose at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.gait.half_ellipse import half_ellipse
+from sim.gait.inverse_kinematics import leg_angles
+from sim.gait.trajectory import desired_angles, low_pass, n_ticks
+from sim.robot import Robot, load_robot
+from sim.robot.posture import feet_below_body, resting_height
+from sim.scenario import SCENARIOS, Scenario
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("szabadka2")
+
+
+def test_support_is_a_straight_line_at_constant_speed_and_swing_a_half_ellipse() -> None:
+    phase = np.linspace(0.0, 1.0, 1001)[:-1]
+    forward, lift = half_ellipse(phase, stride=0.16, height=0.03, duty_factor=0.56)
+    support = phase < 0.56
+    np.testing.assert_allclose(np.diff(forward[support]), -0.16 / 0.56 * 0.001, rtol=1e-9)
+    assert not lift[support].any()
+    assert forward[0] == 0.08
+    swing = ~support
+    np.testing.assert_allclose((forward[swing] / 0.08) ** 2 + (lift[swing] / 0.03) ** 2, 1.0)
+    assert lift.max() == pytest.approx(0.03, rel=1e-4)
+
+
+def test_the_curve_is_closed_and_continuous() -> None:
+    phase = np.array([0.56 - 1e-9, 0.56, 1.0 - 1e-9, 0.0])
+    forward, lift = half_ellipse(phase, stride=0.16, height=0.03, duty_factor=0.56)
+    np.testing.assert_allclose(forward, [-0.08, -0.08, 0.08, 0.08], atol=1e-8)
+    np.testing.assert_allclose(lift, 0.0, atol=1e-8)
+
+
+@given(st.integers(0, 5), st.floats(-0.07, 0.07), st.floats(0.08, 0.13), st.floats(-0.14, -0.10))
+def test_inverse_kinematics_is_undone_by_pinocchios_forward_kinematics(
+    leg: int, forward: float, lateral: float, vertical: float
+) -> None:
+    robot = load_robot("szabadka2")
+    geometry = robot.legs[leg]
+    angles, miss = leg_angles(
+        geometry, np.array([forward]), np.array([lateral]), np.array([vertical])
+    )
+    assert miss[0] == 0.0
+    assert angles[0, 2] < 0.0, "knee up: the tibia bends down from the femur"
+    model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+    data, q = model.createData(), pin.neutral(model)
+    for name, angle in zip(robot.description.legs[leg].joints, angles[0], strict=True):
+        q[model.joints[model.getJointId(name)].idx_q] = angle
+    pin.framesForwardKinematics(model, data, q)
+    foot = data.oMf[model.getFrameId(robot.description.legs[leg].foot)].translation
+    hip = np.array(geometry.hip)
+    expected = hip + np.array([forward, geometry.side * lateral, vertical])
+    np.testing.assert_allclose(foot, expected, atol=1e-12)
+
+
+def test_a_target_out_of_reach_is_missed_by_its_distance(robot: Robot) -> None:
+    leg = robot.legs[0]
+    _, miss = leg_angles(leg, np.zeros(2), np.full(2, leg.coxa), np.array([-0.25, -0.03]))
+    np.testing.assert_allclose(miss, [0.05, 0.01])
+
+
+def test_every_scenario_is_within_reach_and_the_stride_bound_is_near_its_limit(
+    robot: Robot,
+) -> None:
+    for scenario in SCENARIOS:
+        assert desired_angles(robot, scenario).reachable
+    laden = SCENARIOS[2]
+    reach = {
+        stride: desired_angles(robot, laden.model_copy(update={"stride": stride})).reachable
+        for stride in (0.18, 0.20)
+    }
+    assert reach == {0.18: True, 0.20: False}
+
+
+def test_tripods_alternate(robot: Robot) -> None:
+    scenario = SCENARIOS[0]
+    coxa = desired_angles(robot, scenario).angles[:, ::3]
+    np.testing.assert_allclose(coxa[:, 0], coxa[:, 3], atol=1e-12)
+    np.testing.assert_allclose(coxa[:, 0], coxa[:, 4], atol=1e-12)
+    half = n_ticks(scenario) // 6
+    settled = slice(20, 20 + 2 * half)
+    later = slice(20 + half, 20 + 3 * half)
+    np.testing.assert_allclose(coxa[later, 0], coxa[settled, 1], atol=1e-9)
+
+
+def test_a_right_turn_shortens_the_right_strides(robot: Robot) -> None:
+    swing = np.ptp(desired_angles(robot, SCENARIOS[5]).angles[:, ::3], axis=0)
+    right, left = swing[[0, 2, 4]], swing[[1, 3, 5]]
+    assert (right < 0.6 * left).all()
+
+
+def test_slow_trajectories_are_held_between_updates(robot: Robot) -> None:
+    slow = SCENARIOS[0].model_copy(update={"trajectory_rate": 20.0, "fir_ms": 0})
+    angles = desired_angles(robot, slow).angles[:, 0]
+    changes = np.flatnonzero(np.diff(angles)) + 1
+    assert set(np.diff(changes)) == {25}
+
+
+@pytest.mark.parametrize("taps", [1, 6, 50])
+def test_the_filter_is_a_moving_average_from_rest(taps: int) -> None:
+    signal = np.random.default_rng(0).normal(size=(200, 2))
+    smooth = low_pass(signal, 2 * taps)
+    padded = np.concatenate([np.repeat(signal[:1], taps - 1, axis=0), signal])
+    expected = [padded[k : k + taps].mean(axis=0) for k in range(len(signal))]
+    np.testing.assert_allclose(smooth, expected, atol=1e-12)
+    np.testing.assert_allclose(smooth[0], signal[0])
+
+
+def test_at_rest_the_springs_carry_the_weight(robot: Robot) -> None:
+    joints = desired_angles(robot, SCENARIOS[0]).angles[0]
+    height = resting_height(robot, joints, 66.3)
+    compression = 0.010 - (height + feet_below_body(robot, joints))
+    assert 1e4 * compression.clip(0).sum() == pytest.approx(66.3)
+    assert height == pytest.approx(0.15, abs=2e-3)
+
+
+def test_a_robot_rests_on_the_feet_that_reach_the_ground(robot: Robot) -> None:
+    swinging = SCENARIOS[0].model_copy(update={"duty_factor": 0.45})
+    assert isinstance(swinging, Scenario)
+    joints = desired_angles(robot, swinging).angles[0]
+    height = resting_height(robot, joints, 66.3)
+    compression = 0.010 - (height + feet_below_body(robot, joints))
+    assert (compression > 0).sum() == 3
+    assert 1e4 * compression.clip(0).sum() == pytest.approx(66.3)

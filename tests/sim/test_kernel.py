@@ -1,0 +1,164 @@
+"""The compiled kernel: same physics as the readable one, same bits wherever a walker is."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from sim.controllers import CONTROLLERS
+from sim.kernel.native import native_kernel
+from sim.kernel.observation import walk_log
+from sim.kernel.reference import reference_kernel
+from sim.kernel.walk import Coding, Kernel, WalkSetup
+from sim.outcome import Status
+from sim.robot import Robot, load_robot
+from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import PHYSICS_RATE, lanes, simulate
+from sim.simulate import _course as course_of
+
+FUZZY = CONTROLLERS["fuzzy-pi"]
+OPTIMUM = FUZZY.published["A"]
+SHORT = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.4})
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("szabadka2")
+
+
+def swarm(n: int, seed: int = 5) -> np.ndarray:
+    """Random designs inside the bounds, (n, 9)."""
+    low = np.array([v.low for v in FUZZY.variables])
+    high = np.array([v.high for v in FUZZY.variables])
+    designs = np.random.default_rng(seed).uniform(low, high, (n, len(low)))
+    designs[:, 4] = np.rint(designs[:, 4])
+    return designs
+
+
+NAMES = [v.name for v in FUZZY.variables]
+
+
+def walk(designs: np.ndarray, scenario: Scenario = SHORT) -> np.ndarray:
+    return simulate(scenario, "fuzzy-pi", NAMES, designs, backend="native").outcome.objectives
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
+def test_compiled_and_readable_kernel_agree(scenario: Scenario) -> None:
+    brief = scenario.model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
+    design = np.array([list(OPTIMUM.values())])
+    results = [
+        simulate(brief, "fuzzy-pi", list(OPTIMUM), design, backend=backend, log=True)
+        for backend in ("native", "reference")
+    ]
+    fast, slow = results
+    assert fast.outcome.statuses.tolist() == slow.outcome.statuses.tolist() == [Status.OK]
+    np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
+    for field in ("base_position", "joint_angle", "current", "foot_force"):
+        ours, theirs = (getattr(result.logs[0], field) for result in results)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+
+
+def test_pi_controller_agrees_between_kernels() -> None:
+    results = [
+        simulate(SHORT, "pi", ["P", "I"], np.array([[0.25, 0.3]]), backend=backend).outcome
+        for backend in ("native", "reference")
+    ]
+    np.testing.assert_allclose(results[0].objectives, results[1].objectives, rtol=1e-9)
+
+
+def test_a_walk_has_the_same_bits_in_every_lane_batch_and_chunk() -> None:
+    designs = swarm(2 * lanes() + 3)
+    together = walk(designs)
+    assert np.isfinite(together).any()
+    alone = np.concatenate([walk(design[None]) for design in designs])
+    np.testing.assert_array_equal(together, alone)
+    np.testing.assert_array_equal(walk(designs[::-1])[::-1], together)
+    for size in (1, 3, lanes(), lanes() + 1):
+        chunks = [walk(designs[k : k + size]) for k in range(0, len(designs), size)]
+        np.testing.assert_array_equal(np.concatenate(chunks), together)
+
+
+def test_a_log_does_not_change_the_walk() -> None:
+    designs = swarm(3)
+    logged = simulate(SHORT, "fuzzy-pi", NAMES, designs, log=True)
+    np.testing.assert_array_equal(logged.outcome.objectives, walk(designs))
+    assert all(log is not None and len(log.time) == 200 for log in logged.logs)
+
+
+def _setup(robot: Robot, kernel: Kernel, scenario: Scenario) -> WalkSetup:
+    course = course_of(robot, kernel, scenario, 1.0 / PHYSICS_RATE)
+    assert course is not None
+    return course.driven_by(FUZZY.compile(OPTIMUM))
+
+
+def _sums(kernel: Kernel, setups: Sequence[WalkSetup], robot: Robot) -> list[tuple[Status, bytes]]:
+    results = kernel.walk(setups, Coding.of(robot, 10), log=False)
+    return [(result.status, result.sums.tobytes()) for result in results]
+
+
+def test_one_walkers_divergence_and_fall_touch_no_neighbour(robot: Robot) -> None:
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    good = _setup(robot, kernel, SHORT)
+    layout = kernel.layout
+    explosive = good.parameters.copy()
+    explosive[layout.slices["stiffness"]] = 1e12
+    falling = good.parameters.copy()
+    falling[layout.slices["stiffness"]] = falling[layout.slices["damping"]] = 0.0
+    bad = dataclasses.replace(good, parameters=explosive)
+    low = dataclasses.replace(good, parameters=falling)
+    ((status, expected),) = _sums(kernel, [good], robot)
+    assert status is Status.OK
+    mixed = _sums(kernel, [bad, good, low, good], robot)
+    assert [s for s, _ in mixed] == [Status.DIVERGED, Status.OK, Status.FELL, Status.OK]
+    assert mixed[1][1] == mixed[3][1] == expected
+
+
+def test_walks_of_different_length_share_a_group(robot: Robot) -> None:
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    short = _setup(robot, kernel, SHORT)
+    long = _setup(robot, kernel, SHORT.model_copy(update={"cycles": 2.0}))
+    assert long.ticks == 2 * short.ticks
+    apart = [_sums(kernel, [s], robot)[0] for s in (short, long)]
+    assert _sums(kernel, [short, long], robot) == apart
+
+
+@pytest.mark.parametrize("kind", ["native", "reference"])
+def test_a_standing_robot_carries_its_weight(robot: Robot, kind: str) -> None:
+    kernel = native_kernel(robot) if kind == "native" else reference_kernel(robot)
+    assert kernel is not None
+    setup = _setup(robot, kernel, SHORT)
+    still = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], 500, axis=0))
+    (result,) = kernel.walk([still], Coding.of(robot, 10), log=True)
+    assert result.states is not None
+    log = walk_log(robot, still, result.states)
+    carried = log.foot_force[:, :, 2].sum(axis=1)
+    assert carried[0] == pytest.approx(66.3, abs=0.1)
+    assert carried[250:].mean() == pytest.approx(66.3, abs=0.1)
+    assert abs(log.base_velocity[-1, :3]).max() < 0.01
+
+
+def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
+    """The winding's inductance, solved exactly over the logged voltages and speeds."""
+    design = np.array([list(OPTIMUM.values())])
+    (log,) = simulate(SHORT, "fuzzy-pi", list(OPTIMUM), design, log=True).logs
+    assert log is not None
+    drive = robot.drives()
+    steps = 10
+    decay = np.exp(-drive.resistance / drive.inductance / PHYSICS_RATE)
+    exact = np.zeros(robot.n_joints)
+    charge = quasi = 0.0
+    for k in range(len(log.time) - 1):
+        for n in range(steps):
+            speed = log.joint_velocity[k] + n / steps * (
+                log.joint_velocity[k + 1] - log.joint_velocity[k]
+            )
+            settled = (log.voltage[k] - drive.torque * speed) / drive.resistance
+            exact = settled + (exact - settled) * decay
+            charge += float(log.voltage[k] @ exact)
+            quasi += float(log.voltage[k] @ settled)
+    assert charge == pytest.approx(quasi, rel=0.02)

@@ -45,17 +45,21 @@ BASE = 1
 class Inertia:
     """Rigid or articulated inertia in a link's frame: force = linear a + coupling alpha,
     moment = coupling^T a + angular alpha.
+
+    rigid: mass [kg] and first moment [kg m] of a rigid body, None for an articulated inertia. A
+    rigid one is cheaper to move: its linear part is isotropic, its coupling a mere vector.
     """
 
     linear: Matrix
     coupling: Matrix
     angular: Matrix
+    rigid: tuple[Scalar, Vector] | None = None
 
     @classmethod
     def of_body(cls, mass: Scalar, moment: Vector, angular: Matrix) -> Inertia:
         """mass [kg], first moment m c [kg m], rotational inertia about the origin [kg m2]."""
         diagonal = ((mass, 0.0, 0.0), (0.0, mass, 0.0), (0.0, 0.0, mass))
-        return cls(diagonal, transpose(skew(moment)), angular)
+        return cls(diagonal, transpose(skew(moment)), angular, rigid=(mass, moment))
 
     def times(self, motion: Motion) -> Force:
         """Inertia times motion."""
@@ -67,12 +71,38 @@ class Inertia:
         )
 
     def plus(self, other: Inertia) -> Inertia:
-        """Sum, in the same frame."""
+        """Sum, in the same frame; no longer known to be rigid."""
         return Inertia(
             mirrored(plus(self.linear, other.linear)),
             plus(self.coupling, other.coupling),
             mirrored(plus(self.angular, other.angular)),
         )
+
+    def less_outer(self, scaled: Force, column: Force) -> Inertia:
+        """Less the product scaled column^T, which is symmetric."""
+        return Inertia(
+            mirrored(minus(self.linear, outer(scaled.linear, column.linear))),
+            minus(self.coupling, outer(scaled.linear, column.angular)),
+            mirrored(minus(self.angular, outer(scaled.angular, column.angular))),
+        )
+
+    def in_parent(self, rotation: Matrix, offset: Vector) -> Inertia:
+        """Seen from the parent's frame, in which this frame is turned and displaced."""
+        inverse = transpose(rotation)
+        angular = mirrored(multiply(multiply(rotation, self.angular), inverse))
+        if self.rigid is None:
+            linear = mirrored(multiply(multiply(rotation, self.linear), inverse))
+            coupling = multiply(multiply(rotation, self.coupling), inverse)
+            rigid = None
+        else:
+            mass, moment = self.rigid
+            linear, turned = self.linear, apply(rotation, moment)
+            coupling = transpose(skew(turned))
+            rigid = (mass, add(turned, scale(mass, offset)))
+        lever = skew(offset)
+        shifted = minus(coupling, multiply(linear, lever))
+        moved = minus(angular, multiply(transpose(coupling), lever))
+        return Inertia(linear, shifted, mirrored(plus(moved, multiply(lever, shifted))), rigid)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +123,11 @@ class Force:
     def plus(self, other: Force) -> Force:
         """Sum, in the same frame."""
         return Force(add(self.linear, other.linear), add(self.angular, other.angular))
+
+    def in_parent(self, rotation: Matrix, offset: Vector) -> Force:
+        """Seen from the parent's frame, in which this frame is turned and displaced."""
+        linear = apply(rotation, self.linear)
+        return Force(linear, add(apply(rotation, self.angular), cross(offset, linear)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,48 +264,50 @@ def articulated_body(
             )
         forces.append(bias)
 
-    projected: list[tuple[Force, Scalar, Scalar, Motion]] = []
+    passed: list[tuple[Force, Scalar, Scalar]] = []
+    coriolises: list[Motion] = []
     for k in range(len(links), 0, -1):
         link, rotation, rate = links[k - 1], rotations[k - 1], rates[k - 1]
-        inertia, force, state = inertias[k], forces[k], states[k]
+        inertia, state = inertias[k], states[k]
         turning = scale(rate, link.axis)
         coriolis = Motion(
             cross(state.velocity.linear, turning), cross(state.velocity.angular, turning)
         )
         column = Force(apply(inertia.coupling, link.axis), apply(inertia.angular, link.axis))
         pivot = invert(dot(link.axis, column.angular) + armature[k - 1])
-        drive = torques[k - 1] - dot(link.axis, force.angular)
-        projected.append((column, pivot, drive, coriolis))
-        scaled = Force(scale(pivot, column.linear), scale(pivot, column.angular))
-        apparent = Inertia(
-            mirrored(minus(inertia.linear, outer(scaled.linear, column.linear))),
-            minus(inertia.coupling, outer(scaled.linear, column.angular)),
-            mirrored(minus(inertia.angular, outer(scaled.angular, column.angular))),
-        )
-        force = force.plus(apparent.times(coriolis)).plus(
-            Force(scale(drive, scaled.linear), scale(drive, scaled.angular))
-        )
+        force = forces[k].plus(inertia.times(coriolis))
+        free = pivot * (torques[k - 1] - dot(link.axis, force.angular))
+        passed.append((column, pivot, free))
+        # What the joint passes on, put together in the parent's frame: a link without children
+        # is still a rigid body there.
+        above = column.in_parent(rotation, link.offset)
+        scaled = Force(scale(pivot, above.linear), scale(pivot, above.angular))
         inertias[link.parent] = inertias[link.parent].plus(
-            _inertia_to_parent(apparent, rotation, link.offset)
+            inertia.in_parent(rotation, link.offset).less_outer(scaled, above)
         )
-        forces[link.parent] = forces[link.parent].plus(
-            _force_to_parent(force, rotation, link.offset)
+        driven = Force(scale(free, above.linear), scale(free, above.angular))
+        forces[link.parent] = (
+            forces[link.parent].plus(force.in_parent(rotation, link.offset)).plus(driven)
         )
-    projected.reverse()
+        coriolises.append(coriolis)
+    passed.reverse()
+    coriolises.reverse()
 
     # Accelerations are relative to free fall until gravity is put back at the end.
     accelerations = [_solve(inertias[0], forces[0], invert)]
     joints = []
     for k, link in enumerate(links, start=1):
-        column, pivot, drive, coriolis = projected[k - 1]
-        parent = accelerations[link.parent]
-        inverse = transpose(rotations[k - 1])
-        linear = add(
-            apply(inverse, add(parent.linear, cross(parent.angular, link.offset))), coriolis.linear
+        (column, pivot, free), coriolis = passed[k - 1], coriolises[k - 1]
+        parent, inverse = accelerations[link.parent], transpose(rotations[k - 1])
+        linear = apply(inverse, add(parent.linear, cross(parent.angular, link.offset)))
+        angular = apply(inverse, parent.angular)
+        joint = free - pivot * (dot(column.linear, linear) + dot(column.angular, angular))
+        accelerations.append(
+            Motion(
+                add(linear, coriolis.linear),
+                add(angular, coriolis.angular, scale(joint, link.axis)),
+            )
         )
-        angular = add(apply(inverse, parent.angular), coriolis.angular)
-        joint = pivot * (drive - dot(column.linear, linear) - dot(column.angular, angular))
-        accelerations.append(Motion(linear, add(angular, scale(joint, link.axis))))
         joints.append(joint)
     falling = accelerations[0]
     return Acceleration(Motion(add(falling.linear, gravity), falling.angular), tuple(joints))
@@ -289,30 +326,6 @@ def _body_inertia(inertia: Any) -> Inertia:
     x, y, z = (float(value) for value in mass * lever)
     rows = [tuple(float(value) for value in row) for row in about_origin]
     return Inertia.of_body(mass, (x, y, z), (rows[0], rows[1], rows[2]))  # type: ignore[arg-type]
-
-
-def _inertia_to_parent(inertia: Inertia, rotation: Matrix, offset: Vector) -> Inertia:
-    inverse = transpose(rotation)
-    linear = mirrored(multiply(multiply(rotation, inertia.linear), inverse))
-    coupling = multiply(multiply(rotation, inertia.coupling), inverse)
-    angular = mirrored(multiply(multiply(rotation, inertia.angular), inverse))
-    lever = skew(offset)
-    shifted = minus(coupling, multiply(linear, lever))
-    return Inertia(
-        linear,
-        shifted,
-        mirrored(
-            plus(
-                minus(angular, multiply(transpose(coupling), lever)),
-                multiply(lever, shifted),
-            )
-        ),
-    )
-
-
-def _force_to_parent(force: Force, rotation: Matrix, offset: Vector) -> Force:
-    linear = apply(rotation, force.linear)
-    return Force(linear, add(apply(rotation, force.angular), cross(offset, linear)))
 
 
 def _solve(inertia: Inertia, force: Force, invert: Callable[[Scalar], Scalar]) -> Motion:

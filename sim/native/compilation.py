@@ -41,10 +41,18 @@ _FLAGS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Compiler:
-    """A C compiler: its command, and what identifies its output."""
+    """A C compiler: its command, and the first line it says of its version."""
 
     command: tuple[str, ...]
     version: str
+
+    def flags(self, level: str) -> tuple[str, ...]:
+        """Flags for a micro-architecture level, which zig spells in its own way."""
+        if not level:
+            return _FLAGS
+        if "ziglang" in self.command:
+            return (*_FLAGS, "-mcpu=" + level.replace("-", "_"))
+        return (*_FLAGS, f"-march={level}")
 
 
 def cache_directory() -> Path:
@@ -55,19 +63,19 @@ def cache_directory() -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What code is compiled for: doubles in a vector register, and the compiler's flags."""
+    """What code is compiled for: doubles in a vector register, micro-architecture level."""
 
     lanes: int
-    flags: tuple[str, ...]
+    level: str
 
 
 # Micro-architecture levels of the x86-64 ABI by the CPU flags that tell them. Named levels rather
 # than -march=native: one binary for all machines of a level, and the same bits on every level.
 _LEVELS: Final = (
-    ({"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}, Target(8, ("-march=x86-64-v4",))),
-    ({"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}, Target(4, ("-march=x86-64-v3",))),
+    ({"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}, Target(8, "x86-64-v4")),
+    ({"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}, Target(4, "x86-64-v3")),
 )
-_PLAIN: Final = Target(2, ())
+_PLAIN: Final = Target(2, "")
 
 
 @lru_cache(maxsize=1)
@@ -112,8 +120,7 @@ def load_library(name: str, identity: bytes, source: Callable[[], str]) -> ctype
     identity: all that the source depends on; source is called only if it must be compiled.
     Raises KernelBuildError with the compiler's message if it refuses the source.
     """
-    flags = (*_FLAGS, *target().flags)
-    digest = hashlib.sha256(repr((flags, target().lanes, platform.machine())).encode())
+    digest = hashlib.sha256(repr((_FLAGS, target(), platform.machine())).encode())
     digest.update(identity)
     stem = f"{name}-{digest.hexdigest()[:24]}"
     compiler = find_compiler()
@@ -122,20 +129,24 @@ def load_library(name: str, identity: bytes, source: Callable[[], str]) -> ctype
         shipped = sorted(cache_directory().glob(f"{stem}-*.so"))
         return ctypes.CDLL(str(shipped[0])) if shipped else None
     made_by = hashlib.sha256(compiler.version.encode()).hexdigest()[:8]
-    with _writable_cache() as folder:
-        library = folder / f"{stem}-{made_by}.so"
-        if not library.exists():
-            with _lock(folder / f"{stem}.lock"):
-                if not library.exists():
-                    _compile(compiler, flags, source(), library)
-        return ctypes.CDLL(str(library))
+    file = f"{stem}-{made_by}.so"
+    # The usual directory may be read-only and still hold what an image shipped in it.
+    for folder in (cache_directory(), _private_cache()):
+        if (folder / file).exists():
+            return ctypes.CDLL(str(folder / file))
+    folder = _writable_cache()
+    with _lock(folder / f"{stem}.lock"):
+        if not (folder / file).exists():
+            _compile(compiler, source(), folder / file)
+    return ctypes.CDLL(str(folder / file))
 
 
-def _compile(compiler: Compiler, flags: tuple[str, ...], source: str, library: Path) -> None:
+def _compile(compiler: Compiler, source: str, library: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="gaitswarm-build-") as folder:
         code = Path(folder) / "kernel.c"
         code.write_text(f"#define LANES {target().lanes}\n{source}", encoding="utf-8")
         built = library.with_name(f"{library.name}.{os.getpid()}.tmp")
+        flags = compiler.flags(target().level)
         command = [*compiler.command, *flags, str(code), "-o", str(built)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -149,21 +160,27 @@ def _compile(compiler: Compiler, flags: tuple[str, ...], source: str, library: P
             built.unlink(missing_ok=True)
 
 
-@contextlib.contextmanager
-def _writable_cache() -> Iterator[Path]:
-    """The cache directory, or a private one for this call where it cannot be written."""
-    folder = cache_directory()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            writable = True
-    except OSError:
-        writable = False
-    if writable:
-        yield folder
-    else:
-        with tempfile.TemporaryDirectory(prefix="gaitswarm-cache-") as private:
-            yield Path(private)
+def _writable_cache() -> Path:
+    """The cache directory, or where that cannot be written a private one in the temporary files."""
+    for folder in (cache_directory(), _private_cache()):
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    raise KernelBuildError(
+        f"neither {cache_directory()} nor {_private_cache()} can be written; set XDG_CACHE_HOME to"
+        " a directory for compiled kernels"
+    )
+
+
+def _private_cache() -> Path:
+    """This user's own directory among the temporary files; never one that others may write to."""
+    folder = Path(tempfile.gettempdir()) / f"gaitswarm-{os.getuid()}"
+    if folder.exists() and (folder.stat().st_uid != os.getuid() or folder.stat().st_mode & 0o022):
+        raise KernelBuildError(f"{folder} belongs to someone else; set XDG_CACHE_HOME")
+    return folder
 
 
 @contextlib.contextmanager
@@ -181,4 +198,4 @@ def _lock(path: Path) -> Iterator[None]:
 
 def _version(command: list[str]) -> str:
     done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
-    return done.stdout if done.returncode == 0 else ""
+    return done.stdout.partition("\n")[0] if done.returncode == 0 else ""

@@ -107,3 +107,21 @@ def test_sine_and_cosine_are_accurate_to_the_last_bits(tmp_path: Path) -> None:
     library.both(*pointers, ctypes.c_int64(len(x)))
     assert np.abs(sine - np.sin(x)).max() < 2.5e-16
     assert np.abs(cosine - np.cos(x)).max() < 2.5e-16
+
+
+def test_where_the_cache_cannot_be_written_a_private_one_serves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "image"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    source = "int f(void) { return 1; }"
+    assert load_library("shipped", b"", lambda: source) is not None
+    # Root may write anywhere, so a file in the directory's place stands for a read-only one.
+    shipped = tmp_path / "image" / "gaitswarm"
+    shipped.rename(tmp_path / "kept")
+    shipped.write_text("not a directory")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "image"))
+    assert load_library("shipped", b"", lambda: source) is not None
+    private = tmp_path / f"gaitswarm-{os.getuid()}"
+    assert len(list(private.glob("shipped-*.so"))) == 1
+    assert private.stat().st_mode & 0o077 == 0

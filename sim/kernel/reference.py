@@ -44,7 +44,7 @@ class ReferenceKernel:
 
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
         n_joints = setup.desired.shape[1]
-        step = _Stepper(self._model.step, len(setup.start), n_joints, setup.parameters)
+        step = Stepper(self._model.step, len(setup.start), n_joints, setup.parameters)
         step.q[:] = setup.start
         integral = np.zeros(n_joints, dtype=np.int64)
         sums = np.zeros(len(TERMS))
@@ -65,7 +65,7 @@ class ReferenceKernel:
         return WalkResult(status, sums, step.q.copy(), _padded(rows, setup.ticks) if log else None)
 
 
-class _Stepper:
+class Stepper:
     """CasADi's step on fixed buffers: several times cheaper than calling the function."""
 
     def __init__(self, function: Any, n_q: int, n_joints: int, parameters: Floats) -> None:

@@ -1,0 +1,59 @@
+# Every target does its own set-up: a virtual environment in .venv with the locked dependencies.
+# PYTHON=/path/to/python3 chooses the Python; UV=/path/to/uv the uv that `make lock` runs.
+
+BIN := .venv/bin
+UV ?= uv
+DB ?=
+ARGS ?=
+COMPILE := $(UV) pip compile --universal --generate-hashes --no-header --no-annotate --quiet
+
+# An empty DB means the default database of the user.
+ifneq ($(DB),)
+DB_OPTION := --db $(DB)
+endif
+
+.DEFAULT_GOAL := help
+.PHONY: help demo serve bench test lint format lock clean setup setup-dev
+
+help: ## Show this list.
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+
+demo: setup ## Optimize the chapter-4 job (25 x 25, six scenarios) and compare it with the thesis.
+	@$(BIN)/gaitswarm optimize --name "chapter 4, preference A" --particles 25 --iterations 25 \
+	    --preference A --seed 1 --compare-published $(DB_OPTION) $(ARGS)
+
+serve: setup ## Serve the REST API on 127.0.0.1:8000, with a runner (http://127.0.0.1:8000/docs).
+	@$(BIN)/gaitswarm serve $(DB_OPTION) $(ARGS)
+
+bench: setup ## Measure the simulator on one core of this machine.
+	@$(BIN)/gaitswarm bench $(ARGS)
+
+test: setup-dev ## Run all tests.
+	@$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+
+lint: setup-dev ## Check style, types, imports between packages and declared dependencies.
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+	@$(BIN)/deptry .
+
+format: setup-dev ## Format the code and fix what can be fixed.
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+lock: ## Choose versions anew, after a change of the dependencies in pyproject.toml (needs uv).
+	$(COMPILE) pyproject.toml --extra postgres --group build -o requirements/run.lock
+	$(COMPILE) pyproject.toml --extra postgres --group dev -c requirements/run.lock -o requirements/dev.lock
+	$(COMPILE) pyproject.toml --extra postgres --extra cluster --group build -c requirements/run.lock -o requirements/image.lock
+	sed -n 's/^compiler = \["\(.*\)"\]/\1/p' pyproject.toml | $(COMPILE) - -o requirements/compiler.lock
+
+clean: ## Remove the virtual environment and caches; jobs in the user's database stay.
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis .benchmarks build dist
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+setup:
+	@scripts/setup.sh run
+
+setup-dev:
+	@scripts/setup.sh dev

@@ -1,0 +1,105 @@
+"""What happens to every request: an id, a limit on its body, an answer even to a bug."""
+
+from __future__ import annotations
+
+import logging
+import re
+import uuid
+from typing import Final
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from api.problems import internal_error, problem
+
+_log = logging.getLogger("gaitswarm.api")
+
+REQUEST_ID: Final = "X-Request-ID"
+_ACCEPTABLE_ID: Final = re.compile(r"^[A-Za-z0-9_.-]{1,128}$")
+
+_DRAINED: Final = 32
+"""Refused bodies are read up to this many times the limit, so that the client sees the answer:
+closing a connection with unread data resets it."""
+
+
+class RequestIdMiddleware:
+    """Names every request in the header X-Request-ID and answers exceptions that nobody expected.
+
+    A client's own id is kept if it is one of up to 128 letters, digits, `_`, `.` and `-`.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One ASGI exchange."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        given = Headers(scope=scope).get(REQUEST_ID, "")
+        request_id = given if _ACCEPTABLE_ID.match(given) else uuid.uuid4().hex
+        started = False
+
+        async def send_named(message: Message) -> None:
+            nonlocal started
+            if message["type"] == "http.response.start":
+                started = True
+                MutableHeaders(scope=message)[REQUEST_ID] = request_id
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_named)
+        except Exception:
+            _log.exception("%s %s (request %s)", scope["method"], scope["path"], request_id)
+            if started:
+                # Too late for a problem: breaking the connection is the only honest answer.
+                raise
+            response = internal_error(scope["path"], request_id)
+            await response(scope, receive, send_named)
+
+
+class BodyLimitMiddleware:
+    """Refuses bodies over a limit with a problem, whether their length was declared or not."""
+
+    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+        self.app = app
+        self.max_bytes = max_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One ASGI exchange."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        length = Headers(scope=scope).get("content-length", "")
+        if length.isdecimal() and int(length) > self.max_bytes:
+            await self._drain(receive, 0)
+            await self._refusal(scope["path"])(scope, receive, send)
+            return
+        received = 0
+
+        async def receive_limited() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            if received > self.max_bytes:
+                await self._drain(receive, received)
+                raise HTTPException(413)
+            return message
+
+        await self.app(scope, receive_limited, send)
+
+    async def _drain(self, receive: Receive, received: int) -> None:
+        more = True
+        while more and received < _DRAINED * self.max_bytes:
+            message = await receive()
+            received += len(message.get("body", b""))
+            more = message.get("more_body", False)
+
+    def _refusal(self, path: str) -> ASGIApp:
+        return problem(
+            path,
+            413,
+            "body-too-large",
+            f"the body is larger than {self.max_bytes} bytes; a job spec takes a few kilobytes",
+        )

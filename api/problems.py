@@ -1,0 +1,208 @@
+"""Every error as HTTP: the one place where the error trees become problem+json (RFC 9457).
+
+| raised                                        | status | type                  |
+| --------------------------------------------- | ------ | --------------------- |
+| RequestValidationError, body is not JSON      | 400    | malformed-json        |
+| RequestValidationError, InvalidRequest,       | 422    | invalid-request       |
+| SimulationInputError                          |        |                       |
+| NotFound; no such route                       | 404    | not-found             |
+| Conflict, LeaseLost                           | 409    | conflict              |
+| IdempotencyConflict                           | 409    | idempotency-conflict  |
+| a body over the limit                         | 413    | body-too-large        |
+| StoreUnavailable, EvaluatorUnavailable,       | 503    | unavailable           |
+| SimulationError, too many simulations         |        |                       |
+| anything else                                 | 500    | internal-error        |
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any, Final, cast
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+
+from api.views import FieldErrorView, ProblemView
+from services.optimizer.errors import (
+    Conflict,
+    EvaluatorUnavailable,
+    GaitswarmError,
+    IdempotencyConflict,
+    InvalidRequest,
+    LeaseLost,
+    NotFound,
+    StoreUnavailable,
+)
+from sim.errors import SimulationError, SimulationInputError
+
+_log = logging.getLogger("gaitswarm.api")
+
+MEDIA_TYPE: Final = "application/problem+json"
+
+_RETRY: Final = {"Retry-After": "5"}
+
+_MOST_ERRORS: Final = 20
+"""A body can be wrong in ten thousand places; nobody reads them all."""
+
+_TITLES: Final = {
+    "malformed-json": "The body is not JSON",
+    "invalid-request": "The request is not valid",
+    "not-found": "There is no such thing",
+    "method-not-allowed": "The method is not allowed here",
+    "conflict": "The present state does not allow it",
+    "idempotency-conflict": "The idempotency key was used for another request",
+    "body-too-large": "The body is too large",
+    "unavailable": "The service cannot do it now",
+    "internal-error": "Something went wrong on the server",
+}
+
+_KINDS: Final[tuple[tuple[type[Exception], HTTPStatus, str], ...]] = (
+    (InvalidRequest, HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request"),
+    (NotFound, HTTPStatus.NOT_FOUND, "not-found"),
+    (IdempotencyConflict, HTTPStatus.CONFLICT, "idempotency-conflict"),
+    (Conflict, HTTPStatus.CONFLICT, "conflict"),
+    (LeaseLost, HTTPStatus.CONFLICT, "conflict"),
+    (StoreUnavailable, HTTPStatus.SERVICE_UNAVAILABLE, "unavailable"),
+    (EvaluatorUnavailable, HTTPStatus.SERVICE_UNAVAILABLE, "unavailable"),
+    (SimulationInputError, HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request"),
+    (SimulationError, HTTPStatus.SERVICE_UNAVAILABLE, "unavailable"),
+)
+"""Domain errors, the more special first."""
+
+_HTTP: Final = {
+    400: ("malformed-json", "the body cannot be read as JSON; send one JSON object, not too deep"),
+    404: ("not-found", "no resource has this path; /docs lists those that exist"),
+    405: ("method-not-allowed", "use a method that the Allow header names; see /docs"),
+    413: ("body-too-large", "send a smaller body; a job spec takes a few kilobytes"),
+}
+"""What to do about the errors that the framework itself raises."""
+
+_LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)
+
+
+def problem(
+    request_path: str,
+    status: int,
+    kind: str,
+    detail: str,
+    *,
+    errors: Sequence[FieldErrorView] = (),
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    """A problem as response. kind: last part of its type."""
+    view = ProblemView(
+        type=f"urn:gaitswarm:problem:{kind}",
+        title=_TITLES.get(kind, HTTPStatus(status).phrase),
+        status=status,
+        detail=detail,
+        instance=request_path,
+        errors=list(errors),
+    )
+    body = view.model_dump_json()
+    return Response(body, status, dict(headers or {}), media_type=MEDIA_TYPE)
+
+
+def internal_error(request_path: str, request_id: str) -> Response:
+    """The answer to a bug: nothing of the inside is shown, but how to report it is."""
+    return problem(
+        request_path,
+        500,
+        "internal-error",
+        f"try again; if it stays, report it with the request id {request_id}, by which the"
+        " server's log names the cause",
+    )
+
+
+def add_problem_handlers(app: FastAPI) -> None:
+    """Answer every error of the table above with a problem."""
+    app.add_exception_handler(RequestValidationError, _on_invalid)
+    app.add_exception_handler(HTTPException, _on_http_error)
+    app.add_exception_handler(GaitswarmError, _on_domain_error)
+    app.add_exception_handler(SimulationError, _on_domain_error)
+
+
+async def _on_domain_error(request: Request, error: Exception) -> Response:
+    found = next((row for row in _KINDS if isinstance(error, row[0])), None)
+    if found is None:
+        raise error
+    _, status, name = found
+    detail = str(error)
+    errors = []
+    if isinstance(error, InvalidRequest):
+        message = detail.removeprefix(f"{error.field}: ")
+        errors = [FieldErrorView(field=error.field, message=message)]
+    elif isinstance(error, SimulationInputError):
+        errors = [_field_error("", detail)]
+    if status == HTTPStatus.SERVICE_UNAVAILABLE:
+        _log.error("%s %s: %s", request.method, request.url.path, detail)
+        return problem(request.url.path, status, name, detail, headers=_RETRY)
+    return problem(request.url.path, status, name, detail, errors=errors)
+
+
+async def _on_http_error(request: Request, raised: Exception) -> Response:
+    error = cast(HTTPException, raised)
+    default = (f"http-{error.status_code}", str(error.detail))
+    kind, advice = _HTTP.get(error.status_code, default)
+    return problem(request.url.path, error.status_code, kind, advice, headers=error.headers)
+
+
+async def _on_invalid(request: Request, raised: Exception) -> Response:
+    error = cast(RequestValidationError, raised)
+    found = error.errors()
+    if any(entry["type"] == "json_invalid" for entry in found):
+        entry = found[0]
+        reason = entry.get("ctx", {}).get("error", "it cannot be parsed")
+        message = f"{reason} at character {entry['loc'][-1]}; send one JSON object"
+        errors = [FieldErrorView(field="body", message=message)]
+        return problem(request.url.path, 400, "malformed-json", f"body: {message}", errors=errors)
+    errors = _without_repeats(_describe(entry, error.body) for entry in found[:_MOST_ERRORS])
+    detail = "; ".join(f"{e.field}: {e.message}" if e.field else e.message for e in errors)
+    if len(found) > _MOST_ERRORS:
+        detail += f"; and {len(found) - _MOST_ERRORS} more"
+    return problem(request.url.path, 422, "invalid-request", detail, errors=errors)
+
+
+def _describe(entry: Mapping[str, Any], body: Any) -> FieldErrorView:
+    """One of pydantic's errors in the request's own terms."""
+    where, *path = entry["loc"]
+    if where == "body":
+        field = ".".join(str(part) for part in _own_path(path, body, entry["type"]))
+        if not path and entry["type"] in ("missing", "model_attributes_type"):
+            return FieldErrorView(
+                field="body", message="send a JSON object as application/json; /docs has examples"
+            )
+    else:
+        field = ".".join(str(part) for part in path)
+    return _field_error(field, str(entry["msg"]).removeprefix("Value error, "))
+
+
+def _own_path(path: Sequence[Any], body: Any, kind: str) -> list[Any]:
+    """The parts of an error's location that are in the body, without pydantic's union labels."""
+    own: list[Any] = []
+    value = body
+    for part in path:
+        inside = isinstance(value, dict) and part in value
+        inside = inside or (isinstance(value, list) and isinstance(part, int) and part < len(value))
+        if inside:
+            value = value[part]
+            own.append(part)
+        elif kind == "missing" and part is path[-1]:
+            own.append(part)
+    return own
+
+
+def _field_error(field: str, message: str) -> FieldErrorView:
+    """Checks of a whole object begin their message with the field that they blame."""
+    match = _LEADING_FIELD.match(message)
+    if not field and match:
+        field, message = match.groups()
+    return FieldErrorView(field=field, message=message)
+
+
+def _without_repeats(errors: Any) -> list[FieldErrorView]:
+    """In order; each alternative of a union reports the same field."""
+    return list({(error.field, error.message): error for error in errors}.values())

@@ -1,0 +1,132 @@
+"""Jobs: submit, list, look at, command."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Response, status
+
+from api.context import JobId, Service
+from api.openapi import problems
+from api.views import PREFIX, JobSummaryView, JobView, PageView
+from services.optimizer.job import Command, Job, JobState
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.service import JobService
+
+router = APIRouter(prefix=f"{PREFIX}/jobs", tags=["jobs"])
+
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        pattern=r"^[\x21-\x7e]+$",
+        description="Any string of your own without blanks. A repeated request with the same key"
+        " and the same job does not make a second job.",
+        examples=["7d9f2b1e"],
+    ),
+]
+
+
+@router.post(
+    "",
+    operation_id="submit_job",
+    summary="Submit a job",
+    status_code=status.HTTP_202_ACCEPTED,
+    response_description="The job is queued; `Location` says where to follow it.",
+    responses={
+        200: {
+            "model": JobView,
+            "description": "The key was used before for the same job: this is that job.",
+        },
+        **problems(400, 409, 413, 422),
+    },
+)
+def submit_job(
+    spec: JobSpec, service: Service, response: Response, idempotency_key: IdempotencyKey = None
+) -> JobView:
+    """Check that the job can be simulated and queue it.
+
+    The answer comes at once; a runner takes the job up when it has room. With an
+    `Idempotency-Key` used before, the same body answers 200 with the job that it made, another
+    body 409.
+    """
+    job, new = service.submit(spec, idempotency_key=idempotency_key)
+    if not new:
+        response.status_code = status.HTTP_200_OK
+    response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
+    return _in_full(service, job)
+
+
+@router.get(
+    "", operation_id="list_jobs", summary="List jobs, newest first", responses=problems(422)
+)
+def list_jobs(
+    service: Service,
+    state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
+    after: Annotated[
+        str | None, Query(max_length=200, description="`next` of the page before.")
+    ] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description="Most jobs on a page.")] = 50,
+) -> PageView[JobSummaryView]:
+    """Jobs with their progress, in pages. Jobs submitted meanwhile do not shift later pages."""
+    page = service.jobs(state=state, after=after, limit=limit)
+    return PageView(items=[JobSummaryView.from_job(job) for job in page.items], next=page.next)
+
+
+@router.get(
+    "/{job_id}", operation_id="get_job", summary="Look at a job", responses=problems(404, 422)
+)
+def get_job(job_id: JobId, service: Service) -> JobView:
+    """State, progress, rates, estimated time left, best design so far, and why it failed if so."""
+    return _in_full(service, service.job(job_id))
+
+
+@router.post(
+    "/{job_id}/pause",
+    operation_id="pause_job",
+    summary="Pause a job",
+    status_code=status.HTTP_202_ACCEPTED,
+    responses=problems(404, 409, 422),
+)
+def pause_job(job_id: JobId, service: Service) -> JobView:
+    """A running job ends and commits the iteration under way first (`pausing`), then is `paused`.
+
+    409 if it is paused already, or has ended.
+    """
+    return _in_full(service, service.command(job_id, Command.PAUSE))
+
+
+@router.post(
+    "/{job_id}/resume",
+    operation_id="resume_job",
+    summary="Resume a job",
+    status_code=status.HTTP_202_ACCEPTED,
+    responses=problems(404, 409, 422),
+)
+def resume_job(job_id: JobId, service: Service) -> JobView:
+    """Queue a paused or failed job again; it goes on bit for bit as if it had never stopped.
+
+    409 if it is queued or running already, or has ended.
+    """
+    return _in_full(service, service.command(job_id, Command.RESUME))
+
+
+@router.post(
+    "/{job_id}/cancel",
+    operation_id="cancel_job",
+    summary="Cancel a job",
+    responses=problems(404, 409, 422),
+)
+def cancel_job(job_id: JobId, service: Service) -> JobView:
+    """End a job for good. What it has committed stays; the iteration under way is dropped.
+
+    409 if it has ended.
+    """
+    return _in_full(service, service.command(job_id, Command.CANCEL))
+
+
+def _in_full(service: JobService, job: Job) -> JobView:
+    found = job.progress.best_fitness is not None
+    return JobView.from_job_and_best(job, service.best(job.id) if found else None)

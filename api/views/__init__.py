@@ -1,0 +1,64 @@
+"""Views: domain objects as JSON, for the HTTP API and for `--json` on the command line.
+
+Nothing in this package knows FastAPI or HTTP.
+"""
+
+from __future__ import annotations
+
+from api.views.base import View, finite
+from api.views.catalogue import (
+    CatalogueView,
+    ControllerView,
+    PreferenceView,
+    ScenarioView,
+    controller_views,
+    preference_views,
+    scenario_views,
+)
+from api.views.evaluation import (
+    BestView,
+    EvaluationView,
+    ObjectivesView,
+    ScenarioResultView,
+    evaluation_views,
+)
+from api.views.job import (
+    PREFIX,
+    HistoryIterationView,
+    IterationView,
+    JobSummaryView,
+    JobView,
+    PageView,
+    StateView,
+)
+from api.views.problem import FieldErrorView, ProblemView
+from api.views.simulation import SimulatedScenarioView, SimulationView, WalkLogView
+
+__all__ = [
+    "PREFIX",
+    "BestView",
+    "CatalogueView",
+    "ControllerView",
+    "EvaluationView",
+    "FieldErrorView",
+    "HistoryIterationView",
+    "IterationView",
+    "JobSummaryView",
+    "JobView",
+    "ObjectivesView",
+    "PageView",
+    "PreferenceView",
+    "ProblemView",
+    "ScenarioResultView",
+    "ScenarioView",
+    "SimulatedScenarioView",
+    "SimulationView",
+    "StateView",
+    "View",
+    "WalkLogView",
+    "controller_views",
+    "evaluation_views",
+    "finite",
+    "preference_views",
+    "scenario_views",
+]

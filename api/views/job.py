@@ -1,0 +1,224 @@
+"""Jobs, their progress and their history."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any, Final, Generic, TypeVar
+
+from pydantic import ConfigDict, Field
+
+from api.views.base import View, finite, listing_name
+from api.views.evaluation import BestView, EvaluationView, evaluation_views
+from services.optimizer.estimate import estimate
+from services.optimizer.job import TRANSITIONS, Evaluation, Iteration, Job, JobState
+from services.optimizer.job_spec import JobSpec
+
+PREFIX: Final = "/v1"
+"""Version of the HTTP API, in every path."""
+
+T = TypeVar("T")
+
+
+class PageView(View, Generic[T]):
+    """A page of a list. The list is complete when `next` is null."""
+
+    # A parametrized generic does not inherit its docstring.
+    model_config = ConfigDict(
+        json_schema_extra={
+            "description": "A page of a list. The list is complete when `next` is null."
+        }
+    )
+
+    items: list[T] = Field(description="The items, in the list's order.")
+    next: str | None = Field(
+        description="Give it as `after` to get the following page; null on the last page.",
+        examples=["24"],
+    )
+
+    @classmethod
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
+        """Name of the schema, as clients see it."""
+        return listing_name(params, "Page")
+
+
+class JobSummaryView(View):
+    """A job and how far it is."""
+
+    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
+    state: JobState = Field(
+        description="queued, running, pausing (ends its iteration first), paused, cancelled,"
+        " failed or succeeded.",
+        examples=["running"],
+    )
+    error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
+    iterations: int = Field(description="Iterations committed so far [1].", examples=[12])
+    iterations_planned: int = Field(description="Budget of iterations [1].", examples=[25])
+    evaluations: int = Field(
+        description="Designs judged so far, each in every scenario [1].", examples=[300]
+    )
+    evaluations_planned: int = Field(
+        description="Designs that the whole budget will judge [1].", examples=[625]
+    )
+    best_fitness: float | None = Field(
+        description="Least fitness so far [1]; null while every design has failed.",
+        examples=[21.3],
+    )
+    best_iteration: int | None = Field(
+        description="Iteration that found it, from 0.", examples=[11]
+    )
+    compute_seconds: float = Field(
+        description="Time spent in evaluating committed iterations [s].", examples=[14.8]
+    )
+    evaluations_per_second: float | None = Field(
+        description="Designs judged per second of that time [1/s]; null before the first.",
+        examples=[20.3],
+    )
+    simulations_per_second: float | None = Field(
+        description="Walks (designs x scenarios) simulated per second of that time [1/s].",
+        examples=[121.6],
+    )
+    eta_seconds: float | None = Field(
+        description="Estimated time to the end of the budget at the rate so far [s]: 0 for a job"
+        " that succeeded, null unless it runs and has committed an iteration.",
+        examples=[16.1],
+    )
+    created_at: datetime = Field(description="When it was submitted, UTC.")
+    updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
+    started_at: datetime | None = Field(description="When it was first claimed, UTC.")
+    finished_at: datetime | None = Field(description="When it ended, UTC.")
+    links: dict[str, str] = Field(
+        description="Where to go on: `self`, `best`, `iterations`, `events`, and those of `pause`,"
+        " `resume`, `cancel` (POST) that its state allows.",
+        examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
+    )
+
+    @classmethod
+    def from_job(cls, job: Job) -> JobSummaryView:
+        """From the job alone: no further query."""
+        return cls.model_validate(_summary(job))
+
+
+class JobView(JobSummaryView):
+    """A job in full: what was asked, how far it is, and its best design so far."""
+
+    best: BestView | None = Field(
+        description="Best design so far; null while there is none that walks in every scenario."
+    )
+    spec: JobSpec = Field(
+        description="What was asked, with every preset written out as it was on submission."
+    )
+
+    @classmethod
+    def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
+        """best: as `JobService.best` returns it."""
+        view = None if best is None else BestView.from_evaluation(best, job.spec)
+        return cls.model_validate({**_summary(job), "best": view, "spec": job.spec})
+
+
+class IterationView(View):
+    """One committed iteration of a job: the swarm's fitness at a glance."""
+
+    index: int = Field(description="Index of the iteration, from 0.", examples=[24])
+    best: float | None = Field(
+        description="Least fitness of this iteration [1]; null if every design failed.",
+        examples=[21.3],
+    )
+    mean: float | None = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
+    median: float | None = Field(description="Median of them [1].", examples=[23.9])
+    worst: float | None = Field(description="Greatest of them [1].", examples=[41.7])
+    best_so_far: float | None = Field(
+        description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
+    )
+    failed: int = Field(
+        description="Designs that failed in at least one scenario [1].", examples=[2]
+    )
+    evaluate_seconds: float = Field(
+        description="Time that its evaluation took [s].", examples=[1.23]
+    )
+    committed_at: datetime = Field(description="When it was committed, UTC.")
+
+    @classmethod
+    def from_iteration(cls, iteration: Iteration) -> IterationView:
+        """An iteration as the store lists it."""
+        return cls.model_validate(_at_a_glance(iteration))
+
+
+class HistoryIterationView(IterationView):
+    """One committed iteration with every particle."""
+
+    evaluations: list[EvaluationView] = Field(description="Every particle, in order.")
+
+    @classmethod
+    def from_iteration_and_evaluations(
+        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: JobSpec
+    ) -> HistoryIterationView:
+        """evaluations: those of the iteration; spec: that of its job."""
+        particles = evaluation_views(evaluations, spec)
+        return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
+
+
+class StateView(View):
+    """A change of a job's state, as the event stream tells it."""
+
+    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    state: JobState = Field(description="The state that it is in now.", examples=["succeeded"])
+    error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
+    iterations: int = Field(description="Iterations committed so far [1].", examples=[25])
+
+    @classmethod
+    def from_job(cls, job: Job) -> StateView:
+        """The job's present state."""
+        return cls(id=job.id, state=job.state, error=job.error, iterations=job.progress.iterations)
+
+
+def job_links(job: Job) -> dict[str, str]:
+    """Paths of the job's resources, and of the commands that its state allows."""
+    here = f"{PREFIX}/jobs/{job.id}"
+    resources = {name: f"{here}/{name}" for name in ("best", "iterations", "events")}
+    commands = {
+        command.value: f"{here}/{command.value}"
+        for state, command in TRANSITIONS
+        if state is job.state
+    }
+    return {"self": here, **resources, **commands}
+
+
+def _summary(job: Job) -> dict[str, object]:
+    progress, spec = job.progress, job.spec
+    rates = estimate(job, datetime.now(UTC))
+    return {
+        "id": job.id,
+        "name": spec.name,
+        "state": job.state,
+        "error": job.error,
+        "iterations": progress.iterations,
+        "iterations_planned": spec.iterations,
+        "evaluations": progress.evaluations,
+        "evaluations_planned": spec.iterations * spec.optimizer.particles,
+        "best_fitness": finite(progress.best_fitness),
+        "best_iteration": progress.best_iteration,
+        "compute_seconds": progress.compute_seconds,
+        "evaluations_per_second": rates.evaluations_per_second,
+        "simulations_per_second": rates.simulations_per_second,
+        "eta_seconds": rates.eta_seconds,
+        "created_at": job.created_at,
+        "updated_at": job.updated_at,
+        "started_at": job.started_at,
+        "finished_at": job.finished_at,
+        "links": job_links(job),
+    }
+
+
+def _at_a_glance(iteration: Iteration) -> dict[str, object]:
+    return {
+        "index": iteration.index,
+        "best": finite(iteration.best),
+        "mean": finite(iteration.mean),
+        "median": finite(iteration.median),
+        "worst": finite(iteration.worst),
+        "best_so_far": finite(iteration.best_so_far),
+        "failed": iteration.failed,
+        "evaluate_seconds": iteration.evaluate_seconds,
+        "committed_at": iteration.committed_at,
+    }

@@ -1,0 +1,103 @@
+"""A walker's physics step: compiled kernel, CasADi's interpreter, Pinocchio's ABA alone.
+
+    python -m benchmarks.physics [--rounds 5] [--json]
+
+The contestants take turns, so that a busy machine slows all of them alike; medians are compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+from sim.benchmark import measure
+from sim.kernel.parameters import pack_parameters
+from sim.kernel.physics_step import physics_model
+from sim.kernel.reference import Stepper
+from sim.robot import load_robot
+from sim.scenario import SCENARIOS
+
+
+def native() -> float:
+    """Whole walks: control, physics and objectives; us a step and walker."""
+    return measure(repeats=1, backend="native").us_per_step_per_walker
+
+
+def interpreter() -> Callable[[], float]:
+    """The same physics step in CasADi's virtual machine, without control; us a step."""
+    robot = load_robot("szabadka2")
+    model = physics_model(robot)
+    parameters = pack_parameters(robot, model.body, SCENARIOS[0], 2e-4)
+    stepper = Stepper(model.step, 7 + robot.n_joints, robot.n_joints, parameters)
+
+    def run() -> float:
+        stepper.q[:] = 0.0
+        stepper.q[[2, 6]] = 0.15, 1.0
+        stepper.v[:] = 0.0
+        return per_call(stepper.advance, 5000)
+
+    return run
+
+
+def pinocchio_aba() -> Callable[[], float]:
+    """Pinocchio's articulated-body algorithm alone, called from Python; us a call."""
+    model = pin.buildModelFromXML(load_robot("szabadka2").urdf, pin.JointModelFreeFlyer())
+    data, q = model.createData(), pin.neutral(model)
+    v, tau = np.zeros(model.nv), np.zeros(model.nv)
+    return lambda: per_call(lambda: pin.aba(model, data, q, v, tau), 20000)
+
+
+def per_call(call: Callable[[], object], times: int) -> float:
+    """Microseconds a call."""
+    start = time.perf_counter()
+    for _ in range(times):
+        call()
+    return (time.perf_counter() - start) / times * 1e6
+
+
+def main() -> None:
+    """Print a table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    contestants = {
+        "compiled kernel, whole walk": native,
+        "CasADi interpreter, step only": interpreter(),
+        "pinocchio.aba from Python, dynamics only": pinocchio_aba(),
+    }
+    seen: dict[str, list[float]] = {name: [] for name in contestants}
+    for _ in range(options.rounds):
+        for name, run in contestants.items():
+            seen[name].append(run())
+    medians = {name: statistics.median(values) for name, values in seen.items()}
+    base = next(iter(medians.values()))
+    rows = [
+        {
+            "what": name,
+            "us_per_step": median,
+            "fastest": min(seen[name]),
+            "times_the_kernel": median / base,
+            "real_time_factor": 1e6 / 5000 / median,
+        }
+        for name, median in medians.items()
+    ]
+    if options.json:
+        print(json.dumps(rows, indent=2))
+        return
+    print(f"{'':42} {'us/step':>8} {'fastest':>8} {'ratio':>7} {'x real time':>12}")
+    for row in rows:
+        print(
+            f"{row['what']:42} {row['us_per_step']:8.3f} {row['fastest']:8.3f}"
+            f" {row['times_the_kernel']:7.1f} {row['real_time_factor']:12.0f}"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""What a job has found: history and best."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import typer
+
+from cli.options import Db, JobId, Json, Server
+
+if TYPE_CHECKING:
+    from api.views import HistoryIterationView, JobView
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(history)
+    app.command()(best)
+
+
+def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+    """Show every committed iteration.
+
+    With --json also every particle: its design, fitness, statuses and raw objectives.
+    """
+    from cli.jobs.open import open_jobs
+    from cli.output import stdout_console
+    from cli.tables import iterations_table
+
+    with open_jobs(server, db) as jobs:
+        if as_json:
+            _print_history(jobs.job(job_id), jobs.history(job_id))
+        else:
+            jobs.job(job_id)
+            stdout_console().print(iterations_table(jobs.iterations(job_id)))
+
+
+def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+    """Show the best design that a job has found so far, scenario by scenario."""
+    from cli.jobs.open import open_jobs
+    from cli.output import print_json, stdout_console
+    from cli.tables import design_table, results_table
+
+    with open_jobs(server, db) as jobs:
+        found = jobs.best(job_id)
+        if as_json:
+            print_json(found)
+            return
+        job = jobs.job(job_id)
+        console = stdout_console()
+        console.print(
+            f"job {job_id}: fitness {found.fitness:.6g} in iteration {found.iteration},"
+            f" particle {found.particle}",
+            markup=False,
+        )
+        console.print(design_table(job.spec, {"best": found.design}))
+        console.print(results_table({"best": found.scenarios}))
+
+
+def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> None:
+    """One JSON document, written as it is read: a history may be larger than memory."""
+    import json
+    import sys
+
+    from cli.output import write_json_items
+
+    head = {
+        "id": job.id,
+        "state": job.state.value,
+        "variables": job.spec.design_space().names,
+    }
+    opening = json.dumps(head, indent=2).removesuffix("\n}")
+    sys.stdout.write(f'{opening},\n  "iterations": ')
+    write_json_items(sys.stdout, iterations, indent=2)
+    sys.stdout.write("\n}\n")

@@ -1,0 +1,155 @@
+"""Commands about jobs: submit, list, status, watch, pause, resume, cancel."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli.options import (
+    ControllerOption,
+    Db,
+    Iterations,
+    JobId,
+    JobName,
+    Json,
+    Particles,
+    PreferenceOption,
+    Scenarios,
+    Seed,
+    Server,
+    SpecFile,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(submit)
+    app.command("list")(list_jobs)
+    app.command()(status)
+    app.command()(watch)
+    app.command()(pause)
+    app.command()(resume)
+    app.command()(cancel)
+
+
+def submit(
+    spec: SpecFile = None,
+    iterations: Iterations = None,
+    particles: Particles = None,
+    seed: Seed = None,
+    preference: PreferenceOption = None,
+    scenarios: Scenarios = None,
+    controller: ControllerOption = None,
+    name: JobName = None,
+    idempotency_key: Annotated[
+        str | None, typer.Option(help="The same key and spec again make no second job.")
+    ] = None,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """Queue a job for a running server; see `optimize` to run one here and now."""
+    from cli.jobs.open import open_jobs
+    from cli.output import note, print_json, stdout_console
+    from cli.spec_file import Overrides, build_spec
+
+    overrides = Overrides(iterations, particles, seed, preference, scenarios, controller, name)
+    asked = build_spec(spec, overrides)
+    with open_jobs(server, db, create=True) as jobs:
+        job = jobs.submit(asked, idempotency_key=idempotency_key)
+        if as_json:
+            print_json(job)
+            return
+        stdout_console().print(job.id, markup=False)
+        note(f"{job.state}; follow it: gaitswarm watch {job.id}{jobs.place}")
+
+
+def list_jobs(
+    state: Annotated[
+        str | None,
+        typer.Option(
+            help="Only jobs in this state: queued, running, pausing, paused, cancelled, failed or"
+            " succeeded."
+        ),
+    ] = None,
+    limit: Annotated[int, typer.Option(min=1, help="Most jobs to list.")] = 50,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """List jobs, newest first."""
+    from cli.jobs.open import open_jobs
+    from cli.output import print_json_list, stdout_console
+    from cli.tables import jobs_table
+    from services.optimizer.errors import InvalidRequest
+    from services.optimizer.job import JobState
+
+    try:
+        chosen = None if state is None else JobState(state)
+    except ValueError:
+        known = ", ".join(s.value for s in JobState)
+        raise InvalidRequest(f"{state!r} is none of {known}", field="state") from None
+    with open_jobs(server, db) as jobs:
+        found = jobs.jobs(state=chosen, limit=limit)
+        if as_json:
+            print_json_list(found)
+        else:
+            stdout_console().print(jobs_table(found))
+
+
+def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+    """Show a job: state, progress, best design, and why it failed if it did."""
+    from cli.jobs.open import open_jobs
+    from cli.output import print_json
+    from cli.tables import print_job
+
+    with open_jobs(server, db) as jobs:
+        job = jobs.job(job_id)
+        if as_json:
+            print_json(job)
+        else:
+            print_job(job)
+
+
+def watch(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+    """Follow a job until it ends; the exit code tells whether it succeeded.
+
+    With --json every committed iteration is one line, as is every change of the job's state.
+    """
+    from cli.jobs.open import open_jobs
+    from cli.progress import watch_as_json, watch_with_progress
+
+    with open_jobs(server, db) as jobs:
+        follow = watch_as_json if as_json else watch_with_progress
+        follow(jobs, job_id)
+
+
+def pause(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+    """Pause a job when its present iteration is committed."""
+    _command("pause", job_id, server, db, as_json=as_json)
+
+
+def resume(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+    """Queue a paused or failed job again; a running server goes on with it."""
+    _command("resume", job_id, server, db, as_json=as_json)
+
+
+def cancel(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+    """End a job for good; what it has committed stays."""
+    _command("cancel", job_id, server, db, as_json=as_json)
+
+
+def _command(
+    command: str, job_id: str, server: str | None, db: str | None, *, as_json: bool
+) -> None:
+    from cli.jobs.open import open_jobs
+    from cli.output import print_json, stdout_console
+    from services.optimizer.job import Command
+
+    with open_jobs(server, db) as jobs:
+        job = jobs.command(job_id, Command(command))
+    if as_json:
+        print_json(job)
+    else:
+        stdout_console().print(f"job {job.id} is {job.state}", markup=False)

@@ -1,0 +1,89 @@
+"""`gaitswarm optimize`: one job, run by this process from beginning to end."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli.options import (
+    ControllerOption,
+    Cpus,
+    Db,
+    EvaluatorOption,
+    Iterations,
+    JobName,
+    Json,
+    Particles,
+    PreferenceOption,
+    RayAddress,
+    Scenarios,
+    Seed,
+    SpecFile,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(optimize)
+
+
+def optimize(
+    spec: SpecFile = None,
+    iterations: Iterations = None,
+    particles: Particles = None,
+    seed: Seed = None,
+    preference: PreferenceOption = None,
+    scenarios: Scenarios = None,
+    controller: ControllerOption = None,
+    name: JobName = None,
+    resume: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID",
+            help="Go on with this job, to the same bits as if it had never stopped.",
+        ),
+    ] = None,
+    compare_published: Annotated[
+        bool,
+        typer.Option(
+            "--compare-published", help="Show the best design beside the one of the literature."
+        ),
+    ] = False,
+    db: Db = None,
+    evaluator: EvaluatorOption = "ray",
+    cpus: Cpus = None,
+    ray_address: RayAddress = None,
+    as_json: Json = False,
+) -> None:
+    """Run a job here and now, without a server. Ctrl-C stops it; --resume goes on with it."""
+    from contextlib import closing
+
+    from cli.embedded import Embedded, finish, resumed_job
+    from cli.jobs.local import LocalJobs
+    from cli.jobs.open import database_url
+    from cli.options import evaluator_kind
+    from cli.output import note
+    from cli.spec_file import Overrides, build_spec
+    from services.optimizer.errors import InvalidRequest
+    from services.optimizer.service import JobService
+    from services.runtime import open_store
+
+    if as_json and compare_published:
+        raise InvalidRequest("is for people; leave it out with --json", field="compare-published")
+    workers = Embedded(evaluator_kind(evaluator), ray_address=ray_address, cpus=cpus)
+    overrides = Overrides(iterations, particles, seed, preference, scenarios, controller, name)
+    asked = None
+    if resume is None or spec is not None or overrides.any:
+        asked = build_spec(spec, overrides)
+    url = database_url(db)
+    with closing(open_store(url)) as store:
+        service = JobService(store)
+        jobs = LocalJobs(service, url)
+        if asked is not None and resume is None:
+            job, _ = service.submit(asked)
+        else:
+            job = resumed_job(service, resume or "", asked)
+        note(f"job {job.id} in database {url}")
+        interrupted = workers.run(store, job)
+        finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published)

@@ -1,0 +1,87 @@
+"""`gaitswarm simulate`: one design in chosen scenarios."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Json
+
+if TYPE_CHECKING:
+    from api.views import SimulationView
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(simulate)
+
+
+def simulate(
+    design: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE|published:NAME",
+            help="JSON object {variable: value} of the controller's variables and any gait"
+            " parameters, or with one under `design`; or a published design, as published:A.",
+        ),
+    ],
+    controller: Annotated[str, typer.Option(help="fuzzy-pi or pi.")] = "fuzzy-pi",
+    scenario: Annotated[
+        str, typer.Option(help="Name or number, several separated by commas, or all.")
+    ] = "all",
+    trajectory: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="JSON object of gait parameters, beside the design."),
+    ] = None,
+    preference: Annotated[str, typer.Option(help="A, B or C: how objectives are weighed.")] = "A",
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.npz", help="Write the walks' 500 Hz logs as NumPy arrays."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Let one design walk and say what it is worth; a fall is a result, not an error."""
+    from pydantic import ValidationError
+
+    from api.simulation import SimulationRequest, run_simulation
+    from cli.design_file import read_design
+    from cli.output import note
+    from cli.spec_file import invalid_request
+    from sim.scenario import SCENARIOS
+
+    chosen = [s.name for s in SCENARIOS] if scenario == "all" else scenario.split(",")
+    data = {
+        "controller": controller,
+        "design": read_design(design, controller, trajectory),
+        "scenarios": [name.strip() for name in chosen],
+        "preference": preference,
+        "log": log is not None,
+    }
+    try:
+        request = SimulationRequest.model_validate(data)
+    except ValidationError as error:
+        raise invalid_request(error, data) from error
+    view = run_simulation(request)
+    if log is not None:
+        from cli.walk_log import write_walk_logs
+
+        write_walk_logs(log, {name: result.log for name, result in view.scenarios.items()})
+        note(f"log written to {log}")
+    _show(view, as_json=as_json)
+
+
+def _show(view: SimulationView, *, as_json: bool) -> None:
+    from cli.output import print_text, stdout_console
+    from cli.tables import number, results_table
+
+    if as_json:
+        print_text(view.model_dump_json(indent=2, exclude={"scenarios": {"__all__": {"log"}}}))
+        return
+    console = stdout_console()
+    console.print(results_table({"": view.scenarios}))
+    console.print(f"fitness {number(view.fitness)}", markup=False)
+    for name, result in view.scenarios.items():
+        if result.status != "ok":
+            console.print(f"{name}: {result.explanation}", markup=False)

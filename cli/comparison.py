@@ -1,0 +1,29 @@
+"""Designs of the literature, simulated as a job's own were."""
+
+from __future__ import annotations
+
+from api.simulation import SimulationRequest, run_simulation
+from api.views import SimulationView
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.preference import PREFERENCES
+from sim.controllers import CONTROLLERS
+
+
+def published_beside(spec: JobSpec) -> dict[str, SimulationView]:
+    """The published optimum of the job's controller and preference, by the name to show.
+
+    Evaluated in the job's scenarios under its preference. Where none was published for that
+    preference, the controller's first.
+    """
+    published = CONTROLLERS[spec.controller].published
+    wanted = spec.resolved_preference()
+    names = [name for name, known in PREFERENCES.items() if known == wanted and name in published]
+    study = next(iter([*names, *published]))
+    request = SimulationRequest(
+        robot=spec.robot,
+        controller=spec.controller,
+        design=dict(published[study]),
+        scenarios=spec.scenarios,
+        preference=spec.preference,
+    )
+    return {f"published {study}": run_simulation(request)}

@@ -1,0 +1,70 @@
+"""Designs from files, for `simulate` and `plot`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from cli.spec_file import read_json_object
+from services.optimizer.errors import InvalidRequest
+from sim.controllers import CONTROLLERS, Controller
+from sim.scenario import GAIT_VARIABLE_NAMES
+
+_PUBLISHED: Final = "published:"
+
+
+def read_design(design: str, controller: str, trajectory: Path | None = None) -> dict[str, Any]:
+    """Values by name; not checked yet, but for names.
+
+    design: a file with a flat object {name: value}, or with one under `design`, as `best --json`
+        prints; or `published:NAME` for a design of the literature.
+    trajectory: a file with gait parameters only, none of which the design may set as well.
+    Raises InvalidRequest that names the field.
+    """
+    values = _read_values(design, controller)
+    known = {variable.name for variable in _controller(controller).variables}
+    _check_names(values, known | GAIT_VARIABLE_NAMES, "design")
+    if trajectory is None:
+        return values
+    gait = read_json_object(trajectory, "trajectory")
+    _check_names(gait, GAIT_VARIABLE_NAMES, "trajectory")
+    for name in gait:
+        if name in values:
+            raise InvalidRequest(
+                "set in the design file too; choose one", field=f"trajectory.{name}"
+            )
+    return {**values, **gait}
+
+
+def _read_values(design: str, controller: str) -> dict[str, Any]:
+    if design.startswith(_PUBLISHED):
+        published = _controller(controller).published
+        name = design.removeprefix(_PUBLISHED)
+        if name not in published:
+            known = ", ".join(published)
+            raise InvalidRequest(
+                f"no published design {name!r} of {controller}; known are {known}", field="design"
+            )
+        return dict(published[name])
+    content = read_json_object(Path(design), "design")
+    values = content.get("design", content)
+    if not isinstance(values, dict):
+        raise InvalidRequest("must be an object of values by name", field="design")
+    return values
+
+
+def _controller(name: str) -> Controller:
+    for known, controller in CONTROLLERS.items():
+        if known == name:
+            return controller
+    raise InvalidRequest(
+        f"unknown controller {name!r}; known are {', '.join(CONTROLLERS)}", field="controller"
+    )
+
+
+def _check_names(values: dict[str, Any], known: set[str] | frozenset[str], field: str) -> None:
+    for name in values:
+        if name not in known:
+            raise InvalidRequest(
+                f"unknown variable; known are {', '.join(sorted(known))}", field=f"{field}.{name}"
+            )

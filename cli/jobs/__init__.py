@@ -1,0 +1,1 @@
+"""Jobs as commands see them, wherever they are."""

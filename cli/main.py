@@ -1,0 +1,73 @@
+"""`gaitswarm`: the command line.
+
+Commands import what they need when they run, so that `gaitswarm --help` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from cli.commands import (
+    bench,
+    export,
+    history,
+    jobs,
+    optimize,
+    plot,
+    serve,
+    simulate,
+)
+from cli.exit_codes import ExitCode, exit_code
+from cli.output import discard_stdout, note, warnings_as_notes
+
+app = typer.Typer(
+    name="gaitswarm",
+    help="Find robust drive controllers for walking robots.",
+    epilog="Exit codes: 0 done, 1 job failed or cancelled, 2 bad input, 3 not found, 4 not possible"
+    " in the job's state, 5 server, database or workers unavailable, 130 interrupted.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    # Rich takes longer to import than all the rest of a help text takes.
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for _module in (
+    optimize,
+    serve,
+    jobs,
+    history,
+    simulate,
+    bench,
+    export,
+    plot,
+):
+    _module.register(app)
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    warnings_as_notes()
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """One command; returns its exit code. Messages about what went wrong are on stderr."""
+    try:
+        app(list(arguments), prog_name="gaitswarm")
+    except SystemExit as ended:
+        return ended.code if isinstance(ended.code, int) else int(bool(ended.code))
+    except KeyboardInterrupt:
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        discard_stdout()
+        return ExitCode.OK
+    except Exception as error:
+        code = exit_code(error)
+        if code is None:
+            raise
+        note(f"gaitswarm: {error}")
+        return code
+    return ExitCode.OK

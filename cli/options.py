@@ -1,0 +1,80 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+
+if TYPE_CHECKING:
+    from services.runtime import EvaluatorKind
+
+SpecFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Job spec as JSON; `-` reads standard input. Without one: the chapter-4 job.",
+    ),
+]
+
+Iterations = Annotated[int | None, typer.Option(help="Iterations to run.")]
+
+Particles = Annotated[int | None, typer.Option(help="Size of the swarm.")]
+
+Seed = Annotated[int | None, typer.Option(help="Source of all randomness.")]
+
+PreferenceOption = Annotated[
+    str | None, typer.Option("--preference", help="How objectives are weighed: A, B or C.")
+]
+
+Scenarios = Annotated[str | None, typer.Option(help="Names or numbers, separated by commas.")]
+
+ControllerOption = Annotated[str | None, typer.Option("--controller", help="fuzzy-pi or pi.")]
+
+JobName = Annotated[str | None, typer.Option("--name", help="Name of the job, for people.")]
+
+JobId = Annotated[str, typer.Argument(metavar="ID", help="Identifier of the job.")]
+
+Server = Annotated[
+    str | None,
+    typer.Option(metavar="URL", help="Ask this server. [env: GAITSWARM_SERVER]"),
+]
+
+Db = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL",
+        help="Use this database: a file, sqlite:///FILE or postgresql://... [env: GAITSWARM_DB;"
+        " default: gaitswarm/gaitswarm.db in the user's data directory]",
+    ),
+]
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+EvaluatorOption = Annotated[
+    str, typer.Option("--evaluator", help="ray, or in-process (threads of this process).")
+]
+
+Cpus = Annotated[
+    int | None, typer.Option(min=1, help="Walks to compute at once on this machine; default all.")
+]
+
+RayAddress = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Use this Ray cluster; else one is started, and ended."),
+]
+
+
+def evaluator_kind(name: str) -> EvaluatorKind:
+    """Raises InvalidRequest that says which there are."""
+    from typing import get_args
+
+    from services.optimizer.errors import InvalidRequest
+    from services.runtime import EvaluatorKind
+
+    for kind in get_args(EvaluatorKind):
+        if kind == name:
+            return cast("EvaluatorKind", kind)
+    known = ", ".join(get_args(EvaluatorKind))
+    raise InvalidRequest(f"{name!r} is none of {known}", field="evaluator")

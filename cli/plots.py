@@ -1,0 +1,123 @@
+"""Pictures of jobs and controllers. Draws without a screen.
+
+matplotlib writes its font cache when it is imported, so it is not before something is drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from cli.atomic_file import replacing
+from services.optimizer.errors import InvalidRequest
+from sim.controllers.base import TABLE_SHAPE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+    from api.views import IterationView
+    from sim.controllers import Drive
+
+_FORMATS: Final = ("png", "svg", "pdf")
+_INK: Final = "#1f3a5f"
+_ACCENT: Final = "#d1495b"
+_FRACTION: Final = 1 << 16
+"""A drive's gains have 16 fractional bits."""
+
+
+def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figure:
+    """Fitness (minimized) over iterations: best so far, median, and the band best to worst."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    if not iterations:
+        raise InvalidRequest("the job has committed no iteration yet, so there is nothing to draw")
+    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+    axes = figure.add_subplot()
+    index = [i.index + 1 for i in iterations]
+    best, median, worst = (
+        _floats([getattr(i, name) for i in iterations]) for name in ("best", "median", "worst")
+    )
+    axes.fill_between(index, best, worst, color=_INK, alpha=0.12, lw=0, label="swarm")
+    axes.plot(index, median, color=_INK, alpha=0.6, lw=1.2, label="median of the swarm")
+    so_far = _floats([i.best_so_far for i in iterations])
+    label = f"best so far, {so_far[-1]:.4g} at last"
+    axes.step(index, so_far, where="post", color=_ACCENT, lw=2.2, label=label)
+    axes.set_yscale("log")
+    _plain_log_labels(axes)
+    axes.set_xlim(index[0], max(index[-1], index[0] + 1))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("iteration")
+    axes.set_ylabel("fitness, minimized  [1]")
+    axes.set_title(title, loc="left", weight="bold")
+    axes.grid(visible=True, which="both", color="0.9", lw=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, loc="upper right")
+    return figure
+
+
+def draw_surface(drive: Drive, *, title: str) -> Figure:
+    """Output over angle error and motor current, from the table that the robot looks up."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    if drive.table is None:
+        raise InvalidRequest("this controller has no table, so there is no surface to draw")
+    rows, columns = TABLE_SHAPE
+    error = (np.arange(rows) - rows // 2) * _FRACTION / drive.error_gain
+    current = np.arange(columns) * _FRACTION / drive.current_gain
+    output = drive.table.astype(np.float64) * drive.output_gain / _FRACTION
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    axes: Axes3D = figure.add_subplot(projection="3d")
+    drawn = axes.plot_surface(
+        error[:, None] / 1000.0,
+        current[None, :] / 1000.0,
+        output,
+        cmap="coolwarm",
+        vmin=-abs(output).max(),
+        vmax=abs(output).max(),
+        rcount=128,
+        ccount=64,
+        linewidth=0.0,
+        antialiased=False,
+    )
+    axes.set_xlabel("angle error  [1000 counts]", labelpad=10.0)
+    axes.set_ylabel("absolute motor current  [1000 counts]", labelpad=10.0)
+    axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    axes.view_init(elev=26.0, azim=-124.0)
+    axes.set_box_aspect((1.3, 1.1, 0.8), zoom=0.92)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_pane_color((0.97, 0.97, 0.98))
+    figure.suptitle(title, x=0.04, ha="left", weight="bold")
+    figure.colorbar(drawn, ax=axes, shrink=0.6, pad=0.06, label="output  [PWM counts]")
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write in the format of the file's suffix. Raises InvalidRequest."""
+    kind = path.suffix.removeprefix(".").lower()
+    if kind not in _FORMATS:
+        raise InvalidRequest(f"{path} must end in .{', .'.join(_FORMATS)}", field="output")
+    # Without a date the same picture is the same file.
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    with replacing(path, "output") as file:
+        figure.savefig(file, format=kind, dpi=150, metadata=metadata)
+
+
+def _floats(values: Sequence[float | None]) -> list[float]:
+    return [math.nan if value is None else value for value in values]
+
+
+def _plain_log_labels(axes: Axes) -> None:
+    """25, not 2.5 x 10^1: a fitness varies by less than a decade."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,58 @@
+"""Which jobs a command is about: those of a server, or those in a database."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from services.optimizer.errors import InvalidRequest
+
+if TYPE_CHECKING:
+    from api.settings import ApiSettings
+
+
+class CliSettings(BaseSettings):
+    """Read from the environment, prefix GAITSWARM_; an option of the command goes before."""
+
+    model_config = SettingsConfigDict(
+        env_prefix="GAITSWARM_", env_ignore_empty=True, frozen=True, extra="ignore"
+    )
+
+    server: str | None = Field(
+        default=None, description="URL of a gaitswarm server that commands are sent to."
+    )
+    db: str | None = Field(
+        default=None,
+        description="Database of the jobs: a file name, sqlite:///FILE or"
+        " postgresql://USER:PASSWORD@HOST/DATABASE. Default: a file in the user's data directory.",
+    )
+
+
+def api_settings(*, host: str | None, port: int | None) -> ApiSettings:
+    """The server's settings from the environment, with options laid over them.
+
+    Raises InvalidRequest that names the variable.
+    """
+    from pydantic import ValidationError
+
+    from api.settings import ApiSettings
+
+    given: dict[str, Any] = {
+        name: v for name, v in (("host", host), ("port", port)) if v is not None
+    }
+    try:
+        return ApiSettings(**given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = "_".join(str(part) for part in first["loc"]).upper()
+        raise InvalidRequest(first["msg"], field=f"GAITSWARM_API_{name}") from error
+
+
+def default_database() -> Path:
+    """The user's own database, the same for every command; its directory may not exist yet."""
+    base = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
+    return Path(base).expanduser() / "gaitswarm" / "gaitswarm.db"

@@ -1,0 +1,134 @@
+"""Job specs from files and options."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from services.optimizer.errors import InvalidRequest
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+    from services.optimizer.job_spec import JobSpec
+
+LARGEST_FILE: Final = 1 << 20
+"""Largest JSON file that is read [B]; a spec takes a few kilobytes."""
+
+
+def read_json_object(path: Path, what: str) -> dict[str, Any]:
+    """The JSON object in a file; "-" reads standard input.
+
+    what: name of the option, for messages. Raises InvalidRequest.
+    """
+    import sys
+
+    try:
+        with sys.stdin.buffer if str(path) == "-" else path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise InvalidRequest(f"cannot read {path}: {error.strerror}", field=what) from error
+    if len(content) > LARGEST_FILE:
+        raise InvalidRequest(
+            f"{path} is larger than {LARGEST_FILE >> 20} MiB, which no valid file is", field=what
+        )
+    try:
+        value = json.loads(content, object_pairs_hook=_without_repeats)
+    except RecursionError as error:
+        raise InvalidRequest(f"{path} is nested too deeply", field=what) from error
+    except ValueError as error:
+        raise InvalidRequest(f"{path} is not valid JSON: {error}", field=what) from error
+    if not isinstance(value, dict):
+        raise InvalidRequest(f"{path} must hold one JSON object", field=what)
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Overrides:
+    """Options laid over a spec; None leaves the spec's own value.
+
+    scenarios: names or numbers, separated by commas.
+    """
+
+    iterations: int | None = None
+    particles: int | None = None
+    seed: int | None = None
+    preference: str | None = None
+    scenarios: str | None = None
+    controller: str | None = None
+    name: str | None = None
+
+    @property
+    def any(self) -> bool:
+        """Whether there is one."""
+        return any(value is not None for value in asdict(self).values())
+
+
+def build_spec(path: Path | None, overrides: Overrides) -> JobSpec:
+    """The spec in a file (without one: the defaults) with options laid over it.
+
+    Raises InvalidRequest that names the field.
+    """
+    data = read_json_object(path, "spec") if path is not None else {}
+    chosen = {name: value for name, value in asdict(overrides).items() if value is not None}
+    if overrides.scenarios is not None:
+        chosen["scenarios"] = [name.strip() for name in overrides.scenarios.split(",")]
+    particles = chosen.pop("particles", None)
+    if particles is not None:
+        optimizer = data.get("optimizer", {})
+        chosen["optimizer"] = (
+            {**optimizer, "particles": particles} if isinstance(optimizer, dict) else optimizer
+        )
+    return parse_spec(data | chosen)
+
+
+def parse_spec(data: Mapping[str, Any]) -> JobSpec:
+    """A checked spec that can be simulated. Raises InvalidRequest that names every bad field."""
+    from pydantic import ValidationError
+
+    from services.optimizer.job_spec import JobSpec
+    from services.optimizer.service import check_can_be_simulated
+
+    try:
+        spec = JobSpec.model_validate(data)
+    except ValidationError as error:
+        raise invalid_request(error, data) from error
+    check_can_be_simulated(spec)
+    return spec
+
+
+def invalid_request(error: ValidationError, data: Mapping[str, Any]) -> InvalidRequest:
+    """What pydantic found wrong, in the words of the input: paths as in the file."""
+    found: dict[tuple[str, str], None] = {}
+    for entry in error.errors(include_url=False):
+        field = ".".join(_path_in(data, entry["loc"], missing=entry["type"] == "missing"))
+        message = entry["msg"].removeprefix("Value error, ")
+        found[field, message] = None
+    (field, message), *others = found
+    more = "".join(f"; {f}: {m}" if f else f"; {m}" for f, m in others)
+    return InvalidRequest(message + more, field=field)
+
+
+def _path_in(data: Any, location: tuple[int | str, ...], *, missing: bool) -> list[str]:
+    """The parts of a location that the input has: pydantic adds the names of union members."""
+    path: list[str] = []
+    for position, part in enumerate(location):
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            if not (missing and position == len(location) - 1):
+                continue
+        path.append(str(part))
+    return path
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object in which a name occurs twice means two things at once."""
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{name!r} occurs twice in one object")
+    return dict(pairs)

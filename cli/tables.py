@@ -1,0 +1,162 @@
+"""Views as tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Final
+
+from rich.table import Table
+from rich.text import Text
+
+from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES
+
+if TYPE_CHECKING:
+    from api.views import IterationView, JobSummaryView, JobView, ScenarioResultView
+    from services.optimizer.job_spec import JobSpec
+
+MISSING: Final = "–"
+
+_STYLES: Final = {
+    "running": "cyan",
+    "succeeded": "green",
+    "failed": "red",
+    "cancelled": "yellow",
+    "paused": "yellow",
+}
+
+
+_SHORT: Final = {
+    "torque": "torque",
+    "acceleration": "accel.",
+    "angular_acceleration": "ang.acc.",
+    "energy": "energy",
+    "reciprocal_speed": "1/speed",
+    "height_loss": "h. loss",
+}
+"""Headings that leave room for six objectives on a line of 80 characters."""
+
+
+def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
+    """One row a job."""
+    table = Table("id", "name", "state", "iterations", "best fitness", "submitted (UTC)", box=None)
+    for job in jobs:
+        table.add_row(
+            job.id,
+            Text(job.name or MISSING),
+            Text(job.state.value, style=_STYLES.get(job.state.value, "")),
+            f"{job.iterations}/{job.iterations_planned}",
+            number(job.best_fitness),
+            f"{job.created_at:%Y-%m-%d %H:%M}",
+        )
+    return table
+
+
+def iterations_table(iterations: Iterable[IterationView]) -> Table:
+    """One row an iteration; fitness is minimized."""
+    table = Table(box=None)
+    columns = ("iteration", "best so far", "best", "mean", "median", "worst", "failed", "seconds")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for i in iterations:
+        fitnesses = (i.best_so_far, i.best, i.mean, i.median, i.worst)
+        table.add_row(
+            str(i.index), *map(number, fitnesses), str(i.failed), f"{i.evaluate_seconds:.2f}"
+        )
+    return table
+
+
+def design_table(spec: JobSpec, designs: Mapping[str, Mapping[str, float]]) -> Table:
+    """Variables as rows, designs as columns, with unit and bounds."""
+    table = Table(title="Design", title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table.add_column("variable")
+    for name in designs:
+        table.add_column(name, justify="right")
+    table.add_column("bounds", justify="right")
+    table.add_column("unit")
+    space = spec.design_space()
+    searched = {variable.name: variable for variable in space.variables}
+    for name in space.names:
+        variable = searched.get(name)
+        table.add_row(
+            name,
+            *(number(design.get(name)) for design in designs.values()),
+            "fixed" if variable is None else f"{variable.low:g} – {variable.high:g}",
+            "" if variable is None else variable.unit,
+        )
+    return table
+
+
+def results_table(designs: Mapping[str, Mapping[str, ScenarioResultView]]) -> Table:
+    """Scenarios as rows; with several designs, one row for each under the scenario's name.
+
+    Utility and objectives are minimized.
+    """
+    table = Table(title="By scenario", title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("scenario", no_wrap=True)
+    table.add_column("status")
+    table.add_column("utility", justify="right")
+    for objective in OBJECTIVES:
+        table.add_column(f"{_SHORT[objective.name]}\n{objective.unit}", justify="right")
+    for scenario in next(iter(designs.values())):
+        if len(designs) > 1:
+            table.add_row(Text(scenario, style="bold"))
+        for design, results in designs.items():
+            result = results[scenario]
+            objectives = result.objectives.model_dump()
+            table.add_row(
+                f"  {design}" if len(designs) > 1 else scenario,
+                Text(result.status, style="" if result.status == "ok" else "red"),
+                number(result.utility),
+                *(_objective(name, objectives[name]) for name in OBJECTIVE_NAMES),
+            )
+    return table
+
+
+def _objective(name: str, value: float | None) -> str:
+    # A height is lost by millimetres: four decimals say more than four digits.
+    return f"{value:.4f}" if name == "height_loss" and value is not None else number(value)
+
+
+def print_job(job: JobView) -> None:
+    """What `status` shows."""
+    from cli.output import stdout_console
+
+    console = stdout_console()
+    rows = {
+        "job": job.id,
+        "name": job.name or MISSING,
+        "state": job.state.value,
+        "error": job.error,
+        "iterations": f"{job.iterations} of {job.iterations_planned}",
+        "evaluations": f"{job.evaluations} of {job.evaluations_planned}",
+        "speed": None
+        if job.evaluations_per_second is None
+        else f"{job.evaluations_per_second:.1f} designs/s",
+        "time left": None if job.eta_seconds is None else duration(job.eta_seconds),
+        "best fitness": number(job.best_fitness),
+    }
+    table = Table(box=None, show_header=False)
+    for name, value in rows.items():
+        if value is not None:
+            table.add_row(name, Text(value))
+    console.print(table)
+    if job.best is not None:
+        console.print(design_table(job.spec, {"best": job.best.design}))
+        console.print(results_table({"best": job.best.scenarios}))
+
+
+def number(value: float | None) -> str:
+    """Four significant digits, or all before the decimal point."""
+    if value is None:
+        return MISSING
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
+
+
+def duration(seconds: float) -> str:
+    """`42 s`, `3 min 05 s`, `2 h 07 min`."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"

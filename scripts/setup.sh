@@ -1,0 +1,71 @@
+#!/bin/sh
+# Make .venv hold what one lock file says, and nothing half-installed: setup.sh run|dev
+#
+# Does nothing if it already does. Needs a Python with venv and pip, and a package index that its
+# pip is configured for; PYTHON=/path/to/python overrides which Python is taken.
+set -eu
+cd "$(dirname "$0")/.."
+
+lock="requirements/${1:?which lock: run or dev}.lock"
+venv=.venv
+say() { printf 'set-up: %s\n' "$*" >&2; }
+
+is_suitable() {
+    "$1" -c '
+import sys
+import ensurepip, venv
+sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 15))' >/dev/null 2>&1
+}
+
+find_python() {
+    if [ -n "${PYTHON:-}" ]; then
+        is_suitable "$PYTHON" && { echo "$PYTHON"; return; }
+        say "PYTHON=$PYTHON is not a Python 3.11 to 3.14 with its venv and ensurepip modules"
+        exit 1
+    fi
+    for candidate in python3 python3.13 python3.14 python3.12 python3.11 python; do
+        is_suitable "$candidate" && { echo "$candidate"; return; }
+    done
+    say "no Python 3.11 to 3.14 with its venv and ensurepip modules was found."
+    say "Install one (Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3"
+    exit 1
+}
+
+has_compiler() {
+    for compiler in "${CC:-}" cc gcc clang; do
+        [ -n "$compiler" ] && command -v "$compiler" >/dev/null 2>&1 && return 0
+    done
+    return 1
+}
+
+# Old pips know nothing of some of these; they are then without effect.
+export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_USER=0 PIP_NO_INPUT=1 PIP_ROOT_USER_ACTION=ignore
+install() { "$venv/bin/python" -m pip install --quiet --no-deps "$@"; }
+
+key="$(cat "$lock" requirements/compiler.lock pyproject.toml scripts/setup.sh | cksum) $PWD ${PYTHON:-}"
+stamp="$venv/installed-$1"
+if [ -x "$venv/bin/gaitswarm" ] && is_suitable "$venv/bin/python" \
+    && [ "$(cat "$stamp" 2>/dev/null)" = "$key" ]; then
+    exit 0
+fi
+
+started=$(date +%s)
+python=$(find_python)
+# A virtual environment of another Python, or one that was moved, is of no use.
+if ! is_suitable "$venv/bin/python" || [ "$(cat "$venv/home" 2>/dev/null)" != "$PWD ${PYTHON:-}" ]; then
+    rm -rf "$venv"
+    say "making a virtual environment in $venv with $("$python" --version)"
+    "$python" -m venv "$venv"
+    echo "$PWD ${PYTHON:-}" > "$venv/home"
+fi
+rm -f "$stamp"
+say "installing $lock; the first time this takes a minute or two"
+install --require-hashes --only-binary :all: -r "$lock"
+if ! has_compiler; then
+    say "no C compiler found: installing the one of the ziglang wheel, so that simulation is fast"
+    install --require-hashes --only-binary :all: -r requirements/compiler.lock \
+        || say "that failed; simulation falls back to the slow reference interpreter"
+fi
+install --no-build-isolation --editable .
+echo "$key" > "$stamp"
+say "done in $(($(date +%s) - started)) s"

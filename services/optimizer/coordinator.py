@@ -1,0 +1,288 @@
+"""What happens next in a job: a pure function of (state, event) -> (state, actions).
+
+No I/O, clock or thread is in here; `services.optimizer.runner` executes the actions, in order,
+and answers the last of them with an event. An action that raises voids those after it.
+
+event                  in phase     actions                        phase after
+Claimed                start        [Begin,] Evaluate              evaluating
+Evaluated              evaluating   Commit                         committing
+Committed(running)     committing   Evaluate                       evaluating
+Committed(any other)   committing   -                              ended
+EvaluatorLost          evaluating   Wait, or Release(failed)       waiting, or ended
+Waited                 waiting      Evaluate                       evaluating
+EvaluationFailed       evaluating   Release(failed)                ended
+PauseSeen              waiting      Release(queued)                ended
+StopRequested          any          Release(queued)                ended
+LeaseWasLost           any          -                              ended
+
+A pause that comes while walks are run is the store's to see: the commit then answers `paused`.
+The store likewise pauses a pausing job that is released as queued.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+from services.optimizer.backoff import Backoff
+from services.optimizer.evaluator import EvaluationRequest
+from services.optimizer.job import Ask, Claim, CompletedIteration, Job, JobState
+from services.optimizer.optimizers.base import Optimizer
+from services.optimizer.optimizers.registry import create_optimizer
+from services.optimizer.preference import aggregate
+from sim.outcome import Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Claimed:
+    """The job is ours."""
+
+    claim: Claim
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluated:
+    """The ask was evaluated. outcomes: one per scenario; seconds: how long it took."""
+
+    outcomes: tuple[Outcome, ...]
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationFailed:
+    """The simulation refused the request, or has a bug: trying again would not help."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluatorLost:
+    """The workers could not be reached: trying again may help."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Waited:
+    """The delay is over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Committed:
+    """The iteration is stored. state: the job's state after it."""
+
+    state: JobState
+
+
+@dataclass(frozen=True, slots=True)
+class PauseSeen:
+    """A heartbeat saw that the job is to pause."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopRequested:
+    """This process is to end; the job is to go on elsewhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseWasLost:
+    """The job was cancelled, or belongs to another runner."""
+
+
+Event = (
+    Claimed
+    | Evaluated
+    | EvaluationFailed
+    | EvaluatorLost
+    | Waited
+    | Committed
+    | PauseSeen
+    | StopRequested
+    | LeaseWasLost
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Begin:
+    """Store the first ask."""
+
+    ask: Ask
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluate:
+    """Run the walks of the stored ask."""
+
+    request: EvaluationRequest
+
+
+@dataclass(frozen=True, slots=True)
+class Commit:
+    """Store the iteration and the ask that follows it, None at the end of the budget."""
+
+    done: CompletedIteration
+    following: Ask | None
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Let this many seconds pass."""
+
+    seconds: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Give up the lease."""
+
+    state: JobState
+    error: str | None = None
+
+
+Action = Begin | Evaluate | Commit | Wait | Release
+
+
+class Phase(StrEnum):
+    """What the coordinator waits for."""
+
+    START = "start"
+    EVALUATING = "evaluating"
+    WAITING = "waiting"
+    COMMITTING = "committing"
+    ENDED = "ended"
+
+
+@dataclass(frozen=True, slots=True)
+class Coordination:
+    """Where one run of one job is. Never changed, only replaced.
+
+    The optimizer is not kept: it is made from the stored ask whenever it is needed, so that going
+    on and resuming are one and the same path. following: the ask of a commit under way.
+    """
+
+    backoff: Backoff = field(default_factory=Backoff)
+    phase: Phase = Phase.START
+    job: Job | None = None
+    ask: Ask | None = None
+    following: Ask | None = None
+    failures: int = 0
+
+
+def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
+    """Answer one event. Raises ValueError for one that makes no sense in this phase."""
+    match state.phase, event:
+        case Phase.ENDED, _:
+            return state, ()
+        case _, LeaseWasLost():
+            return replace(state, phase=Phase.ENDED), ()
+        case (_, StopRequested()) | (Phase.WAITING, PauseSeen()):
+            return _release(state, JobState.QUEUED)
+        case _:
+            return _proceed(state, event)
+
+
+def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
+    match state.phase, event:
+        case Phase.START, Claimed(claim=claim):
+            return _start(state, claim)
+        case Phase.EVALUATING, Evaluated():
+            return _complete(state, event)
+        case Phase.EVALUATING, EvaluatorLost(reason=reason):
+            return _try_again(state, reason)
+        case Phase.EVALUATING, EvaluationFailed(reason=reason):
+            return _release(state, JobState.FAILED, reason)
+        case Phase.WAITING, Waited():
+            return replace(state, phase=Phase.EVALUATING), (_evaluate(state),)
+        case Phase.COMMITTING, Committed(state=stored):
+            return _go_on(state, stored)
+        case phase, _:
+            raise ValueError(f"{type(event).__name__} makes no sense while {phase}")
+
+
+def _start(state: Coordination, claim: Claim) -> tuple[Coordination, tuple[Action, ...]]:
+    state = replace(state, phase=Phase.EVALUATING, job=claim.job, ask=claim.ask)
+    if claim.ask is not None:
+        return state, (_evaluate(state),)
+    first = _ask(create_optimizer(claim.job.spec))
+    state = replace(state, ask=first)
+    return state, (Begin(first), _evaluate(state))
+
+
+def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
+    job, ask = _current(state)
+    fitness, _ = aggregate(event.outcomes, job.spec.resolved_preference())
+    optimizer = create_optimizer(job.spec)
+    optimizer.load(ask.state)
+    optimizer.tell(fitness)
+    following = _ask(optimizer) if optimizer.iteration < job.spec.iterations else None
+    done = CompletedIteration(
+        iteration=ask.iteration,
+        designs=job.spec.design_space().designs(ask.positions),
+        outcomes=event.outcomes,
+        fitness=fitness,
+        evaluate_seconds=event.seconds,
+    )
+    state = replace(state, phase=Phase.COMMITTING, following=following, failures=0)
+    return state, (Commit(done, following),)
+
+
+def _go_on(state: Coordination, stored: JobState) -> tuple[Coordination, tuple[Action, ...]]:
+    if stored is not JobState.RUNNING or state.following is None:
+        return replace(state, phase=Phase.ENDED), ()
+    state = replace(state, phase=Phase.EVALUATING, ask=state.following, following=None)
+    return state, (_evaluate(state),)
+
+
+def _try_again(state: Coordination, reason: str) -> tuple[Coordination, tuple[Action, ...]]:
+    failures = state.failures + 1
+    delay = state.backoff.delay(failures)
+    if delay is None:
+        return _release(
+            state,
+            JobState.FAILED,
+            f"the workers could not be reached in {failures} attempts: {reason};"
+            " resume the job when they can",
+        )
+    return replace(state, phase=Phase.WAITING, failures=failures), (Wait(delay, reason),)
+
+
+def _release(
+    state: Coordination, released: JobState, error: str | None = None
+) -> tuple[Coordination, tuple[Action, ...]]:
+    return replace(state, phase=Phase.ENDED), (Release(released, error),)
+
+
+def _evaluate(state: Coordination) -> Evaluate:
+    job, ask = _current(state)
+    spec = job.spec
+    space = spec.design_space()
+    return Evaluate(
+        EvaluationRequest(
+            job_id=job.id,
+            robot=spec.robot,
+            controller=spec.controller,
+            scenarios=spec.resolved_scenarios(),
+            variables=space.names,
+            designs=space.designs(ask.positions),
+        )
+    )
+
+
+def _ask(optimizer: Optimizer) -> Ask:
+    positions = optimizer.ask()
+    return Ask(optimizer.iteration, positions, _as_stored(optimizer.dump()))
+
+
+def _as_stored(state: dict[str, Any]) -> dict[str, Any]:
+    """What the store will give back: a state that JSON would change is found out at once."""
+    stored: dict[str, Any] = json.loads(json.dumps(state, allow_nan=False))
+    return stored
+
+
+def _current(state: Coordination) -> tuple[Job, Ask]:
+    if state.job is None or state.ask is None:
+        raise ValueError(f"no job was claimed, while {state.phase}")
+    return state.job, state.ask

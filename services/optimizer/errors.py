@@ -1,0 +1,52 @@
+"""Errors of the service.
+
+GaitswarmError
+├── InvalidRequest          what was asked makes no sense; names the field (HTTP 422)
+├── NotFound                no job or iteration of that id (HTTP 404)
+├── Conflict                not possible in the job's present state (HTTP 409)
+│   └── IdempotencyConflict the key was used before with another body
+├── LeaseLost               another runner, or a cancellation, has taken the job
+├── EvaluatorUnavailable    the workers cannot be reached now; try again later
+└── StoreUnavailable        the database cannot be reached, or has another schema (HTTP 503)
+"""
+
+from __future__ import annotations
+
+
+class GaitswarmError(Exception):
+    """Base of every error that gaitswarm raises on purpose."""
+
+
+class InvalidRequest(GaitswarmError, ValueError):
+    """What was asked makes no sense.
+
+    field: dotted path of the offending field, "" when it is the request as a whole.
+    """
+
+    def __init__(self, message: str, *, field: str = "") -> None:
+        self.field = field
+        super().__init__(f"{field}: {message}" if field else message)
+
+
+class NotFound(GaitswarmError):
+    """No such job, or no such iteration of it."""
+
+
+class Conflict(GaitswarmError):
+    """The job's present state does not allow it."""
+
+
+class IdempotencyConflict(Conflict):
+    """The idempotency key was used before for another request."""
+
+
+class LeaseLost(GaitswarmError):
+    """The job belongs to another runner now, or was cancelled."""
+
+
+class EvaluatorUnavailable(GaitswarmError):
+    """The workers cannot be reached now."""
+
+
+class StoreUnavailable(GaitswarmError):
+    """The database cannot be reached, or holds another schema."""

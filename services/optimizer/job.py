@@ -1,0 +1,166 @@
+"""Jobs and what is remembered of them: the domain objects of the service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.errors import Conflict
+from services.optimizer.job_spec import JobSpec
+from sim.outcome import Outcome
+
+
+class JobState(StrEnum):
+    """Where a job is in its life."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+    SUCCEEDED = "succeeded"
+
+    @property
+    def terminal(self) -> bool:
+        """Nothing more happens to it by itself."""
+        return self in (JobState.CANCELLED, JobState.FAILED, JobState.SUCCEEDED)
+
+
+class Command(StrEnum):
+    """What a user may ask of a job."""
+
+    PAUSE = "pause"
+    RESUME = "resume"
+    CANCEL = "cancel"
+
+
+TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
+    (JobState.QUEUED, Command.PAUSE): JobState.PAUSED,
+    (JobState.RUNNING, Command.PAUSE): JobState.PAUSING,
+    (JobState.PAUSED, Command.RESUME): JobState.QUEUED,
+    (JobState.PAUSING, Command.RESUME): JobState.RUNNING,
+    (JobState.FAILED, Command.RESUME): JobState.QUEUED,
+    (JobState.QUEUED, Command.CANCEL): JobState.CANCELLED,
+    (JobState.RUNNING, Command.CANCEL): JobState.CANCELLED,
+    (JobState.PAUSING, Command.CANCEL): JobState.CANCELLED,
+    (JobState.PAUSED, Command.CANCEL): JobState.CANCELLED,
+    (JobState.FAILED, Command.CANCEL): JobState.CANCELLED,
+}
+"""Every transition that a user can ask for; the runner's own are claim, pause, end."""
+
+
+def commanded(state: JobState, command: Command) -> JobState:
+    """The state after a command; Conflict says what is possible instead."""
+    try:
+        return TRANSITIONS[state, command]
+    except KeyError:
+        possible = [c.value for (s, c) in TRANSITIONS if s is state]
+        hint = f"possible now: {', '.join(possible)}" if possible else "it has ended"
+        raise Conflict(f"cannot {command} a job that is {state}; {hint}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """One design, judged in every scenario of its job.
+
+    design: (v,) values of `Job.spec.design_space().names`.
+    objectives: (K, 6) raw objectives by scenario, NaN where there is none; statuses: (K,) uint8.
+    fitness: geometric mean of the scenarios' utilities, minimized, +inf if any scenario failed.
+    """
+
+    iteration: int
+    particle: int
+    design: NDArray[np.float64]
+    objectives: NDArray[np.float64]
+    statuses: NDArray[np.uint8]
+    fitness: float
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a job is; read with the job in one query."""
+
+    iterations: int = 0
+    evaluations: int = 0
+    best_fitness: float | None = None
+    best_iteration: int | None = None
+    best_particle: int | None = None
+    compute_seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A job as stored. `spec` is resolved: no preset is left to be looked up."""
+
+    id: str
+    spec: JobSpec
+    state: JobState
+    created_at: datetime
+    updated_at: datetime
+    started_at: datetime | None = None
+    finished_at: datetime | None = None
+    error: str | None = None
+    progress: Progress = field(default_factory=Progress)
+
+
+@dataclass(frozen=True, slots=True)
+class Iteration:
+    """One committed iteration, as it is listed: no particles.
+
+    index counts from 0. best, mean, median, worst: fitness over the swarm's finite values, None
+    if no particle has one. best_so_far: over this and all earlier iterations.
+    """
+
+    index: int
+    best: float | None
+    mean: float | None
+    median: float | None
+    worst: float | None
+    best_so_far: float | None
+    failed: int
+    evaluate_seconds: float
+    committed_at: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """An iteration that is to be evaluated: stored before it is sent out.
+
+    positions: (particles, d) as the optimizer gave them; state: the optimizer's dump after the ask.
+    Both are stored as standard JSON, so every number in them is finite.
+    """
+
+    iteration: int
+    positions: NDArray[np.float64]
+    state: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class CompletedIteration:
+    """All that one transaction commits of an iteration.
+
+    designs: (n, v); outcomes: one per scenario, of n designs each; fitness: (n,).
+    """
+
+    iteration: int
+    designs: NDArray[np.float64]
+    outcomes: tuple[Outcome, ...]
+    fitness: NDArray[np.float64]
+    evaluate_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A lease on a job. `token` fences: a store refuses writes under an older one."""
+
+    job: Job
+    runner: str
+    token: int
+    ask: Ask | None
+    """The stored ask to go on with; None for a job that has not begun."""

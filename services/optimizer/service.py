@@ -1,0 +1,124 @@
+"""What can be asked of the service, in the words of its users; the API and the CLI call this."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Final
+
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.job import Command, Evaluation, Iteration, Job, JobState
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.store.base import Page, Store
+from sim.controllers import CONTROLLERS
+from sim.errors import SimulationInputError
+from sim.scenario import GAIT_VARIABLE_NAMES
+from sim.simulate import check_reach, with_gait
+from sim.variables import Variable
+
+_PIECE: Final = 16
+
+
+@dataclass(frozen=True, slots=True)
+class JobService:
+    """Jobs as their users see them. Thread-safe, as the store is."""
+
+    store: Store
+
+    def submit(self, spec: JobSpec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
+        """Check that the job can be simulated and queue it; (job, whether it is new).
+
+        Raises InvalidRequest that names the field, IdempotencyConflict.
+        """
+        check_can_be_simulated(spec)
+        return self.store.create_job(spec.resolved(), idempotency_key=idempotency_key)
+
+    def job(self, job_id: str) -> Job:
+        """Raises NotFound."""
+        return self.store.job(job_id)
+
+    def jobs(
+        self, *, state: JobState | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[Job]:
+        """Newest first."""
+        return self.store.jobs(state=state, after=after, limit=limit)
+
+    def command(self, job_id: str, command: Command) -> Job:
+        """Pause, resume or cancel. Raises NotFound, Conflict."""
+        return self.store.command(job_id, command)
+
+    def iterations(
+        self, job_id: str, *, after: int | None = None, limit: int = 100
+    ) -> Page[Iteration]:
+        """Committed iterations with index > after."""
+        return self.store.iterations(job_id, after=after, limit=limit)
+
+    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
+        """Every particle of a committed iteration."""
+        return self.store.evaluations(job_id, iteration)
+
+    def best(self, job_id: str) -> Evaluation | None:
+        """The best design so far."""
+        return self.store.best(job_id)
+
+    def history(
+        self, job_id: str, *, after: int | None = None
+    ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
+        """Every committed iteration with index > after, with its particles, in order.
+
+        Read by pieces as it is consumed: however long it takes, no transaction stays open, and a
+        job that runs meanwhile is followed to its end. Raises NotFound at the first item.
+        """
+        while True:
+            page = self.store.iterations(job_id, after=after, limit=_PIECE)
+            if page.items:
+                first, last = page.items[0].index, page.items[-1].index
+                found = self.store.evaluations_between(job_id, first, last + 1)
+                by_iteration = {k: tuple(g) for k, g in groupby(found, key=_iteration_of)}
+                for iteration in page.items:
+                    yield iteration, by_iteration.get(iteration.index, ())
+                after = last
+            if page.next is None:
+                return
+
+
+def check_can_be_simulated(spec: JobSpec) -> None:
+    """Raise InvalidRequest for bounds that nothing can run with, or a gait beyond the legs.
+
+    A gait that is itself searched may leave the legs' reach at some points of the box: there a
+    status says so. Only a scenario whose gentlest gait is beyond reach is refused.
+    """
+    space = spec.design_space()
+    scenarios = spec.resolved_scenarios()
+    fixed = dict(space.fixed)
+    for corner in (space.low, space.high):
+        (values,) = space.designs(corner.reshape(1, -1))
+        design = dict(zip(space.names, values.tolist(), strict=True))
+        try:
+            CONTROLLERS[spec.controller].compile(design)
+            with_gait(scenarios[0], _gait_of(design))
+        except SimulationInputError as error:
+            culprit = str(error).partition(":")[0]
+            field = "fixed" if culprit in fixed else "variables"
+            raise InvalidRequest(str(error), field=field) from error
+    gait = _gait_of(fixed) | _gentlest_gait(space.variables)
+    for index, scenario in enumerate(scenarios):
+        try:
+            check_reach(scenario, tuple(gait), tuple(gait.values()), robot=spec.robot)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
+
+
+def _gait_of(design: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in design.items() if name in GAIT_VARIABLE_NAMES}
+
+
+def _gentlest_gait(searched: tuple[Variable, ...]) -> dict[str, float]:
+    """Of the gaits that may be searched, the one whose feet stray least: short, flat, smooth."""
+    least = {v.name: v.low for v in searched if v.name in ("stride", "height")}
+    return least | {v.name: v.high for v in searched if v.name == "fir_ms"}
+
+
+def _iteration_of(evaluation: Evaluation) -> int:
+    return evaluation.iteration

@@ -1,0 +1,111 @@
+"""The port of the memory: jobs, iterations, evaluations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from services.optimizer.job import (
+    Ask,
+    Claim,
+    Command,
+    CompletedIteration,
+    Evaluation,
+    Iteration,
+    Job,
+    JobState,
+)
+from services.optimizer.job_spec import JobSpec
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Page(Generic[T]):
+    """A keyset page. `next` is the `after` of the following page, None on the last."""
+
+    items: tuple[T, ...]
+    next: str | None
+
+
+class Store(Protocol):
+    """Thread-safe. Every method is one transaction: it happens wholly or not at all.
+
+    Methods that take an id raise NotFound for an unknown one. Methods that take a claim raise
+    LeaseLost, and change nothing, if the claim's token is no longer the job's.
+    """
+
+    def create_job(self, spec: JobSpec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
+        """Insert a queued job of the resolved spec; (job, True).
+
+        With a key used before: (the job it made, False) if the spec is equal, else
+        IdempotencyConflict.
+        """
+
+    def job(self, job_id: str) -> Job:
+        """One job with its progress."""
+
+    def jobs(
+        self, *, state: JobState | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[Job]:
+        """Newest first. Raises InvalidRequest (field `after`) for a cursor that is not one."""
+
+    def command(self, job_id: str, command: Command) -> Job:
+        """Apply `commanded`; Conflict if the state does not allow it.
+
+        Cancelling clears the lease, so a runner's next write is refused.
+        """
+
+    def claim(
+        self, runner: str, *, lease_seconds: float, job_id: str | None = None
+    ) -> Claim | None:
+        """Take the oldest job that is queued, or running/pausing with a lease that ran out.
+
+        job_id: only that one. A pausing job without a live lease becomes paused and is not claimed.
+        The claimed job is running, its token one higher than any before.
+        """
+
+    def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
+        """Heartbeat: extend the lease; returns the state, so that pausing is seen."""
+
+    def begin(self, claim: Claim, ask: Ask) -> None:
+        """Store the first ask of a job. Repeated, it keeps the ask that is there."""
+
+    def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
+        """Store a completed iteration and the next ask, in one transaction.
+
+        following: None at the end of the budget; the job is then succeeded. A pausing job becomes
+        paused and gives up its lease. Returns the state after. Unique on (job, iteration): a
+        commit whose answer was lost may be repeated, and changes nothing the second time. Raises
+        Conflict for an iteration that was not asked.
+        """
+
+    def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
+        """Give up the lease: `failed` with its reason, `paused`, or `queued` to be claimed again.
+
+        `queued` means paused for a job that is pausing, so a runner that stops need not look first.
+        """
+
+    def iterations(
+        self, job_id: str, *, after: int | None = None, limit: int = 100
+    ) -> Page[Iteration]:
+        """Committed iterations in order, those with index > after."""
+
+    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
+        """All particles of a committed iteration, in order; NotFound if it is not committed."""
+
+    def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
+        """All particles of the committed iterations first <= index < last, in order.
+
+        For reading a long history by pieces, each a transaction of its own; committed iterations
+        never change, so the pieces fit together.
+        """
+
+    def best(self, job_id: str) -> Evaluation | None:
+        """The evaluation of least fitness, the earliest of equals; None if none is finite."""
+
+    def ping(self) -> None:
+        """Raise StoreUnavailable unless the database answers and has this version's schema."""
+
+    def close(self) -> None:
+        """Release connections. Idempotent."""

@@ -1,0 +1,178 @@
+"""Connections and transactions: the one place that begins, commits and rolls back."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from sqlalchemy import URL, Connection, Engine, NullPool, create_engine, event, make_url
+from sqlalchemy.exc import ArgumentError, DatabaseError, InterfaceError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
+
+from services.optimizer.errors import StoreUnavailable
+
+BUSY_SECONDS: Final = 15.0
+"""How long a transaction waits for another's lock before the store counts as unavailable."""
+
+_WRITE: Final = "gaitswarm_write"
+
+
+def parse_url(text: str) -> URL:
+    """`sqlite:///path`, a bare path, or `postgresql://...` to what SQLAlchemy takes.
+
+    Raises StoreUnavailable that says which forms there are.
+    """
+    forms = "use a file name, sqlite:///FILE or postgresql://USER:PASSWORD@HOST/DATABASE"
+    if "://" not in text:
+        if not text.strip():
+            raise StoreUnavailable(f"the database URL is empty; {forms}")
+        return _sqlite_url(text, forms)
+    try:
+        url = make_url(text)
+    except (ArgumentError, ValueError) as error:
+        raise StoreUnavailable(f"the database URL cannot be understood; {forms}") from error
+    if url.drivername in ("sqlite", "sqlite+pysqlite"):
+        return _sqlite_url(url.database or "", forms)
+    if url.drivername in ("postgresql", "postgres", "postgresql+psycopg"):
+        return url.set(drivername="postgresql+psycopg")
+    raise StoreUnavailable(f"{url.drivername} databases are not supported; {forms}")
+
+
+def _sqlite_url(path: str, forms: str) -> URL:
+    if path in ("", ":memory:"):
+        raise StoreUnavailable(f"a database in memory forgets every job; {forms}")
+    return URL.create("sqlite+pysqlite", database=str(Path(path).expanduser()))
+
+
+@dataclass(frozen=True, slots=True)
+class Database:
+    """An engine and the name by which messages call its database (without password)."""
+
+    engine: Engine
+    name: str
+
+    @contextmanager
+    def transaction(self, *, write: bool) -> Iterator[Connection]:
+        """Commit at the end, roll back on any exception.
+
+        write: false for a snapshot to read from; it never waits for a writer on SQLite.
+        Raises StoreUnavailable if the database is unreachable, or locked for `BUSY_SECONDS`.
+        """
+        try:
+            with self.engine.connect() as connection:
+                connection.execution_options(**{_WRITE: write})
+                with connection.begin():
+                    yield connection
+        except (DatabaseError, InterfaceError, PoolTimeout) as error:
+            if not _is_infrastructure(error):
+                raise
+            raise StoreUnavailable(f"database {self.name}: {_cause(error)}") from error
+
+    def close(self) -> None:
+        """Release the pooled connections. Idempotent."""
+        self.engine.dispose()
+
+
+def connect(url: URL, *, for_migration: bool = False) -> Database:
+    """An engine for a parsed URL; it connects only when it is first used.
+
+    for_migration: no pool, and on SQLite no enforcement of foreign keys, because a batch migration
+        drops and renames tables that others refer to.
+    """
+    options: dict[str, Any] = {"json_serializer": _strict_json}
+    if for_migration:
+        options |= {"poolclass": NullPool}
+    else:
+        options |= {"pool_size": 8, "max_overflow": 24, "pool_timeout": BUSY_SECONDS}
+    if url.get_backend_name() == "sqlite":
+        engine = _sqlite_engine(url, options, foreign_keys=not for_migration)
+        return Database(engine, url.database or "")
+    return Database(_postgresql_engine(url, options), url.render_as_string(hide_password=True))
+
+
+def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> Engine:
+    # Without an isolation level the driver begins nothing by itself, so that we can say how.
+    connect_args = {"isolation_level": None, "timeout": BUSY_SECONDS}
+    engine = create_engine(url, connect_args=connect_args, **options)
+
+    @event.listens_for(engine, "connect")
+    def _configure(connection: sqlite3.Connection, _record: object) -> None:
+        _journal_ahead(connection)
+        # An iteration that was acknowledged survives a power cut: WAL alone syncs less often.
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: Connection) -> None:
+        # A deferred transaction that turns to writing fails at once if another has written since.
+        write = connection.get_execution_options().get(_WRITE, False)
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN DEFERRED")
+
+    return engine
+
+
+def _journal_ahead(connection: sqlite3.Connection) -> None:
+    """Readers and the writer do not block each other. A property of the file, set once."""
+    deadline = time.monotonic() + BUSY_SECONDS
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            # The busy timeout does not cover the switch while another process makes it too.
+            if "locked" not in str(error) or time.monotonic() > deadline:
+                raise
+            time.sleep(0.01)
+
+
+def _postgresql_engine(url: URL, options: dict[str, Any]) -> Engine:
+    connect_args: dict[str, Any] = {}
+    if "connect_timeout" not in url.query:
+        connect_args["connect_timeout"] = round(BUSY_SECONDS)
+    if "options" not in url.query:
+        # A lock waits no longer than on SQLite; a client that vanished must not hold one for ever.
+        milliseconds = round(BUSY_SECONDS * 1000)
+        connect_args["options"] = (
+            f"-c lock_timeout={milliseconds}"
+            f" -c idle_in_transaction_session_timeout={4 * milliseconds}"
+        )
+    try:
+        # A connection that a restart of the server has cut is replaced before it is used.
+        return create_engine(url, connect_args=connect_args, pool_pre_ping=True, **options)
+    except ModuleNotFoundError as error:
+        raise StoreUnavailable(
+            f"PostgreSQL needs {error.name}: install gaitswarm[postgres]"
+        ) from error
+
+
+def _strict_json(value: object) -> str:
+    """JSON as the standard has it (PostgreSQL refuses NaN and Infinity); floats exact to the bit.
+
+    Raises ValueError for a value that is not finite.
+    """
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
+def _is_infrastructure(error: DatabaseError | InterfaceError | PoolTimeout) -> bool:
+    """Whether the database is at fault, and not a statement of ours."""
+    # The bare DatabaseError is how the drivers say that a file or an answer is no database's.
+    return isinstance(error, (OperationalError, InterfaceError, PoolTimeout)) or (
+        type(error) is DatabaseError
+    )
+
+
+def _cause(error: DatabaseError | InterfaceError | PoolTimeout) -> str:
+    """The driver's own words, without the statement and its parameters."""
+    origin = getattr(error, "orig", None)
+    text = " ".join(str(origin if origin is not None else error).split())
+    if "locked" in text:
+        return f"{text}: another process has been writing for {BUSY_SECONDS:g} s; try again"
+    if "unable to open" in text:
+        return f"{text}: check that its directory exists and that you may write there"
+    return text

@@ -1,0 +1,103 @@
+"""Schema revisions: bring a database to the newest, or say why it cannot be used."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Final
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import URL, Connection
+from sqlalchemy.exc import DBAPIError
+
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.store.engine import Database, connect
+
+_MIGRATIONS: Final = Path(__file__).with_name("migrations")
+
+# "gaitswarm migrates", as a number that no other program is likely to lock by.
+_ADVISORY_LOCK: Final = 0x6761_6974_7377_6D01
+
+# Alembic keeps the migration under way in module globals.
+_one_at_a_time: Final = threading.Lock()
+
+
+def migrate(url: URL) -> None:
+    """Bring the database to the newest revision; safe when several processes do so at once.
+
+    Raises StoreUnavailable if it cannot be opened, or was made by a newer gaitswarm.
+    """
+    database = connect(url, for_migration=True)
+    try:
+        # Looking first: an open database that is up to date needs no write lock.
+        with database.transaction(write=False) as connection:
+            if _revision(connection, database.name) == head():
+                return
+        with database.transaction(write=True) as connection:
+            lock_for_migration(connection)
+            if _revision(connection, database.name) != head():
+                _upgrade(connection, database.name)
+    except DBAPIError as error:
+        raise StoreUnavailable(
+            f"database {database.name} cannot be migrated: {error.orig}; it needs a user who may"
+            " create tables in it, and no other program's tables of the same names"
+        ) from error
+    finally:
+        database.close()
+
+
+def check_revision(database: Database) -> None:
+    """Raise StoreUnavailable unless the database answers and has the newest revision."""
+    with database.transaction(write=False) as connection:
+        revision = _revision(connection, database.name)
+    if revision != head():
+        raise StoreUnavailable(
+            f"database {database.name} has schema revision {revision or 'none'}, this gaitswarm"
+            f" needs {head()}; restart it to migrate the database"
+        )
+
+
+def head() -> str:
+    """The newest revision that this program knows."""
+    revision = _scripts().get_current_head()
+    if revision is None:
+        raise StoreUnavailable(f"gaitswarm is not wholly installed: no migrations in {_MIGRATIONS}")
+    return revision
+
+
+def lock_for_migration(connection: Connection) -> None:
+    """One migrating process at a time; on SQLite the write transaction is lock enough."""
+    if connection.dialect.name == "postgresql":
+        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_ADVISORY_LOCK})")
+
+
+def _scripts() -> ScriptDirectory:
+    return ScriptDirectory(_MIGRATIONS)
+
+
+def _revision(connection: Connection, name: str) -> str | None:
+    """Revision of the database, None if it has none; StoreUnavailable for an unknown one."""
+    revision = MigrationContext.configure(connection).get_current_revision()
+    known = {script.revision for script in _scripts().walk_revisions()}
+    if revision is not None and revision not in known:
+        raise StoreUnavailable(
+            f"database {name} has schema revision {revision}, which this gaitswarm (up to"
+            f" {head()}) does not know; upgrade gaitswarm, or name another database"
+        )
+    return revision
+
+
+def _upgrade(connection: Connection, name: str) -> None:
+    config = Config()
+    # A percent sign in a path would be read as the configuration's interpolation.
+    config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
+    config.attributes["connection"] = connection
+    with _one_at_a_time:
+        command.upgrade(config, "head")
+    if connection.dialect.name == "sqlite":
+        broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
+        if broken is not None:
+            raise StoreUnavailable(f"database {name} has rows that refer to nothing: {broken}")

@@ -1,0 +1,179 @@
+"""Rows of the tables to objects of the domain, and back. Floats keep every bit.
+
+JSON has neither NaN nor infinity: an objective that does not exist is null, and a fitness of
++inf is NULL.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.job import (
+    Ask,
+    CompletedIteration,
+    Evaluation,
+    Iteration,
+    Job,
+    JobState,
+    Progress,
+)
+from services.optimizer.job_spec import JobSpec
+from sim.outcome import N_OBJECTIVES, Status
+
+Row = Mapping[Any, Any]
+"""Columns of one row by name, as selected or as they are about to be."""
+
+
+def to_job(row: Row) -> Job:
+    """A row of `jobs`. Raises StoreUnavailable for a spec that this version cannot read."""
+    try:
+        spec = JobSpec.model_validate(row["spec"])
+    except ValidationError as error:
+        raise StoreUnavailable(
+            f"job {row['id']} was stored with a spec that this version cannot read: {error}"
+        ) from error
+    return Job(
+        id=row["id"],
+        spec=spec,
+        state=JobState(row["state"]),
+        created_at=row["created_at"],
+        updated_at=row["updated_at"],
+        started_at=row["started_at"],
+        finished_at=row["finished_at"],
+        error=row["error"],
+        progress=Progress(
+            iterations=row["iterations"],
+            evaluations=row["evaluations"],
+            best_fitness=row["best_fitness"],
+            best_iteration=row["best_iteration"],
+            best_particle=row["best_particle"],
+            compute_seconds=row["compute_seconds"],
+        ),
+    )
+
+
+def spec_document(spec: JobSpec) -> dict[str, Any]:
+    """The JSON document of a spec; it carries its schema version."""
+    return spec.model_dump(mode="json")
+
+
+def to_iteration(row: Row) -> Iteration:
+    """A committed row of `iterations`."""
+    return Iteration(
+        index=row["iteration"],
+        best=row["best"],
+        mean=row["mean"],
+        median=row["median"],
+        worst=row["worst"],
+        best_so_far=row["best_so_far"],
+        failed=row["failed"],
+        evaluate_seconds=row["evaluate_seconds"],
+        committed_at=row["committed_at"],
+    )
+
+
+def iteration_summary(fitness: NDArray[np.float64], best_before: float | None) -> dict[str, Any]:
+    """Columns of a committed iteration: statistics over the finite values of fitness (n,)."""
+    finite = fitness[np.isfinite(fitness)]
+    summary: dict[str, Any] = {
+        "failed": len(fitness) - len(finite),
+        "best": None,
+        "mean": None,
+        "median": None,
+        "worst": None,
+        "best_so_far": best_before,
+    }
+    if len(finite):
+        # Huge values may overflow in the sum; such a mean is as good as none.
+        with np.errstate(over="ignore"):
+            mean, median = _number(np.mean(finite)), _number(np.median(finite))
+        best = float(np.min(finite))
+        so_far = best if best_before is None else min(best, best_before)
+        summary |= {
+            "best": best,
+            "mean": mean,
+            "median": median,
+            "worst": float(np.max(finite)),
+            "best_so_far": so_far,
+        }
+    return summary
+
+
+def best_particle(fitness: NDArray[np.float64]) -> int | None:
+    """Index of the least finite fitness, the earliest of equals; None if there is none."""
+    finite = np.isfinite(fitness)
+    return int(np.argmin(np.where(finite, fitness, np.inf))) if finite.any() else None
+
+
+def to_evaluation(row: Row) -> Evaluation:
+    """A row of `evaluations`."""
+    objectives = np.array(row["objectives"], dtype=np.float64).reshape(-1, N_OBJECTIVES)
+    return Evaluation(
+        iteration=row["iteration"],
+        particle=row["particle"],
+        design=np.array(row["design"], dtype=np.float64),
+        objectives=objectives,
+        statuses=np.array([Status.from_label(s) for s in row["statuses"]], dtype=np.uint8),
+        fitness=math.inf if row["fitness"] is None else row["fitness"],
+    )
+
+
+def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any]]:
+    """One row of `evaluations` per particle."""
+    # (K, n, 6) and (K, n), by scenario, are turned to one (K, 6) and (K,) per particle.
+    objectives = np.stack([outcome.objectives for outcome in done.outcomes], axis=1)
+    statuses = np.stack([outcome.statuses for outcome in done.outcomes], axis=1)
+    return [
+        {
+            "job_id": job_id,
+            "iteration": done.iteration,
+            "particle": particle,
+            "design": design,
+            "objectives": [_numbers(scenario) for scenario in by_scenario],
+            "statuses": [Status(status).label for status in labels],
+            "fitness": _number(fitness),
+        }
+        for particle, (design, by_scenario, labels, fitness) in enumerate(
+            zip(
+                done.designs.tolist(),
+                objectives.tolist(),
+                statuses.tolist(),
+                done.fitness.tolist(),
+                strict=True,
+            )
+        )
+    ]
+
+
+def to_ask(row: Row) -> Ask:
+    """A row of `iterations` as it was asked."""
+    return Ask(
+        iteration=row["iteration"],
+        positions=np.array(row["positions"], dtype=np.float64),
+        state=row["optimizer_state"],
+    )
+
+
+def ask_columns(ask: Ask) -> dict[str, Any]:
+    """Columns of an iteration that is about to be evaluated."""
+    return {
+        "iteration": ask.iteration,
+        "positions": ask.positions.tolist(),
+        "optimizer_state": ask.state,
+    }
+
+
+def _number(value: float | np.floating[Any]) -> float | None:
+    """A float, or None for what JSON and SQL cannot hold."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _numbers(values: Sequence[float]) -> list[float | None]:
+    return [_number(value) for value in values]

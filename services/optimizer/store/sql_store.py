@@ -1,0 +1,286 @@
+"""The memory in SQL: SQLite for one machine, PostgreSQL for many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from typing import Final
+
+from sqlalchemy import select, tuple_
+from sqlalchemy.exc import IntegrityError
+
+from services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
+from services.optimizer.job import (
+    Ask,
+    Claim,
+    Command,
+    CompletedIteration,
+    Evaluation,
+    Iteration,
+    Job,
+    JobState,
+    commanded,
+)
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.store.base import Page
+from services.optimizer.store.cursors import from_cursor, to_cursor
+from services.optimizer.store.engine import Database, connect, parse_url
+from services.optimizer.store.leases import claimable, held, lease_is_live
+from services.optimizer.store.migrate import check_revision, migrate
+from services.optimizer.store.records import (
+    complete_iteration,
+    insert_ask,
+    insert_job,
+    job_of_key,
+    job_row,
+    outstanding_ask,
+    update_job,
+)
+from services.optimizer.store.rows import to_evaluation, to_iteration, to_job
+from services.optimizer.store.tables import evaluations, iterations, jobs
+from services.optimizer.store.transitions import (
+    entering,
+    progress_after,
+    state_after_commit,
+    state_after_release,
+)
+
+_LARGEST_INDEX: Final = 2**31 - 1
+_LARGEST_PAGE: Final = 10_000
+_LONGEST_KEY: Final = 200
+
+
+def open_store(url: str, *, clock: Callable[[], datetime] | None = None) -> SqlStore:
+    """Open a database, creating an SQLite file, and migrate it to the newest schema.
+
+    url: `sqlite:///path`, a bare path, or `postgresql://user:password@host/database`.
+    clock: aware current time; the system's by default.
+    Raises StoreUnavailable that names the database and says what to do.
+    """
+    parsed = parse_url(url)
+    migrate(parsed)
+    return SqlStore(connect(parsed), clock=clock or _system_clock)
+
+
+class SqlStore:
+    """`Store` on a database that has the newest schema. See `open_store`."""
+
+    def __init__(self, database: Database, *, clock: Callable[[], datetime]) -> None:
+        self._database = database
+        self._clock = clock
+
+    # jobs, as their users see them
+
+    def create_job(self, spec: JobSpec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
+        """See `Store.create_job`. Raises InvalidRequest for a key that is empty or too long."""
+        resolved = spec.resolved()
+        _check_key(idempotency_key)
+        try:
+            with self._database.transaction(write=True) as connection:
+                earlier = job_of_key(connection, idempotency_key)
+                if earlier is None:
+                    return insert_job(connection, resolved, idempotency_key, self._clock()), True
+        except IntegrityError:
+            # Another process has inserted the same key between our look and our insertion.
+            with self._database.transaction(write=False) as connection:
+                earlier = job_of_key(connection, idempotency_key)
+            if earlier is None:
+                raise
+        if earlier.spec != resolved:
+            raise IdempotencyConflict(
+                f"idempotency key {idempotency_key!r} was used before, for the different job"
+                f" {earlier.id}; use a new key for a new job"
+            )
+        return earlier, False
+
+    def job(self, job_id: str) -> Job:
+        """See `Store.job`."""
+        with self._database.transaction(write=False) as connection:
+            return to_job(job_row(connection, job_id))
+
+    def jobs(
+        self, *, state: JobState | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[Job]:
+        """See `Store.jobs`."""
+        limit = _checked_limit(limit)
+        query = select(jobs).order_by(jobs.c.created_at.desc(), jobs.c.id.desc()).limit(limit + 1)
+        if state is not None:
+            query = query.where(jobs.c.state == state)
+        if after is not None:
+            created_at, job_id = from_cursor(after)
+            types = (jobs.c.created_at.type, jobs.c.id.type)
+            place = tuple_(created_at, job_id, types=types)
+            query = query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
+        with self._database.transaction(write=False) as connection:
+            rows = connection.execute(query).mappings().all()
+        found = tuple(to_job(row) for row in rows[:limit])
+        more = len(rows) > limit
+        return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
+
+    def command(self, job_id: str, command: Command) -> Job:
+        """See `Store.command`."""
+        with self._database.transaction(write=True) as connection:
+            now = self._clock()
+            row = job_row(connection, job_id, lock=True)
+            state = commanded(JobState(row["state"]), command)
+            if state is JobState.PAUSING and not lease_is_live(row, now):
+                # Its runner has gone, so nobody would ever complete the pause.
+                state = JobState.PAUSED
+            changes = entering(state, now)
+            if command is Command.RESUME:
+                changes["error"] = None
+            return to_job(update_job(connection, row, changes))
+
+    # the runner's side
+
+    def claim(
+        self, runner: str, *, lease_seconds: float, job_id: str | None = None
+    ) -> Claim | None:
+        """See `Store.claim`."""
+        with self._database.transaction(write=True) as connection:
+            now = self._clock()
+            if job_id is not None:
+                job_row(connection, job_id)
+            query = claimable(now, job_id)
+            while (row := connection.execute(query).mappings().first()) is not None:
+                if row["state"] == JobState.PAUSING:
+                    update_job(connection, row, entering(JobState.PAUSED, now))
+                    continue
+                token = row["lease_token"] + 1
+                changes = entering(JobState.RUNNING, now) | {
+                    "started_at": row["started_at"] or now,
+                    "lease_owner": runner,
+                    "lease_token": token,
+                    "lease_expires_at": now + timedelta(seconds=lease_seconds),
+                }
+                job = to_job(update_job(connection, row, changes))
+                return Claim(job, runner, token, outstanding_ask(connection, row))
+        return None
+
+    def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
+        """See `Store.renew`."""
+        with self._database.transaction(write=True) as connection:
+            row = held(connection, claim)
+            expires = self._clock() + timedelta(seconds=lease_seconds)
+            update_job(connection, row, {"lease_expires_at": expires})
+            return JobState(row["state"])
+
+    def begin(self, claim: Claim, ask: Ask) -> None:
+        """See `Store.begin`."""
+        with self._database.transaction(write=True) as connection:
+            row = held(connection, claim)
+            if outstanding_ask(connection, row) is None:
+                insert_ask(connection, row, ask, expected=row["iterations"], now=self._clock())
+
+    def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
+        """See `Store.commit`."""
+        with self._database.transaction(write=True) as connection:
+            now = self._clock()
+            row = held(connection, claim)
+            if done.iteration < row["iterations"]:
+                return JobState(row["state"])
+            complete_iteration(connection, row, done, now)
+            if following is not None:
+                insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
+            state = state_after_commit(JobState(row["state"]), following)
+            update_job(connection, row, entering(state, now) | progress_after(row, done))
+            return state
+
+    def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
+        """See `Store.release`."""
+        if state not in (JobState.FAILED, JobState.PAUSED, JobState.QUEUED):
+            raise ValueError(f"a runner cannot release a job as {state}")
+        with self._database.transaction(write=True) as connection:
+            row = held(connection, claim)
+            after = state_after_release(JobState(row["state"]), state)
+            # PostgreSQL cannot hold a zero byte, wherever an error's text has got it from.
+            text = error.replace("\0", "") if error is not None else row["error"]
+            update_job(connection, row, entering(after, self._clock()) | {"error": text})
+
+    # history
+
+    def iterations(
+        self, job_id: str, *, after: int | None = None, limit: int = 100
+    ) -> Page[Iteration]:
+        """See `Store.iterations`."""
+        limit = _checked_limit(limit)
+        query = (
+            select(iterations)
+            .where(iterations.c.job_id == job_id, iterations.c.committed_at.is_not(None))
+            .order_by(iterations.c.iteration)
+            .limit(limit + 1)
+        )
+        if after is not None:
+            query = query.where(iterations.c.iteration > _bounded(after))
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            rows = connection.execute(query).mappings().all()
+        found = tuple(to_iteration(row) for row in rows[:limit])
+        return Page(found, str(found[-1].index) if len(rows) > limit else None)
+
+    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
+        """See `Store.evaluations`."""
+        found = self.evaluations_between(job_id, iteration, iteration + 1)
+        if not found:
+            raise NotFound(f"job {job_id} has no committed iteration {iteration}")
+        return found
+
+    def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
+        """See `Store.evaluations_between`."""
+        query = (
+            select(evaluations)
+            .where(
+                evaluations.c.job_id == job_id,
+                evaluations.c.iteration >= _bounded(first),
+                evaluations.c.iteration < _bounded(last),
+            )
+            .order_by(evaluations.c.iteration, evaluations.c.particle)
+        )
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            rows = connection.execute(query).mappings().all()
+        return tuple(to_evaluation(row) for row in rows)
+
+    def best(self, job_id: str) -> Evaluation | None:
+        """See `Store.best`."""
+        with self._database.transaction(write=False) as connection:
+            job = job_row(connection, job_id)
+            if job["best_iteration"] is None:
+                return None
+            query = select(evaluations).where(
+                evaluations.c.job_id == job_id,
+                evaluations.c.iteration == job["best_iteration"],
+                evaluations.c.particle == job["best_particle"],
+            )
+            return to_evaluation(connection.execute(query).mappings().one())
+
+    def ping(self) -> None:
+        """See `Store.ping`."""
+        check_revision(self._database)
+
+    def close(self) -> None:
+        """See `Store.close`."""
+        self._database.close()
+
+
+def _system_clock() -> datetime:
+    return datetime.now(UTC)
+
+
+def _checked_limit(limit: int) -> int:
+    if limit < 1:
+        raise InvalidRequest("a page holds at least one item", field="limit")
+    return min(limit, _LARGEST_PAGE)
+
+
+def _bounded(index: int) -> int:
+    """An index that both databases can compare; no iteration lies beyond."""
+    return max(-1, min(index, _LARGEST_INDEX))
+
+
+def _check_key(key: str | None) -> None:
+    if key is not None and not (0 < len(key) <= _LONGEST_KEY and key.isprintable()):
+        raise InvalidRequest(
+            f"an idempotency key has 1 to {_LONGEST_KEY} printable characters",
+            field="idempotency_key",
+        )

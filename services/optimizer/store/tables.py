@@ -1,0 +1,131 @@
+"""Tables of the store, the same on SQLite and PostgreSQL.
+
+What is queried has a column; the rest is JSON. JSON documents that may outlive this code carry
+their own schema version (`JobSpec.schema_version`, the optimizer's state); plain arrays belong
+to the schema revision of the database.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Final
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    Column,
+    DateTime,
+    Dialect,
+    Double,
+    ForeignKeyConstraint,
+    Index,
+    Integer,
+    MetaData,
+    PrimaryKeyConstraint,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+from sqlalchemy.types import TypeDecorator
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """An aware time, UTC on the way out; SQLite, which knows no zones, holds it as naive UTC."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """An aware time to what the database holds; ValueError for a naive one."""
+        if value is None:
+            return None
+        if value.tzinfo is None:
+            raise ValueError(f"a stored time needs its time zone, {value} has none")
+        value = value.astimezone(UTC)
+        return value.replace(tzinfo=None) if dialect.name == "sqlite" else value
+
+    def process_result_value(
+        self,
+        value: datetime | None,
+        dialect: Dialect,  # noqa: ARG002 (the signature is SQLAlchemy's)
+    ) -> datetime | None:
+        """What the database holds to an aware time in UTC."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+metadata: Final = MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "fk": "fk_%(table_name)s_%(referred_table_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+jobs: Final = Table(
+    "jobs",
+    metadata,
+    Column("id", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("spec", JSON, nullable=False),
+    Column("idempotency_key", Text),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("updated_at", UtcDateTime, nullable=False),
+    Column("started_at", UtcDateTime),
+    Column("finished_at", UtcDateTime),
+    Column("error", Text),
+    # The token only ever grows; the owner is NULL whenever nobody holds the job.
+    Column("lease_owner", Text),
+    Column("lease_token", BigInteger, nullable=False),
+    Column("lease_expires_at", UtcDateTime),
+    # Committed iterations, which is also the index of the outstanding one.
+    Column("iterations", Integer, nullable=False),
+    Column("evaluations", BigInteger, nullable=False),
+    Column("best_fitness", Double),
+    Column("best_iteration", Integer),
+    Column("best_particle", Integer),
+    Column("compute_seconds", Double, nullable=False),
+    PrimaryKeyConstraint("id"),
+    UniqueConstraint("idempotency_key"),
+    Index(None, "created_at", "id"),
+    Index(None, "state", "created_at", "id"),
+)
+
+iterations: Final = Table(
+    "iterations",
+    metadata,
+    Column("job_id", Text, nullable=False),
+    Column("iteration", Integer, nullable=False),
+    # The ask, stored before it is sent out: (particles, d) positions and the optimizer's dump.
+    Column("positions", JSON, nullable=False),
+    Column("optimizer_state", JSON, nullable=False),
+    Column("asked_at", UtcDateTime, nullable=False),
+    # NULL from here on until the iteration is committed; then only fitness values may be NULL.
+    Column("committed_at", UtcDateTime),
+    Column("best", Double),
+    Column("mean", Double),
+    Column("median", Double),
+    Column("worst", Double),
+    Column("best_so_far", Double),
+    Column("failed", Integer),
+    Column("evaluate_seconds", Double),
+    PrimaryKeyConstraint("job_id", "iteration"),
+    ForeignKeyConstraint(["job_id"], ["jobs.id"]),
+)
+
+evaluations: Final = Table(
+    "evaluations",
+    metadata,
+    Column("job_id", Text, nullable=False),
+    Column("iteration", Integer, nullable=False),
+    Column("particle", Integer, nullable=False),
+    # (v,) numbers; [K][6] numbers, null for none; (K,) labels; NULL fitness for +inf.
+    Column("design", JSON, nullable=False),
+    Column("objectives", JSON, nullable=False),
+    Column("statuses", JSON, nullable=False),
+    Column("fitness", Double),
+    PrimaryKeyConstraint("job_id", "iteration", "particle"),
+    ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
+)

@@ -1,0 +1,62 @@
+"""Walks in threads of this process: the compiled kernel lets other threads run meanwhile."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+
+from services.optimizer.evaluator import EvaluationRequest
+from services.worker.dispatch import Dispatcher
+from sim import simulate
+from sim.outcome import Outcome
+
+
+def available_cpus() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class InProcessEvaluator:
+    """`Evaluator` on a pool of threads. cpus: their number, all processors by default."""
+
+    def __init__(self, cpus: int | None = None) -> None:
+        slots = cpus if cpus is not None else available_cpus()
+        if slots < 1:
+            raise ValueError(f"cpus must be at least 1, it is {slots}")
+        self._dispatcher = Dispatcher(slots, simulate.lanes)
+        self._threads = [
+            threading.Thread(target=self._work, name=f"walks-{k}", daemon=True)
+            for k in range(slots)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def slots(self) -> int:
+        """See `Evaluator.slots`."""
+        return self._dispatcher.slots
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        """See `Evaluator.evaluate`."""
+        return self._dispatcher.evaluate(request, should_stop)
+
+    def close(self) -> None:
+        """See `Evaluator.close`. Waits for the chunks that are being run."""
+        self._dispatcher.close("the evaluator was closed")
+        for thread in self._threads:
+            thread.join()
+
+    def _work(self) -> None:
+        while not self._dispatcher.closed:
+            work = self._dispatcher.take(timeout=1.0)
+            if work is None:
+                continue
+            try:
+                outcome = work.task.run()
+            except Exception as error:  # noqa: BLE001 - it is the caller's, in another thread
+                self._dispatcher.fail(work, error)
+            else:
+                self._dispatcher.complete(work, outcome)

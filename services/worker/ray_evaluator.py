@@ -1,0 +1,206 @@
+"""Walks as tasks of Ray, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, Final
+
+from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.evaluator import EvaluationRequest
+from services.worker.dispatch import Dispatcher, Work
+from services.worker.ray_session import RaySession, open_ray
+from services.worker.task import Failure, run_in_worker, warm_up
+from sim import simulate
+from sim.outcome import Outcome
+
+_LOOK_AHEAD: Final = 2
+"""Tasks with Ray per slot: one that runs, and one that is at hand when it ends."""
+
+_ATTEMPTS: Final = 4
+"""How often a task is sent out whose worker died."""
+
+_GLANCE: Final = 0.02
+"""Seconds between looks for new work, while there is room for it."""
+
+_IDLE: Final = 0.5
+"""Seconds between looks at whether it is time to end."""
+
+_PULSE: Final = 4.0
+"""Seconds between looks at whether the cluster's head is alive; three misses count as lost."""
+
+_log = logging.getLogger(__name__)
+
+
+class RayEvaluator:
+    """`Evaluator` on Ray. address, cpus: as for `open_ray`.
+
+    A cluster that was lost is opened again by the next `evaluate`, so that a caller who tries
+    again later, as the runner does, outlives it.
+    """
+
+    def __init__(self, address: str | None = None, *, cpus: int | None = None) -> None:
+        self._address = address
+        self._cpus = cpus
+        self._reopening = threading.Lock()
+        self._closed = False
+        self._link = _Link(address, cpus)
+        try:
+            # Compiling and starting processes take seconds each, and can be done side by side.
+            simulate.prepare()
+            self._slots = self._link.dispatcher().slots
+        except BaseException:
+            self._link.close()
+            raise
+
+    @property
+    def slots(self) -> int:
+        """See `Evaluator.slots`."""
+        return self._slots
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        """See `Evaluator.evaluate`."""
+        # Built here, the kernel lies in the cache when this machine's workers look for it.
+        simulate.prepare(request.robot)
+        return self._living_dispatcher().evaluate(request, should_stop)
+
+    def close(self) -> None:
+        """See `Evaluator.close`. Ends an embedded cluster."""
+        with self._reopening:
+            self._closed = True
+            self._link.close()
+
+    def _living_dispatcher(self) -> Dispatcher:
+        with self._reopening:
+            if self._closed:
+                raise EvaluatorUnavailable("the evaluator was closed")
+            if not self._link.alive:
+                self._link.close()
+                self._link = _Link(self._address, self._cpus)
+                self._slots = self._link.dispatcher().slots
+            return self._link.dispatcher()
+
+
+class _Link:
+    """One connection to Ray, from opening to loss or closing.
+
+    An embedded cluster dies with the thread that started it, so one thread does it all.
+    """
+
+    def __init__(self, address: str | None, cpus: int | None) -> None:
+        self._opened: Future[Dispatcher] = Future()
+        self._thread = threading.Thread(
+            target=self._live, args=(address, cpus), name="ray-link", daemon=True
+        )
+        self._thread.start()
+
+    def dispatcher(self) -> Dispatcher:
+        """Takes the requests, once it is open. Raises what kept it from being opened."""
+        return self._opened.result()
+
+    @property
+    def alive(self) -> bool:
+        """False once it was lost, closed, or could not be opened."""
+        return self._opened.exception() is None and not self._opened.result().closed
+
+    def close(self) -> None:
+        """Disconnect, and wait until that is done. Idempotent."""
+        if self._opened.exception() is None:
+            self._opened.result().close("the evaluator was closed")
+        self._thread.join()
+
+    def _live(self, address: str | None, cpus: int | None) -> None:
+        try:
+            session = open_ray(address, cpus=cpus)
+        except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
+            self._opened.set_exception(error)
+            return
+        dispatcher = Dispatcher(session.slots, simulate.lanes)
+        self._opened.set_result(dispatcher)
+        try:
+            _Pump(session, dispatcher).run()
+        except Exception as error:  # noqa: BLE001 - whatever Ray raises when it is going down
+            _log.warning("Ray was lost: %s", error)
+            dispatcher.close(f"Ray was lost: {error}")
+        finally:
+            session.close()
+
+
+class _Pump:
+    """Keeps Ray supplied with tasks, and collects what comes back."""
+
+    def __init__(self, session: RaySession, dispatcher: Dispatcher) -> None:
+        self._ray = session.ray
+        self._dispatcher = dispatcher
+        # Ray's own retries would run a task again behind our accounts.
+        options = {"num_cpus": 1, "max_retries": 0}
+        self._walk = session.ray.remote(**options)(run_in_worker)
+        self._warm_up = session.ray.remote(**options)(warm_up)
+        self._most = session.slots * _LOOK_AHEAD
+        self._flying: dict[Any, Work] = {}
+        self._session = session
+        self._misses = 0
+        self._next_pulse = time.monotonic() + _PULSE
+
+    def run(self) -> None:
+        """Until the dispatcher is closed. Raises whatever Ray raises when it is lost."""
+        # Processes start and import while the caller still does other things.
+        starting = [self._warm_up.remote() for _ in range(self._dispatcher.slots)]
+        while not self._dispatcher.closed:
+            self._send()
+            self._collect()
+            self._feel_pulse()
+        del starting
+
+    def _send(self) -> None:
+        while len(self._flying) < self._most:
+            work = self._dispatcher.take(timeout=0.0 if self._flying else _IDLE)
+            if work is None:
+                return
+            self._flying[self._walk.remote(work.task)] = work
+
+    def _collect(self) -> None:
+        if not self._flying:
+            return
+        patience = _GLANCE if len(self._flying) < self._most else _IDLE
+        done, _ = self._ray.wait(list(self._flying), num_returns=1, timeout=patience)
+        for reference in done:
+            self._settle(reference, self._flying.pop(reference))
+
+    def _feel_pulse(self) -> None:
+        if time.monotonic() < self._next_pulse:
+            return
+        self._next_pulse = time.monotonic() + _PULSE
+        self._misses = 0 if self._session.head_answers() else self._misses + 1
+        if self._misses >= 3:
+            raise EvaluatorUnavailable("the head of the cluster does not answer")
+
+    def _settle(self, reference: Any, work: Work) -> None:
+        exceptions = self._ray.exceptions
+        try:
+            result = self._ray.get(reference)
+        except exceptions.RayTaskError as error:
+            self._dispatcher.fail(work, RuntimeError(f"a worker cannot run walks: {error}"))
+        except (exceptions.WorkerCrashedError, exceptions.OutOfMemoryError) as error:
+            self._send_again(work, error)
+        except exceptions.NodeDiedError as error:
+            self._send_again(work, error)
+        else:
+            if isinstance(result, Failure):
+                self._dispatcher.fail(work, result.error)
+            else:
+                self._dispatcher.complete(work, result)
+
+    def _send_again(self, work: Work, error: Exception) -> None:
+        if work.attempts + 1 < _ATTEMPTS:
+            self._dispatcher.again(work)
+            return
+        self._dispatcher.fail(
+            work,
+            EvaluatorUnavailable(f"workers died {_ATTEMPTS} times at the same walks: {error}"),
+        )

@@ -1,0 +1,222 @@
+"""Ray, started inside this process's lifetime or found by its address; quiet in both cases."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import socket
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+from services.optimizer.errors import EvaluatorUnavailable
+from services.worker.in_process import available_cpus
+
+_OBJECT_STORE_BYTES: Final = 80 * 1024 * 1024
+"""Ray's minimum is 75 MiB; designs and results take kilobytes."""
+
+_PREFIX: Final = "gaitswarm-ray-"
+
+_BEFORE_IMPORT: Final = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    # Ray must not package the checkout and install it anew when we run under `uv run`.
+    "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
+    # The behaviour that later versions have in any case; without it, init warns.
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+}
+
+_WORKER_ENVIRONMENT: Final = {
+    # The slots are the parallelism.
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    # Each worker asks for its metrics agent otherwise, and there is none.
+    "RAY_enable_metrics_collection": "0",
+}
+
+
+@dataclass(slots=True)
+class RaySession:
+    """A connection to Ray.
+
+    ray: the module, imported by `open_ray`. slots: CPUs of the cluster. head: where its control
+    service listens, None where a proxy stands between. directory: files of an embedded cluster.
+    """
+
+    ray: ModuleType
+    slots: int
+    head: tuple[str, int] | None
+    directory: Path | None = None
+
+    def head_answers(self) -> bool:
+        """Whether the control service takes connections.
+
+        Ray itself waits a minute for it and then ends the process, without a word to us.
+        """
+        return self.head is None or _listens(*self.head)
+
+    def close(self) -> None:
+        """Disconnect; an embedded cluster ends, and its files are removed. Idempotent."""
+        with suppress(Exception):
+            self.ray.shutdown()
+        if self.directory is not None:
+            shutil.rmtree(self.directory, ignore_errors=True)
+
+
+def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySession:
+    """Start an embedded cluster, or connect to the one at an address.
+
+    address: None to embed; `auto`, `host:port` or `ray://host:port` to connect.
+    cpus: slots of an embedded cluster; all of this machine's by default.
+
+    An embedded cluster dies with the thread that opened it, so that must be one that stays.
+    Raises EvaluatorUnavailable with what to do.
+    """
+    for name, value in _BEFORE_IMPORT.items():
+        os.environ.setdefault(name, value)
+    if address and (os.environ.get("RAY_AUTH_TOKEN") or os.environ.get("RAY_AUTH_TOKEN_PATH")):
+        # A token is not shown to a cluster unless it is asked for.
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
+    with _quiet():
+        import ray  # noqa: PLC0415 - its environment had to be set first
+
+        if ray.is_initialized():
+            raise EvaluatorUnavailable("this process has a connection to Ray already")
+        return _connect(ray, address) if address else _embed(ray, cpus or available_cpus())
+
+
+def _connect(ray: ModuleType, address: str) -> RaySession:
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if port.isdecimal() and not _listens(host.strip("[]"), int(port)):
+        # Ray would try for minutes, and so long nobody could see what is wrong.
+        raise EvaluatorUnavailable(f"no Ray cluster listens at {address!r}; is it up?")
+    try:
+        ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+        slots = int(ray.cluster_resources().get("CPU", 0))
+    except Exception as error:
+        with suppress(Exception):
+            ray.shutdown()
+        raise EvaluatorUnavailable(
+            f"no Ray cluster answers at {address!r}: {_first_line(error)}; check the address, and"
+            " that RAY_AUTH_TOKEN is the cluster's"
+        ) from error
+    return RaySession(ray, max(slots, 1), None if address.startswith("ray://") else _head(ray))
+
+
+def _embed(ray: ModuleType, cpus: int) -> RaySession:
+    _sweep()
+    directory = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=_short_directory()))
+    options: dict[str, Any] = {
+        "address": "local",
+        "num_cpus": cpus,
+        "num_gpus": 0,
+        "include_dashboard": False,
+        "object_store_memory": _OBJECT_STORE_BYTES,
+        "log_to_driver": False,
+        "logging_level": "ERROR",
+        "_temp_dir": str(directory),
+    }
+    try:
+        # Workers inherit the environment that the cluster was started in.
+        with _environment(_WORKER_ENVIRONMENT | _import_path() | _token()):
+            ray.init(**options)
+    except Exception as error:
+        with suppress(Exception):
+            ray.shutdown()
+        shutil.rmtree(directory, ignore_errors=True)
+        raise EvaluatorUnavailable(
+            f"Ray cannot be started on this machine: {_first_line(error)}; use the in-process"
+            " evaluator instead, or a directory for temporary files (TMPDIR) that can be written"
+        ) from error
+    return RaySession(ray, cpus, _head(ray), directory)
+
+
+def _head(ray: ModuleType) -> tuple[str, int]:
+    host, _, port = str(ray.get_runtime_context().gcs_address).rpartition(":")
+    return host.strip("[]"), int(port)
+
+
+def _listens(host: str, port: int) -> bool:
+    try:
+        with socket.create_connection((host, port), timeout=2.0):
+            return True
+    except OSError:
+        return False
+
+
+def _import_path() -> dict[str, str]:
+    """Lets workers find our packages, installed or not."""
+    root = str(Path(__file__).resolve().parents[2])
+    given = os.environ.get("PYTHONPATH", "")
+    return {"PYTHONPATH": os.pathsep.join([root, *filter(None, [given])])}
+
+
+@cache
+def _token() -> dict[str, str]:
+    """A secret of our own, so that none is looked for, or left, in the home directory.
+
+    One for all clusters of this process, because Ray reads it once.
+    """
+    if os.environ.get("RAY_AUTH_TOKEN") or os.environ.get("RAY_AUTH_TOKEN_PATH"):
+        return {}
+    return {"RAY_AUTH_TOKEN": secrets.token_hex(32)}
+
+
+def _short_directory() -> str:
+    """Sockets have paths of 107 bytes at most, and Ray appends some seventy."""
+    chosen = tempfile.gettempdir()
+    usable = len(chosen) <= 16 or not os.access("/tmp", os.W_OK)  # noqa: S108 - mkdtemp follows
+    return chosen if usable else "/tmp"  # noqa: S108
+
+
+def _sweep() -> None:
+    """Remove what processes left that were killed before they could."""
+    for directory in Path(_short_directory()).glob(f"{_PREFIX}*-*"):
+        pid = directory.name.removeprefix(_PREFIX).split("-")[0]
+        if pid.isdecimal() and not _alive(int(pid)):
+            shutil.rmtree(directory, ignore_errors=True)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+@contextmanager
+def _environment(values: Mapping[str, str]) -> Iterator[None]:
+    """Set variables for the processes started inside, and put back what was there."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Ray's import and start warn of things that are not its user's to change."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _first_line(error: BaseException) -> str:
+    text = str(error).strip() or type(error).__name__
+    return text.splitlines()[0]

@@ -1,0 +1,175 @@
+"""A real server on a free loopback port, with the real store on a file of its own."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, cast
+
+import httpx2
+import numpy as np
+import pytest
+
+from api.app import create_app
+from api.server import ApiServer
+from api.settings import ApiSettings
+from services.optimizer.job import Ask, Claim, CompletedIteration, Job
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.optimizers.pso import PsoSettings
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore, open_store
+from sim.outcome import N_OBJECTIVES, Outcome, Status
+
+PARTICLES = 4
+
+Serve = Callable[..., "Server"]
+Commit = Callable[..., Claim]
+
+
+@pytest.fixture(scope="session")
+def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A migrated database to copy: migrating one per test would take most of their time."""
+    path = tmp_path_factory.mktemp("api") / "empty.db"
+    store = open_store(str(path))
+    store.close()
+    return path
+
+
+@pytest.fixture
+def database(empty_database: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "jobs.db"
+    shutil.copy(empty_database, path)
+    return path
+
+
+@pytest.fixture
+def store(database: Path) -> Iterator[SqlStore]:
+    store = open_store(str(database))
+    yield store
+    store.close()
+
+
+@pytest.fixture
+def service(store: SqlStore) -> JobService:
+    return JobService(store)
+
+
+class Server:
+    """A server in a thread, on a free port, and a client of it."""
+
+    def __init__(self, service: JobService | None, **settings: Any) -> None:
+        values = {"event_poll_seconds": 0.02, **settings}
+        self.app = create_app(cast(JobService, service), settings=ApiSettings(**values))
+        self._server = ApiServer(self.app, host="127.0.0.1", port=0, log_level="critical")
+        self._thread = threading.Thread(target=self._server.run)
+        self._thread.start()
+        self.client = httpx2.Client(base_url=self._server.url, timeout=20.0)
+
+    def stop(self) -> None:
+        self._server.stop()
+
+    def close(self) -> None:
+        self.stop()
+        self.client.close()
+        self._thread.join(timeout=10.0)
+        assert not self._thread.is_alive()
+
+
+@pytest.fixture
+def serve(service: JobService) -> Iterator[Serve]:
+    """Start a server of one test's own, with other settings or another service than the usual."""
+    with ExitStack() as stack:
+
+        def start(served: JobService = service, **settings: Any) -> Server:
+            server = Server(served, **settings)
+            stack.callback(server.close)
+            return server
+
+        yield start
+
+
+@pytest.fixture(scope="session")
+def make_server() -> Callable[..., Server]:
+    """For servers that outlive a test; whoever makes one closes it."""
+    return Server
+
+
+@pytest.fixture(scope="session")
+def lasting_server() -> Iterator[Server]:
+    """One server for most tests; starting and stopping one takes longer than they do."""
+    server = Server(None)
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def client(lasting_server: Server, service: JobService) -> httpx2.Client:
+    """A client of a server with the usual settings, on this test's own database."""
+    lasting_server.app.state.context.service = service
+    return lasting_server.client
+
+
+@pytest.fixture
+def spec() -> JobSpec:
+    """A small job: two scenarios, four particles, three iterations."""
+    return JobSpec(
+        name="small",
+        scenarios=("normal-fast", "turn-right-fast"),
+        optimizer=PsoSettings(particles=PARTICLES),
+        iterations=3,
+    )
+
+
+@pytest.fixture
+def job(store: SqlStore, spec: JobSpec) -> Job:
+    """A queued job."""
+    return store.create_job(spec)[0]
+
+
+@pytest.fixture
+def commit(store: SqlStore) -> Commit:
+    """Commit iterations of a job as a runner does, with made-up results."""
+
+    def run(
+        job: Job, iterations: int, *, claim: Claim | None = None, failed: bool = False
+    ) -> Claim:
+        held = claim or store.claim("test", lease_seconds=60.0, job_id=job.id)
+        assert held is not None
+        done = store.job(job.id).progress.iterations
+        for index in range(done, done + iterations):
+            ask = _ask(job, index)
+            if index == 0:
+                store.begin(held, ask)
+            last = index + 1 == job.spec.iterations
+            following = None if last else _ask(job, index + 1)
+            store.commit(held, _completed(job, index, failed=failed), following)
+        return held
+
+    return run
+
+
+def _ask(job: Job, index: int) -> Ask:
+    space = job.spec.design_space()
+    share = np.random.default_rng(index).random((PARTICLES, len(space.low)))
+    return Ask(index, space.low + share * (space.high - space.low), {"iteration": index})
+
+
+def _completed(job: Job, index: int, *, failed: bool) -> CompletedIteration:
+    """The first particle falls in the second scenario; the others are the better, the later."""
+    objectives = np.full((PARTICLES, N_OBJECTIVES), 10.0) + np.arange(PARTICLES)[:, None]
+    statuses = np.full(PARTICLES, Status.FELL if failed else Status.OK, dtype=np.uint8)
+    second = statuses.copy()
+    second[0] = Status.FELL
+    undefined = objectives.copy()
+    undefined[0] = np.nan
+    fitness = np.where(second == Status.OK, 100.0 - index + np.arange(PARTICLES), np.inf)
+    return CompletedIteration(
+        iteration=index,
+        designs=job.spec.design_space().designs(_ask(job, index).positions),
+        outcomes=(Outcome(objectives, statuses), Outcome(undefined, second)),
+        fitness=fitness,
+        evaluate_seconds=0.5,
+    )

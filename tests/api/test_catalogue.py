@@ -1,0 +1,57 @@
+"""What there is to choose from, over HTTP."""
+
+from __future__ import annotations
+
+import httpx2
+
+from services.optimizer.preference import PREFERENCES
+from sim.controllers import CONTROLLERS
+from sim.scenario import GAIT_VARIABLES, SCENARIOS
+
+
+def items(client: httpx2.Client, what: str) -> list[dict]:
+    answer = client.get(f"/v1/{what}")
+    assert answer.status_code == 200
+    return answer.json()["items"]
+
+
+def test_scenarios_are_those_of_the_table_with_their_numbers(client: httpx2.Client) -> None:
+    found = items(client, "scenarios")
+
+    assert [item["number"] for item in found] == [1, 2, 3, 4, 5, 6]
+    assert [item["name"] for item in found] == [scenario.name for scenario in SCENARIOS]
+    assert found[2]["load"] == 2.0
+    assert found[0]["simulated_seconds"] == SCENARIOS[0].duration
+
+
+def test_preferences_have_their_biases_and_exponents(client: httpx2.Client) -> None:
+    found = items(client, "preferences")
+
+    assert [item["name"] for item in found] == list(PREFERENCES)
+    assert found[1]["bias"] == [0.4, 0.7, 0.3, 0.4, 1.0]
+    assert found[2]["exponent"] == [1.0] * 5
+
+
+def test_controllers_have_variables_with_bounds_units_and_published_designs(
+    client: httpx2.Client,
+) -> None:
+    found = {item["name"]: item for item in items(client, "controllers")}
+
+    assert set(found) == set(CONTROLLERS)
+    fuzzy = found["fuzzy-pi"]
+    ranges = {v["name"]: (v["low"], v["high"], v["unit"], v["kind"]) for v in fuzzy["variables"]}
+    assert ranges["FI1R"] == (1500.0, 6000.0, "counts", "continuous")
+    assert ranges["FOMF"] == (1.0, 3.0, "1", "integer")
+    assert fuzzy["published"]["A"]["FI1R"] == 5837
+    assert [v["name"] for v in fuzzy["gait_variables"]] == [v.name for v in GAIT_VARIABLES]
+    assert all(item["description"] for item in found.values())
+
+
+def test_a_job_can_name_whatever_the_catalogue_lists(client: httpx2.Client) -> None:
+    spec = {
+        "controller": items(client, "controllers")[0]["name"],
+        "preference": items(client, "preferences")[-1]["name"],
+        "scenarios": [str(item["number"]) for item in items(client, "scenarios")],
+    }
+
+    assert client.post("/v1/jobs", json=spec).status_code == 202

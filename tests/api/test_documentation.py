@@ -1,0 +1,114 @@
+"""/docs teaches the domain: every route and every field is explained."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import pytest
+
+from api.openapi import TAGS
+
+Document = dict[str, Any]
+Operation = tuple[str, Document]
+
+
+@pytest.fixture(scope="module")
+def document(lasting_server) -> Document:
+    return lasting_server.client.get("/openapi.json").json()
+
+
+def operations(document: Document) -> Iterator[Operation]:
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield f"{method} {path}", operation
+
+
+def test_the_routes_are_these(document: Document) -> None:
+    job = "/v1/jobs/{job_id}"
+
+    assert {name for name, _ in operations(document)} == {
+        "post /v1/jobs",
+        "get /v1/jobs",
+        f"get {job}",
+        f"post {job}/pause",
+        f"post {job}/resume",
+        f"post {job}/cancel",
+        f"get {job}/iterations",
+        f"get {job}/iterations/{{iteration}}/evaluations",
+        f"get {job}/best",
+        f"get {job}/events",
+        "post /v1/simulations",
+        "get /v1/scenarios",
+        "get /v1/preferences",
+        "get /v1/controllers",
+        "get /v1/healthz",
+        "get /v1/readyz",
+    }
+
+
+def test_every_route_has_a_summary_a_description_a_tag_and_a_short_id(document: Document) -> None:
+    tags = {tag["name"] for tag in TAGS}
+    ids = [operation["operationId"] for _, operation in operations(document)]
+
+    assert len(set(ids)) == len(ids)
+    for name, operation in operations(document):
+        assert operation["summary"], name
+        assert len(operation["description"]) > 30, name
+        assert set(operation["tags"]) <= tags, name
+        assert operation["operationId"].isidentifier(), name
+
+
+def test_every_parameter_is_described(document: Document) -> None:
+    for name, operation in operations(document):
+        for parameter in operation.get("parameters", []):
+            assert parameter.get("description"), f"{name}: {parameter['name']}"
+
+
+def test_every_schema_and_every_field_is_described(document: Document) -> None:
+    undescribed = []
+    for name, schema in document["components"]["schemas"].items():
+        undescribed += [] if schema.get("description") else [name]
+        for field, value in schema.get("properties", {}).items():
+            described = value.get("description") or "const" in value
+            undescribed += [] if described else [f"{name}.{field}"]
+
+    assert undescribed == []
+
+
+def test_every_error_is_a_problem(document: Document) -> None:
+    for name, operation in operations(document):
+        errors = {s: r for s, r in operation["responses"].items() if s >= "400"}
+        assert {"500", "503"} <= set(errors), name
+        for status, response in errors.items():
+            content = response["content"]
+            assert set(content) == {"application/problem+json"}, f"{name} {status}"
+            reference = content["application/problem+json"]["schema"]["$ref"]
+            assert reference.endswith("/ProblemView"), f"{name} {status}"
+
+
+def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -> None:
+    schemas = document["components"]["schemas"]
+
+    assert "JobSpec" in schemas
+    assert not [name for name in schemas if name.startswith("JobSpec-")]
+    assert schemas["JobView"]["properties"]["spec"]["$ref"].endswith("/JobSpec")
+    assert schemas["JobSpec"]["examples"]
+
+
+def test_the_event_stream_is_declared_as_one(document: Document) -> None:
+    answer = document["paths"]["/v1/jobs/{job_id}/events"]["get"]["responses"]["200"]
+
+    assert "event: iteration" in answer["content"]["text/event-stream"]["example"]
+
+
+def test_the_page_needs_no_other_host(client: httpx2.Client) -> None:
+    page = client.get("/docs")
+
+    assert page.status_code == 200
+    assert "http://" not in page.text
+    assert "https://" not in page.text
+    for asset in ("swagger-ui-bundle.js", "swagger-ui.css"):
+        assert f"/docs-assets/{asset}" in page.text
+        assert client.get(f"/docs-assets/{asset}").status_code == 200

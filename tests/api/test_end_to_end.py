@@ -1,0 +1,82 @@
+"""A whole job over HTTP: real runner, real simulator, real database."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+
+from services.optimizer.runner import Runner
+from services.optimizer.store.sql_store import SqlStore
+from services.worker.in_process import InProcessEvaluator
+
+SPEC = {
+    "name": "end to end",
+    "scenarios": [
+        {"name": "short", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "cycles": 1}
+    ],
+    "optimizer": {"particles": 4},
+    "iterations": 3,
+    "seed": 5,
+}
+
+
+@pytest.fixture
+def runner(store: SqlStore) -> Iterator[Runner]:
+    evaluator = InProcessEvaluator()
+    runner = Runner(store, evaluator, poll_seconds=0.02)
+    runner.start()
+    yield runner
+    runner.stop()
+    evaluator.close()
+
+
+def streamed(client: httpx2.Client, job_id: str) -> list[dict]:
+    """Data of every iteration until the stream ends with the job."""
+    answer = client.get(f"/v1/jobs/{job_id}/events", timeout=60.0)
+    blocks = [
+        block.split("\n") for block in answer.text.split("\n\n") if "event: iteration" in block
+    ]
+    return [json.loads(block[1].removeprefix("data: ")) for block in blocks]
+
+
+@pytest.mark.slow
+def test_a_submitted_job_is_run_to_its_end_and_its_best_can_be_walked_again(
+    client: httpx2.Client, runner: Runner
+) -> None:
+    job_id = client.post("/v1/jobs", json=SPEC).json()["id"]
+
+    iterations = streamed(client, job_id)
+
+    view = client.get(f"/v1/jobs/{job_id}").json()
+    assert view["state"] == "succeeded"
+    assert (view["iterations"], view["evaluations"]) == (3, 12)
+    assert [iteration["index"] for iteration in iterations] == [0, 1, 2]
+    listed = client.get(f"/v1/jobs/{job_id}/iterations").json()["items"]
+    assert iterations == listed
+    best = client.get(f"/v1/jobs/{job_id}/best").json()
+    assert best["fitness"] == view["best_fitness"] == listed[-1]["best_so_far"]
+    again = client.post(
+        "/v1/simulations", json={"design": best["design"], "scenarios": SPEC["scenarios"]}
+    ).json()
+    assert again["fitness"] == best["fitness"]
+    walked = again["scenarios"]["short"]
+    assert walked["objectives"] == best["scenarios"]["short"]["objectives"]
+    particles = client.get(f"/v1/jobs/{job_id}/iterations/2/evaluations").json()["items"]
+    assert len(particles) == 4
+
+
+@pytest.mark.slow
+def test_the_same_spec_gives_the_same_bits(client: httpx2.Client, runner: Runner) -> None:
+    ids = [client.post("/v1/jobs", json=SPEC).json()["id"] for _ in range(2)]
+    for job_id in ids:
+        streamed(client, job_id)
+
+    histories = [
+        [client.get(f"/v1/jobs/{job_id}/iterations/{k}/evaluations").json() for k in range(3)]
+        for job_id in ids
+    ]
+
+    assert histories[0] == histories[1]

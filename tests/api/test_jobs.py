@@ -1,0 +1,199 @@
+"""Jobs over HTTP: submit, list, look at, command."""
+
+from __future__ import annotations
+
+import httpx2
+import pytest
+
+from services.optimizer.job import Job, JobState
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.store.sql_store import SqlStore
+
+SPEC = {"name": "mine", "scenarios": ["normal-fast", "2"], "iterations": 7, "seed": 3}
+
+
+def test_a_submitted_job_is_accepted_and_found_at_its_location(client: httpx2.Client) -> None:
+    answer = client.post("/v1/jobs", json=SPEC)
+
+    assert answer.status_code == 202
+    assert answer.json()["state"] == "queued"
+    found = client.get(answer.headers["Location"])
+    assert found.status_code == 200
+    assert found.json()["id"] == answer.json()["id"]
+    assert found.json()["spec"]["seed"] == 3
+
+
+def test_presets_are_written_out_when_a_job_is_submitted(client: httpx2.Client) -> None:
+    spec = client.post("/v1/jobs", json=SPEC).json()["spec"]
+
+    assert [s["name"] for s in spec["scenarios"]] == ["normal-fast", "normal-slow"]
+    assert spec["scenarios"][1]["cycle_time"] == 2.2
+    assert spec["preference"]["exponent"] == [0.1, 0.7, 0.3, 0.3, 0.1]
+
+
+def test_the_same_key_and_body_make_one_job(client: httpx2.Client, store: SqlStore) -> None:
+    first = client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})
+    again = client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})
+
+    assert (first.status_code, again.status_code) == (202, 200)
+    assert again.json()["id"] == first.json()["id"]
+    assert again.headers["Location"] == first.headers["Location"]
+    assert len(store.jobs().items) == 1
+
+
+def test_the_same_key_with_another_body_is_a_conflict(
+    client: httpx2.Client, store: SqlStore
+) -> None:
+    client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})
+    other = client.post("/v1/jobs", json={**SPEC, "seed": 4}, headers={"Idempotency-Key": "k1"})
+
+    assert other.status_code == 409
+    assert other.json()["type"] == "urn:gaitswarm:problem:idempotency-conflict"
+    assert len(store.jobs().items) == 1
+
+
+def test_progress_rates_and_estimate_follow_from_committed_iterations(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    commit(job, 2)
+
+    view = client.get(f"/v1/jobs/{job.id}").json()
+
+    assert view["state"] == "running"
+    assert (view["iterations"], view["iterations_planned"]) == (2, 3)
+    assert (view["evaluations"], view["evaluations_planned"]) == (8, 12)
+    assert view["compute_seconds"] == 1.0
+    assert view["evaluations_per_second"] == 8.0
+    assert view["simulations_per_second"] == 16.0
+    assert 0.0 <= view["eta_seconds"] <= 0.5
+    assert view["best_fitness"] == view["best"]["fitness"] == 100.0
+
+
+def test_a_job_that_has_not_begun_has_no_estimate_and_no_best(
+    client: httpx2.Client, job: Job
+) -> None:
+    view = client.get(f"/v1/jobs/{job.id}").json()
+
+    assert view["iterations"] == view["evaluations"] == 0
+    assert view["best"] is view["eta_seconds"] is view["evaluations_per_second"] is None
+
+
+def test_a_failed_job_says_why(client: httpx2.Client, store: SqlStore, job: Job) -> None:
+    claim = store.claim("test", lease_seconds=60.0)
+    store.release(claim, JobState.FAILED, error="the robot's legs came off")
+
+    view = client.get(f"/v1/jobs/{job.id}").json()
+
+    assert view["state"] == "failed"
+    assert view["error"] == "the robot's legs came off"
+    assert "resume" in view["links"]
+
+
+def test_an_unknown_job_is_not_found(client: httpx2.Client) -> None:
+    answer = client.get("/v1/jobs/bcdfghjkmnpq")
+
+    assert answer.status_code == 404
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert "bcdfghjkmnpq" in answer.json()["detail"]
+    assert answer.json()["instance"] == "/v1/jobs/bcdfghjkmnpq"
+
+
+def test_pages_list_every_job_once_newest_first(
+    client: httpx2.Client, store: SqlStore, spec: JobSpec
+) -> None:
+    made = [store.create_job(spec)[0].id for _ in range(7)]
+
+    listed, after = [], None
+    while True:
+        query = {"limit": 3} | ({"after": after} if after else {})
+        page = client.get("/v1/jobs", params=query).json()
+        listed += [item["id"] for item in page["items"]]
+        after = page["next"]
+        if after is None:
+            break
+
+    assert listed == made[::-1]
+
+
+def test_jobs_are_listed_by_state(client: httpx2.Client, store: SqlStore, spec: JobSpec) -> None:
+    kept, dropped = (store.create_job(spec)[0].id for _ in range(2))
+    client.post(f"/v1/jobs/{dropped}/cancel")
+
+    def ids(state: str) -> list[str]:
+        answer = client.get("/v1/jobs", params={"state": state})
+        return [item["id"] for item in answer.json()["items"]]
+
+    assert ids("queued") == [kept]
+    assert ids("cancelled") == [dropped]
+    assert ids("failed") == []
+
+
+def test_a_page_of_jobs_takes_one_query(
+    client: httpx2.Client, store: SqlStore, spec: JobSpec, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for _ in range(20):
+        store.create_job(spec)
+    taken = []
+    transaction = store._database.transaction
+
+    def counted(*, write: bool):
+        taken.append(write)
+        return transaction(write=write)
+
+    monkeypatch.setattr(type(store._database), "transaction", lambda self, **kw: counted(**kw))
+
+    assert len(client.get("/v1/jobs").json()["items"]) == 20
+    assert taken == [False]
+
+
+def test_pausing_and_resuming_a_queued_job(client: httpx2.Client, job: Job) -> None:
+    paused = client.post(f"/v1/jobs/{job.id}/pause")
+    assert (paused.status_code, paused.json()["state"]) == (202, "paused")
+    assert "resume" in paused.json()["links"]
+
+    resumed = client.post(f"/v1/jobs/{job.id}/resume")
+    assert (resumed.status_code, resumed.json()["state"]) == (202, "queued")
+
+
+def test_a_running_job_is_pausing_until_its_iteration_is_committed(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    claim = commit(job, 1)
+
+    assert client.post(f"/v1/jobs/{job.id}/pause").json()["state"] == "pausing"
+    commit(job, 1, claim=claim)
+    assert client.get(f"/v1/jobs/{job.id}").json()["state"] == "paused"
+
+
+def test_a_second_pause_is_a_conflict_that_names_the_way_out(
+    client: httpx2.Client, job: Job
+) -> None:
+    client.post(f"/v1/jobs/{job.id}/pause")
+
+    answer = client.post(f"/v1/jobs/{job.id}/pause")
+
+    assert answer.status_code == 409
+    assert "resume" in answer.json()["detail"]
+    assert client.get(f"/v1/jobs/{job.id}").json()["state"] == "paused"
+
+
+@pytest.mark.parametrize("command", ["pause", "resume", "cancel"])
+def test_nothing_can_be_asked_of_a_cancelled_job(
+    client: httpx2.Client, job: Job, command: str
+) -> None:
+    assert client.post(f"/v1/jobs/{job.id}/cancel").json()["state"] == "cancelled"
+
+    answer = client.post(f"/v1/jobs/{job.id}/{command}")
+
+    assert answer.status_code == 409
+    assert "cancelled" in answer.json()["detail"]
+
+
+def test_links_lead_to_the_jobs_resources_and_allowed_commands(
+    client: httpx2.Client, job: Job
+) -> None:
+    links = client.get(f"/v1/jobs/{job.id}").json()["links"]
+
+    assert set(links) == {"self", "best", "iterations", "events", "pause", "cancel"}
+    assert client.get(links["iterations"]).status_code == 200
+    assert client.post(links["pause"]).status_code == 202

@@ -1,0 +1,131 @@
+"""What every request gets: an id, an answer even to a bug, news of an ill database."""
+
+from __future__ import annotations
+
+import httpx2
+import pytest
+
+from services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnavailable
+from services.optimizer.job import Job
+from services.optimizer.store.sql_store import SqlStore
+from sim.errors import KernelBuildError
+
+
+def test_every_answer_has_a_request_id_of_its_own(client: httpx2.Client) -> None:
+    first, second = (client.get("/v1/healthz").headers["X-Request-ID"] for _ in range(2))
+
+    assert first
+    assert first != second
+
+
+def test_a_clients_request_id_is_kept(client: httpx2.Client) -> None:
+    answer = client.get("/v1/nowhere", headers={"X-Request-ID": "my-id.7"})
+
+    assert answer.headers["X-Request-ID"] == "my-id.7"
+
+
+def test_a_request_id_that_could_forge_log_lines_is_replaced(client: httpx2.Client) -> None:
+    answer = client.get("/v1/healthz", headers={"X-Request-ID": "a b\tc"})
+
+    assert answer.headers["X-Request-ID"].isalnum()
+
+
+def test_a_bug_is_a_problem_that_shows_nothing_of_the_inside(
+    client: httpx2.Client,
+    store: SqlStore,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("the password is swordfish")
+
+    monkeypatch.setattr(type(store), "jobs", broken)
+
+    answer = client.get("/v1/jobs")
+
+    assert answer.status_code == 500
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json()["type"] == "urn:gaitswarm:problem:internal-error"
+    assert "swordfish" not in answer.text
+    assert answer.headers["X-Request-ID"] in answer.json()["detail"]
+    assert answer.headers["X-Request-ID"] in caplog.text
+    assert "swordfish" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (StoreUnavailable("the database is away"), 503),
+        (EvaluatorUnavailable("the workers are away"), 503),
+        (KernelBuildError("cc said no"), 503),
+        (LeaseLost("another runner has it"), 409),
+    ],
+)
+def test_what_cannot_be_done_now_is_told_apart_from_bugs(
+    client: httpx2.Client,
+    store: SqlStore,
+    monkeypatch: pytest.MonkeyPatch,
+    error: Exception,
+    status: int,
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(type(store), "jobs", fail)
+
+    answer = client.get("/v1/jobs")
+
+    assert answer.status_code == status
+    assert answer.json()["detail"] == str(error)
+    assert ("Retry-After" in answer.headers) == (status == 503)
+
+
+def test_the_server_is_alive_and_ready(client: httpx2.Client) -> None:
+    assert client.get("/v1/healthz").json() == {"status": "ok"}
+    assert client.get("/v1/readyz").json() == {"status": "ok"}
+
+
+def test_without_a_database_the_server_is_alive_but_not_ready(
+    client: httpx2.Client, store: SqlStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def away(_: object) -> None:
+        raise StoreUnavailable("jobs.db is gone; restore it or start anew")
+
+    monkeypatch.setattr(type(store), "ping", away)
+
+    assert client.get("/v1/healthz").status_code == 200
+    answer = client.get("/v1/readyz")
+    assert answer.status_code == 503
+    assert "restore it" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    ("path", "target"),
+    [("/", "/docs"), ("/healthz", "/v1/healthz"), ("/readyz", "/v1/readyz")],
+)
+def test_short_paths_lead_to_the_real_ones(client: httpx2.Client, path: str, target: str) -> None:
+    answer = client.get(path)
+
+    assert answer.is_redirect
+    assert answer.headers["Location"] == target
+    assert client.get(path, follow_redirects=True).status_code == 200
+
+
+def test_a_stream_outlives_an_absence_of_the_database(
+    client: httpx2.Client, store: SqlStore, job: Job, commit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commit(job, 3)
+    answers = iter([None, StoreUnavailable("away"), StoreUnavailable("away")])
+    read = type(store).job
+
+    def sometimes(self: SqlStore, job_id: str) -> Job:
+        error = next(answers, None)
+        if error is not None:
+            raise error
+        return read(self, job_id)
+
+    monkeypatch.setattr(type(store), "job", sometimes)
+
+    answer = client.get(f"/v1/jobs/{job.id}/events")
+
+    assert answer.text.count("event: iteration") == 3

@@ -1,0 +1,114 @@
+"""The server as a process: where it listens, and how it ends."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from api.app import create_app
+from api.server import ApiServer
+from api.settings import ApiSettings
+from services.optimizer.job import Job
+from services.optimizer.service import JobService
+
+PROGRAM = """
+import sys
+from api.app import create_app
+from api.server import serve
+from api.settings import ApiSettings
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import open_store
+
+store = open_store(sys.argv[1])
+settings = ApiSettings(event_poll_seconds=60.0, shutdown_seconds=60)
+app = create_app(JobService(store), settings=settings)
+serve(app, host="127.0.0.1", port=0, announce=lambda url: print(url, flush=True))
+store.close()
+print("closed", flush=True)
+"""
+
+
+@pytest.fixture
+def process(database: Path) -> Iterator[subprocess.Popen[str]]:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(database)],
+        cwd=Path(__file__).parents[2],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        yield process
+        process.kill()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_the_process_within_seconds_in_spite_of_open_streams(
+    process: subprocess.Popen[str], job: Job, number: signal.Signals
+) -> None:
+    url = process.stdout.readline().strip()
+    with httpx2.stream("GET", f"{url}/v1/jobs/{job.id}/events", timeout=20.0) as answer:
+        lines = answer.iter_lines()
+        assert next(lines) == "event: state"
+        began = time.monotonic()
+        process.send_signal(number)
+        list(lines)
+
+    assert process.stdout.readline() == "closed\n"
+    assert process.wait(timeout=30.0) == 0
+    assert time.monotonic() - began < 15.0
+
+
+def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobService) -> None:
+    app = create_app(service, settings=ApiSettings())
+    server = ApiServer(app, host="127.0.0.1", port=0)
+    host, _, port = server.url.removeprefix("http://").partition(":")
+    thread = threading.Thread(target=server.run)
+
+    # The connection waits in the listening socket until the server runs.
+    with socket.create_connection((host, int(port)), timeout=10.0) as connection:
+        connection.sendall(b"GET /v1/healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        thread.start()
+        assert connection.recv(64).startswith(b"HTTP/1.1 200")
+    server.stop()
+    thread.join(timeout=10.0)
+    assert not thread.is_alive()
+
+
+def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
+    app = create_app(service, settings=ApiSettings())
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
+        ApiServer(app, host="127.0.0.1", port=taken.getsockname()[1])
+
+
+@pytest.mark.slow
+def test_the_api_brings_in_neither_ray_nor_a_database() -> None:
+    program = (
+        "import sys, api.app, api.server, api.simulation\n"
+        "print(*{'ray', 'sqlalchemy', 'alembic'} & set(sys.modules))"
+    )
+
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+    assert done.stdout.strip() == ""
+
+
+def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GAITSWARM_API_PORT", "1234")
+
+    assert ApiSettings().port == 1234
+    assert ApiSettings(port=0).port == 0

@@ -1,0 +1,126 @@
+"""Views say all of what the domain objects do, in JSON that every parser reads."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from api.views import (
+    HistoryIterationView,
+    JobView,
+    ObjectivesView,
+    SimulationView,
+    WalkLogView,
+    evaluation_views,
+)
+from api.views.evaluation import StatusName
+from services.optimizer.job import Evaluation, Job
+from services.optimizer.preference import PREFERENCES
+from services.optimizer.store.sql_store import SqlStore
+from sim.kernel.observation import WalkLog
+from sim.outcome import N_OBJECTIVES, OBJECTIVE_NAMES, Status
+
+
+def strict(text: str) -> object:
+    """Parsed as the standard has it: Python's own parser also takes NaN and Infinity."""
+
+    def refuse(literal: str) -> None:
+        raise ValueError(literal)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_objectives_and_statuses_are_the_simulators() -> None:
+    assert tuple(ObjectivesView.model_fields) == OBJECTIVE_NAMES
+    assert get_args(StatusName) == tuple(status.label for status in Status)
+
+
+def test_numbers_that_are_not_finite_are_null(job: Job) -> None:
+    evaluation = Evaluation(
+        iteration=0,
+        particle=0,
+        design=np.zeros(len(job.spec.design_space().names)),
+        objectives=np.array([[np.nan] * N_OBJECTIVES, [np.inf] * N_OBJECTIVES]),
+        statuses=np.array([Status.DIVERGED, Status.STALLED], dtype=np.uint8),
+        fitness=np.inf,
+    )
+
+    (view,) = evaluation_views([evaluation], job.spec)
+
+    assert strict(view.model_dump_json())["fitness"] is None
+    assert set(view.scenarios["normal-fast"].objectives.model_dump().values()) == {None}
+
+
+def test_a_log_that_ended_early_has_nulls() -> None:
+    columns = {name: np.array([[0.5, np.nan]]) for name in (f.name for f in fields(WalkLog))}
+
+    view = WalkLogView.from_log(WalkLog(**columns))
+
+    assert list(view.columns) == list(columns)
+    assert {str(column.values) for column in view.columns.values()} == {"[[0.5, None]]"}
+    assert strict(view.model_dump_json())
+
+
+def test_a_design_that_was_never_walked_has_no_log() -> None:
+    view = SimulationView.from_walks(
+        robot="szabadka2",
+        controller="fuzzy-pi",
+        design={},
+        preference=PREFERENCES["A"],
+        names=["only"],
+        statuses=np.array([Status.UNREACHABLE], dtype=np.uint8),
+        objectives=np.full((1, N_OBJECTIVES), np.nan),
+        logs=[None],
+    )
+
+    assert view.scenarios["only"].log is None
+    assert view.fitness is None
+
+
+def test_a_history_keeps_every_bit_of_designs_and_objectives(
+    store: SqlStore, job: Job, commit
+) -> None:
+    commit(job, 1)
+    (iteration,) = store.iterations(job.id).items
+    evaluations = store.evaluations(job.id, 0)
+
+    view = HistoryIterationView.from_iteration_and_evaluations(iteration, evaluations, job.spec)
+
+    for shown, stored in zip(
+        strict(view.model_dump_json())["evaluations"], evaluations, strict=True
+    ):
+        assert list(shown["design"].values()) == stored.design.tolist()
+        objectives = shown["scenarios"]["normal-fast"]["objectives"]
+        assert list(objectives.values()) == stored.objectives[0].tolist()
+
+
+def test_a_job_views_json_reads_back_as_the_same_view(store: SqlStore, job: Job, commit) -> None:
+    commit(job, 3)
+    view = JobView.from_job_and_best(store.job(job.id), store.best(job.id))
+
+    assert JobView.model_validate_json(view.model_dump_json()) == view
+
+
+@pytest.mark.slow
+def test_views_can_be_had_without_a_web_framework() -> None:
+    program = (
+        "import sys, api.views, api.simulation\n"
+        "print(*{'fastapi', 'starlette', 'uvicorn'} & set(sys.modules))"
+    )
+
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+    assert done.stdout.strip() == ""

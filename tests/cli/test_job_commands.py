@@ -1,0 +1,184 @@
+"""Commands about jobs do the same on a database and over HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Finished, Gaitswarm
+
+Place = Callable[[Path], list[str]]
+
+
+@pytest.fixture
+def queued(gaitswarm: Gaitswarm, small_spec: Path, db: Path) -> str:
+    result = gaitswarm("submit", "--spec", small_spec, "--db", db)
+    assert result.code == 0, result.err
+    return result.out.strip()
+
+
+def test_submit_queues_a_job_that_status_and_list_then_show(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, place: Place, queued: str
+) -> None:
+    where = place(db)
+    submitted = gaitswarm("submit", "--spec", small_spec, "--seed", "8", *where, "--json").json
+    assert submitted["state"] == "queued"
+    assert submitted["spec"]["seed"] == 8
+    status = gaitswarm("status", submitted["id"], *where, "--json").json
+    assert status == submitted
+    listed = gaitswarm("list", *where, "--json").json
+    assert [job["id"] for job in listed] == [submitted["id"], queued]
+    assert gaitswarm("list", "--limit", "1", *where, "--json").json == listed[:1]
+    assert gaitswarm("list", "--state", "paused", *where, "--json").json == []
+
+
+def test_the_same_idempotency_key_makes_one_job_and_another_spec_is_a_conflict(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, queued: str, place: Place
+) -> None:
+    where = place(db)
+    submit = ("submit", "--spec", small_spec, "--idempotency-key", "k", *where)
+    first, second = gaitswarm(*submit), gaitswarm(*submit)
+    assert first.out == second.out != f"{queued}\n"
+    other = gaitswarm(*submit, "--iterations", "9")
+    assert other.code == 4
+    assert "idempotency" in other.err
+
+
+def test_pause_resume_and_cancel_change_the_state_until_the_job_has_ended(
+    gaitswarm: Gaitswarm, db: Path, place: Place, queued: str
+) -> None:
+    where = place(db)
+    assert gaitswarm("pause", queued, *where, "--json").json["state"] == "paused"
+    again = gaitswarm("pause", queued, *where)
+    assert again.code == 4
+    assert "cannot pause a job that is paused" in again.err
+    assert gaitswarm("resume", queued, *where).out == f"job {queued} is queued\n"
+    assert gaitswarm("cancel", queued, *where, "--json").json["state"] == "cancelled"
+    assert gaitswarm("resume", queued, *where).code == 4
+
+
+@pytest.mark.parametrize(
+    "command", ["status", "watch", "history", "best", "pause", "resume", "cancel", "export"]
+)
+def test_an_unknown_job_is_exit_code_3(
+    gaitswarm: Gaitswarm, finished: Finished, place: Place, command: str, tmp_path: Path
+) -> None:
+    output = ["--output", tmp_path / "x.csv"] if command == "export" else []
+    result = gaitswarm(command, "nosuchjob", *output, *place(finished.db))
+    assert result.code == 3
+    assert "nosuchjob" in result.err
+    assert result.out == ""
+    assert list(tmp_path.glob("*.csv")) == []
+
+
+def test_best_of_a_job_without_any_is_exit_code_3(
+    gaitswarm: Gaitswarm, db: Path, place: Place, queued: str
+) -> None:
+    result = gaitswarm("best", queued, *place(db), "--json")
+    assert result.code == 3
+    assert "no design yet" in result.err
+
+
+def test_best_is_the_one_that_optimize_reported(
+    gaitswarm: Gaitswarm, finished: Finished, place: Place
+) -> None:
+    where = place(finished.db)
+    assert gaitswarm("best", finished.id, *where, "--json").json == finished.job["best"]
+    text = gaitswarm("best", finished.id, *where).out
+    assert "FI1R" in text
+    assert "short" in text
+
+
+def test_history_holds_every_particle_with_full_precision(
+    gaitswarm: Gaitswarm, finished: Finished, place: Place
+) -> None:
+    history = gaitswarm("history", finished.id, *place(finished.db), "--json").json
+    assert history["id"] == finished.id
+    assert [i["index"] for i in history["iterations"]] == [0, 1]
+    evaluations = [e for i in history["iterations"] for e in i["evaluations"]]
+    assert [e["particle"] for e in evaluations] == [0, 1, 2, 0, 1, 2]
+    best = min(evaluations, key=lambda e: e["fitness"])
+    assert best == finished.job["best"]
+    assert list(best["design"]) == history["variables"]
+    assert set(best["scenarios"]["short"]["objectives"]) == {
+        "torque",
+        "acceleration",
+        "angular_acceleration",
+        "energy",
+        "reciprocal_speed",
+        "height_loss",
+    }
+
+
+def test_watch_replays_what_is_committed_and_ends_with_the_job(
+    gaitswarm: Gaitswarm, finished: Finished, place: Place
+) -> None:
+    where = place(finished.db)
+    result = gaitswarm("watch", finished.id, *where, "--json")
+    assert result.code == 0
+    lines = result.out.splitlines()
+    assert [line[:20] for line in lines] == ['{"event":"iteration"'] * 2 + ['{"event":"state","da']
+    told = gaitswarm("watch", finished.id, *where)
+    assert told.code == 0
+    assert "iteration 2/2: best" in told.err
+    assert told.out == ""
+
+
+def test_watching_a_cancelled_job_is_exit_code_1(
+    gaitswarm: Gaitswarm, db: Path, place: Place, queued: str
+) -> None:
+    where = place(db)
+    gaitswarm("cancel", queued, *where)
+    result = gaitswarm("watch", queued, *where)
+    assert result.code == 1
+    assert "cancelled" in result.err
+
+
+def test_a_bad_spec_is_exit_code_2_over_http_too(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, place: Place, queued: str
+) -> None:
+    where = place(db)
+    result = gaitswarm("submit", "--spec", small_spec, "--scenarios", "moon", *where)
+    assert result.code == 2
+    assert "moon" in result.err
+    assert len(gaitswarm("list", *where, "--json").json) == 1
+
+
+def test_a_server_that_does_not_answer_is_exit_code_5(gaitswarm: Gaitswarm) -> None:
+    result = gaitswarm("list", "--server", "http://127.0.0.1:9")
+    assert result.code == 5
+    assert "http://127.0.0.1:9" in result.err
+    assert "gaitswarm serve" in result.err
+
+
+def test_a_database_that_is_not_there_is_not_made_by_reading(
+    gaitswarm: Gaitswarm, db: Path
+) -> None:
+    result = gaitswarm("list", "--db", db)
+    assert result.code == 3
+    assert str(db) in result.err
+    assert not db.exists()
+
+
+def test_without_options_commands_share_the_database_of_the_user(
+    gaitswarm: Gaitswarm, small_spec: Path, tmp_path: Path
+) -> None:
+    submitted = gaitswarm("submit", "--spec", small_spec).out.strip()
+    assert [job["id"] for job in gaitswarm("list", "--json").json] == [submitted]
+    assert (tmp_path / "user-data" / "gaitswarm" / "gaitswarm.db").exists()
+
+
+def test_the_environment_names_a_database_and_an_option_goes_before_it(
+    gaitswarm: Gaitswarm, finished: Finished, db: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAITSWARM_DB", str(finished.db))
+    assert [job["id"] for job in gaitswarm("list", "--json").json] == [finished.id]
+    assert gaitswarm("list", "--db", db).code == 3
+
+
+def test_a_job_is_on_a_server_or_in_a_database_not_both(gaitswarm: Gaitswarm, db: Path) -> None:
+    result = gaitswarm("list", "--db", db, "--server", "http://127.0.0.1:9")
+    assert result.code == 2
+    assert "--server, --db" in result.err

@@ -1,0 +1,186 @@
+"""`gaitswarm optimize` runs a job in this process, from a spec and options."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cli.spec_file import LARGEST_FILE
+from tests.cli.conftest import SMALL_SPEC, Finished, Gaitswarm, WriteJson
+
+
+def test_it_prints_the_finished_job_as_one_json_document(finished: Finished) -> None:
+    job = finished.job
+    assert job["state"] == "succeeded"
+    assert job["iterations"] == 2
+    assert job["evaluations"] == 6
+    best = job["best"]
+    assert best["fitness"] > 0
+    assert set(best["design"]) == {
+        "I", "FI1R", "FI2R", "FOR", "FOMF", "FW1", "FW23", "FW4", "FW56",
+    }  # fmt: skip
+    (walk,) = best["scenarios"].values()
+    assert walk["status"] == "ok"
+    assert walk["utility"] == pytest.approx(best["fitness"])
+
+
+def test_options_go_before_the_spec(gaitswarm: Gaitswarm, small_spec: Path, db: Path) -> None:
+    options = "--iterations 1 --particles 2 --seed 3 --preference C --controller pi --name other"
+    result = gaitswarm(
+        "optimize", "--spec", small_spec, *options.split(),
+        "--db", db, "--evaluator", "in-process", "--json",
+    )  # fmt: skip
+    assert result.code == 0, result.err
+    spec = result.json["spec"]
+    assert (spec["iterations"], spec["seed"], spec["name"]) == (1, 3, "other")
+    assert (spec["controller"], spec["optimizer"]["particles"]) == ("pi", 2)
+    assert spec["preference"]["exponent"] == [1.0] * 5
+    assert set(result.json["best"]["design"]) == {"P", "I"}
+
+
+def test_the_report_for_people_has_the_published_optimum_beside_the_best(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path
+) -> None:
+    result = gaitswarm(
+        "optimize", "--spec", small_spec, "--db", db, "--evaluator", "in-process",
+        "--compare-published",
+    )  # fmt: skip
+    assert result.code == 0, result.err
+    assert "published A" in result.out
+    assert "5837" in result.out
+    assert "fitness of best: " in result.out
+    assert "fitness of published A: " in result.out
+    assert "iteration 2/2: best" in result.err
+    assert f"gaitswarm serve --db {db}" in result.err
+
+
+def test_resuming_a_finished_job_prints_it_again(gaitswarm: Gaitswarm, finished: Finished) -> None:
+    result = gaitswarm("optimize", "--resume", finished.id, "--db", finished.db, "--json")
+    assert result.code == 0
+    assert result.json == finished.job
+
+
+def test_resuming_takes_the_same_spec_but_no_other(
+    gaitswarm: Gaitswarm, finished: Finished, small_spec: Path
+) -> None:
+    resume = ("optimize", "--resume", finished.id, "--db", finished.db, "--json")
+    assert gaitswarm(*resume, "--spec", small_spec).code == 0
+    other = gaitswarm(*resume, "--spec", small_spec, "--seed", "9")
+    assert other.code == 4
+    assert "another seed" in other.err
+
+
+def test_resuming_goes_on_with_a_paused_job_and_refuses_a_cancelled_one(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, finished: Finished
+) -> None:
+    where = ("--db", db)
+    job_id = gaitswarm("submit", "--spec", small_spec, *where).out.strip()
+    gaitswarm("pause", job_id, *where)
+    resumed = gaitswarm(
+        "optimize", "--resume", job_id, *where, "--evaluator", "in-process", "--json"
+    )
+    assert resumed.code == 0, resumed.err
+    assert resumed.json["best"] == finished.job["best"]
+    cancelled = gaitswarm("submit", "--spec", small_spec, *where).out.strip()
+    gaitswarm("cancel", cancelled, *where)
+    refused = gaitswarm("optimize", "--resume", cancelled, *where)
+    assert refused.code == 4
+    assert "cancelled" in refused.err
+
+
+def test_resuming_an_unknown_job_is_exit_code_3(gaitswarm: Gaitswarm, finished: Finished) -> None:
+    assert gaitswarm("optimize", "--resume", "nosuchjob", "--db", finished.db).code == 3
+
+
+BAD_SPECS: dict[str, tuple[dict[str, Any], str]] = {
+    "unknown scenario": ({"scenarios": ["moon-walk"]}, "moon-walk"),
+    "no scenario": ({"scenarios": []}, "scenarios"),
+    "inverted bounds": (
+        {"variables": ["FI1R", {"name": "I", "low": 1.0, "high": 0.1}]},
+        "variables.1",
+    ),
+    "NaN": ({"fixed": {"FW1": float("nan")}}, "fixed.FW1"),
+    "no iterations": ({"iterations": 0}, "iterations"),
+    "no particles": ({"optimizer": {"name": "pso", "particles": 0}}, "optimizer.particles"),
+    "optimizer that is a number": ({"optimizer": 3}, "optimizer"),
+    "negative seed": ({"seed": -1}, "seed"),
+    "unknown field": ({"budget": 5}, "budget"),
+    "unknown preference": ({"preference": "Z"}, "preference"),
+    "unreachable pose": (
+        {"scenarios": [{"name": "giant", "cycle_time": 1.5, "radius": 0.9, "withers": 0.15}]},
+        "giant",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "field"), BAD_SPECS.values(), ids=BAD_SPECS)
+def test_a_bad_spec_is_exit_code_2_that_names_the_field_and_leaves_nothing(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, change: dict[str, Any], field: str
+) -> None:
+    result = gaitswarm("optimize", "--spec", write_json(SMALL_SPEC | change), "--db", db, "--json")
+    assert result.code == 2
+    assert field in result.err
+    assert result.out == ""
+    assert not db.exists()
+
+
+BAD_FILES = {
+    "no JSON": (b"{iterations: 3}", "not valid JSON"),
+    "no object": (b"[1, 2]", "one JSON object"),
+    "no text": (b"\xff\xfe\x00", "not valid JSON"),
+    "a name twice": (b'{"seed": 1, "seed": 2}', "'seed' occurs twice"),
+    "nested too deeply": (b"[" * 200_000, "not valid JSON"),
+    "too large": (b'{"name": "' + b"x" * 10 * LARGEST_FILE + b'"}', "larger than 1 MiB"),
+}
+
+
+@pytest.mark.parametrize(("content", "why"), BAD_FILES.values(), ids=BAD_FILES)
+def test_a_file_that_is_no_spec_is_exit_code_2(
+    gaitswarm: Gaitswarm, tmp_path: Path, db: Path, content: bytes, why: str
+) -> None:
+    path = tmp_path / "spec.json"
+    path.write_bytes(content)
+    result = gaitswarm("optimize", "--spec", path, "--db", db)
+    assert result.code == 2
+    assert result.err.startswith("gaitswarm: spec: ")
+    if content[:1] != b"[" or len(content) < 100:
+        assert why in result.err
+    assert not db.exists()
+
+
+def test_a_spec_file_that_is_not_there_is_exit_code_2(gaitswarm: Gaitswarm, db: Path) -> None:
+    result = gaitswarm("optimize", "--spec", "no-such-file.json", "--db", db)
+    assert result.code == 2
+    assert "no-such-file.json" in result.err
+
+
+@pytest.mark.parametrize(
+    "options",
+    [["--evaluator", "abacus"], ["--cpus", "0"], ["--iterations", "many"], ["--no-such-option"]],
+)
+def test_an_option_that_makes_no_sense_is_exit_code_2(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, options: list[str]
+) -> None:
+    result = gaitswarm("optimize", "--spec", small_spec, "--db", db, *options)
+    assert result.code == 2
+    assert options[0].removeprefix("--") in result.err
+    assert not db.exists()
+
+
+def test_a_directory_that_is_not_there_is_exit_code_5_and_named(
+    gaitswarm: Gaitswarm, small_spec: Path, tmp_path: Path
+) -> None:
+    missing = tmp_path / "missing" / "jobs.db"
+    result = gaitswarm("optimize", "--spec", small_spec, "--db", missing)
+    assert result.code == 5
+    assert str(missing) in result.err
+
+
+def test_json_floats_survive_the_way_through_text(finished: Finished, gaitswarm: Gaitswarm) -> None:
+    first = gaitswarm("history", finished.id, "--db", finished.db, "--json").out
+    assert json.loads(json.dumps(json.loads(first))) == json.loads(first)
+    design = json.loads(first)["iterations"][0]["evaluations"][0]["design"]
+    assert any(len(repr(value)) > 14 for value in design.values())

@@ -1,0 +1,109 @@
+"""The command line as its users run it: processes, signals, a server."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
+
+import pytest
+
+from tests.cli.conftest import SMALL_SPEC, Gaitswarm, WriteJson
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+
+
+def _start(*arguments: str | Path) -> subprocess.Popen[str]:
+    program = "from cli.main import main; main()"
+    return subprocess.Popen(
+        [sys.executable, "-u", "-c", program, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+
+
+def _wait_for(stream: IO[str] | None, pattern: str) -> re.Match[str]:
+    assert stream is not None
+    seen = []
+    for line in stream:
+        seen.append(line)
+        found = re.search(pattern, line)
+        if found:
+            return found
+    raise AssertionError(f"{pattern} did not come: {seen}")
+
+
+@pytest.fixture
+def server(db: Path) -> Iterator[str]:
+    process = _start("serve", "--db", db, "--port", "0", "--evaluator", "in-process")
+    url = _wait_for(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
+    yield url
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+
+
+def test_a_job_submitted_to_a_server_is_run_by_it(
+    gaitswarm: Gaitswarm, small_spec: Path, server: str
+) -> None:
+    where = ("--server", server)
+    job_id = gaitswarm("submit", "--spec", small_spec, *where).out.strip()
+    watched = gaitswarm("watch", job_id, *where)
+    assert watched.code == 0, watched.err
+    job = gaitswarm("status", job_id, *where, "--json").json
+    assert job["state"] == "succeeded"
+    assert gaitswarm("best", job_id, *where, "--json").json == job["best"]
+
+
+def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_never_stopped(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, tmp_path: Path
+) -> None:
+    spec = write_json(SMALL_SPEC | {"iterations": 40})
+    options = ("--spec", spec, "--evaluator", "in-process", "--json")
+    process = _start("optimize", *options, "--db", db)
+    job_id = _wait_for(process.stderr, r"^job (\w+) in").group(1)
+    _wait_for(process.stderr, r"^iteration \d+/40")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert out == ""
+    assert f"gaitswarm optimize --resume {job_id} --db {db}" in err
+    stopped = gaitswarm("status", job_id, "--db", db, "--json").json
+    assert stopped["state"] == "queued"
+    assert 0 < stopped["iterations"] < 40
+
+    resumed = gaitswarm("optimize", "--resume", job_id, "--db", db, *options[2:])
+    assert resumed.code == 0, resumed.err
+    other = tmp_path / "other.db"
+    straight = gaitswarm("optimize", *options, "--db", other).json
+    assert _bits(gaitswarm, job_id, db) == _bits(gaitswarm, straight["id"], other)
+
+
+def _bits(gaitswarm: Gaitswarm, job_id: str, db: Path) -> Any:
+    history = gaitswarm("history", job_id, "--db", db, "--json").json
+    return [iteration["evaluations"] for iteration in history["iterations"]]
+
+
+def test_an_optimization_on_embedded_ray_gives_the_same_bits_and_ends_quietly(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, tmp_path: Path
+) -> None:
+    process = _start("optimize", "--spec", small_spec, "--db", db, "--cpus", "1", "--json")
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    job = json.loads(out)
+    assert len(err.splitlines()) <= 4, err
+    other = tmp_path / "other.db"
+    here = gaitswarm(
+        "optimize", "--spec", small_spec, "--db", other, "--evaluator", "in-process", "--json"
+    ).json
+    assert _bits(gaitswarm, job["id"], db) == _bits(gaitswarm, here["id"], other)

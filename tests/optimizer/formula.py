@@ -1,0 +1,76 @@
+"""Walks by formula: an evaluator that is fast, deterministic and fails when it is told to."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from datetime import UTC, datetime
+
+import numpy as np
+
+from services.optimizer.evaluator import EvaluationRequest, EvaluationStopped
+from services.optimizer.job import Job, JobState
+from services.optimizer.job_spec import JobSpec
+from sim.outcome import Outcome, Status
+
+SPEC = JobSpec.model_validate(
+    {
+        "name": "formula",
+        "controller": "pi",
+        "scenarios": ["normal-fast", "slope-fast"],
+        "optimizer": {"name": "pso", "particles": 4},
+        "iterations": 6,
+        "seed": 11,
+    }
+).resolved()
+
+
+def job(spec: JobSpec = SPEC, state: JobState = JobState.RUNNING) -> Job:
+    now = datetime(2026, 1, 1, tzinfo=UTC)
+    return Job("a-job", spec, state, now, now)
+
+
+def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:
+    """Objectives that depend on every variable and scenario; one design in seven falls."""
+    outcomes = []
+    for scenario in request.scenarios:
+        scale = scenario.cycle_time + scenario.slope + np.arange(1.0, 7.0)
+        objectives = np.abs(request.designs.sum(axis=1, keepdims=True) - 0.7) * scale + 0.01
+        statuses = np.full(len(request.designs), Status.OK, dtype=np.uint8)
+        fallen = np.floor(request.designs[:, 0] * 1e6) % 7 == 0
+        statuses[fallen] = Status.FELL
+        objectives[fallen] = np.nan
+        outcomes.append(Outcome(objectives, statuses))
+    return tuple(outcomes)
+
+
+class FormulaEvaluator:
+    """`Evaluator`. errors: raised by the first calls, one each; None lets a call succeed.
+
+    hold: while set, evaluations wait until they are told to stop or it is cleared.
+    """
+
+    slots = 1
+
+    def __init__(self, errors: Iterable[Exception | None] = ()) -> None:
+        self.errors = list(errors)
+        self.calls = 0
+        self.hold = threading.Event()
+        self.entered = threading.Event()
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        self.calls += 1
+        self.entered.set()
+        error = self.errors.pop(0) if self.errors else None
+        if error is not None:
+            raise error
+        while self.hold.is_set():
+            if should_stop():
+                raise EvaluationStopped
+            threading.Event().wait(0.005)
+        return walk(request)
+
+    def close(self) -> None:
+        pass

@@ -1,0 +1,213 @@
+"""What happens next in a job, without a store, workers, clock or threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from services.optimizer.backoff import Backoff
+from services.optimizer.coordinator import (
+    Action,
+    Begin,
+    Claimed,
+    Commit,
+    Committed,
+    Coordination,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    EvaluatorLost,
+    Event,
+    LeaseWasLost,
+    PauseSeen,
+    Phase,
+    Release,
+    StopRequested,
+    Wait,
+    Waited,
+    handle,
+)
+from services.optimizer.job import Ask, Claim, CompletedIteration, JobState
+from services.optimizer.preference import aggregate
+from tests.optimizer.formula import SPEC, job, walk
+
+
+def claimed(ask: Ask | None = None) -> Claimed:
+    return Claimed(Claim(job(), "runner", 1, ask))
+
+
+def begin() -> tuple[Coordination, tuple[Action, ...]]:
+    return handle(Coordination(backoff=Backoff(first=1.0, longest=4.0, attempts=4)), claimed())
+
+
+def evaluated(actions: tuple[Action, ...]) -> Evaluated:
+    (evaluate,) = [action for action in actions if isinstance(action, Evaluate)]
+    return Evaluated(walk(evaluate.request), 0.5)
+
+
+@dataclass
+class Memory:
+    """What a store would keep: the asks and the iterations, in order."""
+
+    ask: Ask | None = None
+    done: list[CompletedIteration] = field(default_factory=list)
+
+
+class CrashError(Exception):
+    """The process was killed."""
+
+
+def run(memory: Memory, *, crash_before: int | None = None) -> None:
+    """Execute actions as the runner does; crash before the so many-th of them."""
+    state, actions = handle(Coordination(), claimed(memory.ask))
+    executed = 0
+    while actions:
+        event: Event | None = None
+        for action in actions:
+            if executed == crash_before:
+                raise CrashError
+            executed += 1
+            match action:
+                case Begin(ask=ask):
+                    memory.ask = ask
+                case Evaluate(request=request):
+                    event = Evaluated(walk(request), 0.5)
+                case Commit(done=done, following=following):
+                    memory.done.append(done)
+                    memory.ask = following
+                    event = Committed(JobState.SUCCEEDED if following is None else JobState.RUNNING)
+        assert event is not None
+        state, actions = handle(state, event)
+
+
+def bits(memory: Memory) -> list[tuple[int, bytes, bytes, bytes]]:
+    return [
+        (
+            done.iteration,
+            done.designs.tobytes(),
+            done.fitness.tobytes(),
+            b"".join(outcome.objectives.tobytes() for outcome in done.outcomes),
+        )
+        for done in memory.done
+    ]
+
+
+def test_a_job_runs_through_its_budget_and_ends() -> None:
+    memory = Memory()
+    run(memory)
+    assert [done.iteration for done in memory.done] == list(range(SPEC.iterations))
+    assert memory.ask is None
+
+
+def test_the_ask_is_stored_before_it_is_sent_out() -> None:
+    _, actions = begin()
+    assert [type(action) for action in actions] == [Begin, Evaluate]
+    first, sent = actions
+    assert isinstance(first, Begin) and isinstance(sent, Evaluate)
+    np.testing.assert_array_equal(
+        sent.request.designs, SPEC.design_space().designs(first.ask.positions)
+    )
+    assert sent.request.scenarios == SPEC.resolved_scenarios()
+
+
+@pytest.mark.parametrize("crash_before", range(2 * SPEC.iterations + 1))
+def test_a_job_that_crashed_before_any_action_resumes_to_the_same_bits(crash_before: int) -> None:
+    whole, broken = Memory(), Memory()
+    run(whole)
+    with pytest.raises(CrashError):
+        run(broken, crash_before=crash_before)
+    run(broken)
+    assert bits(broken) == bits(whole)
+
+
+def test_a_job_that_crashes_at_every_step_resumes_to_the_same_bits() -> None:
+    whole, broken = Memory(), Memory()
+    run(whole)
+    crashes = 0
+    while len(broken.done) < SPEC.iterations:
+        try:
+            # Two actions a life, the first of which repeats what the last life did not commit.
+            run(broken, crash_before=2)
+        except CrashError:
+            crashes += 1
+    assert crashes >= SPEC.iterations - 1
+    assert bits(broken) == bits(whole)
+
+
+def test_what_is_committed_is_the_fitness_of_the_preference() -> None:
+    state, actions = begin()
+    event = evaluated(actions)
+    _, (commit,) = handle(state, event)
+    assert isinstance(commit, Commit)
+    expected, _ = aggregate(event.outcomes, SPEC.resolved_preference())
+    np.testing.assert_array_equal(commit.done.fitness, expected)
+    assert commit.done.evaluate_seconds == 0.5
+    assert commit.following is not None and commit.following.iteration == 1
+
+
+def test_a_pause_takes_effect_when_the_iteration_is_committed() -> None:
+    state, actions = begin()
+    state, _ = handle(state, evaluated(actions))
+    state, actions = handle(state, Committed(JobState.PAUSED))
+    assert (state.phase, actions) == (Phase.ENDED, ())
+
+
+def test_workers_out_of_reach_are_tried_again_after_growing_delays_and_then_given_up() -> None:
+    state, _ = begin()
+    delays = []
+    while state.phase is not Phase.ENDED:
+        state, (action,) = handle(state, EvaluatorLost("no route to host"))
+        if isinstance(action, Wait):
+            delays.append(action.seconds)
+            state, (action,) = handle(state, Waited())
+            assert isinstance(action, Evaluate)
+    assert delays == [1.0, 2.0, 4.0, 4.0]
+    assert isinstance(action, Release) and action.state is JobState.FAILED
+    assert action.error is not None
+    assert "no route to host" in action.error and "resume" in action.error
+
+
+def test_an_iteration_that_succeeds_restores_patience() -> None:
+    state, actions = begin()
+    state, _ = handle(state, EvaluatorLost("gone"))
+    state, actions = handle(state, Waited())
+    state, _ = handle(state, evaluated(actions))
+    state, _ = handle(state, Committed(JobState.RUNNING))
+    _, (wait,) = handle(state, EvaluatorLost("gone"))
+    assert isinstance(wait, Wait) and wait.seconds == 1.0
+
+
+def test_a_pause_while_waiting_for_workers_need_not_wait_for_them() -> None:
+    state, _ = begin()
+    state, _ = handle(state, EvaluatorLost("gone"))
+    _, actions = handle(state, PauseSeen())
+    # The store pauses a pausing job that is given back.
+    assert actions == (Release(JobState.QUEUED),)
+
+
+def test_a_simulation_that_fails_fails_the_job_with_its_reason() -> None:
+    state, _ = begin()
+    state, actions = handle(state, EvaluationFailed("torque table: broken"))
+    assert actions == (Release(JobState.FAILED, "torque table: broken"),)
+    assert state.phase is Phase.ENDED
+
+
+def test_a_stop_gives_the_job_back_to_the_queue() -> None:
+    state, _ = begin()
+    assert handle(state, StopRequested())[1] == (Release(JobState.QUEUED),)
+
+
+def test_after_the_lease_is_lost_nothing_is_written() -> None:
+    state, actions = begin()
+    late = evaluated(actions)
+    state, actions = handle(state, LeaseWasLost())
+    assert actions == ()
+    assert handle(state, late) == (state, ())
+
+
+def test_an_event_that_makes_no_sense_is_refused() -> None:
+    state, _ = begin()
+    with pytest.raises(ValueError, match="Committed makes no sense while evaluating"):
+        handle(state, Committed(JobState.RUNNING))

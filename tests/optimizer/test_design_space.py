@@ -1,0 +1,74 @@
+"""From positions in the box to the designs that are simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.optimizer.design_space import DesignSpace
+from sim.variables import Variable
+
+GAIN = Variable(name="gain", low=0.0, high=2.0, unit="1")
+SHAPE = Variable(name="shape", low=1, high=3, kind="integer", unit="index")
+STRIDE = Variable(name="stride", low=0.1, high=0.2, unit="m")
+
+
+def build(
+    chosen: list[str | Variable] | None = None, fixed: dict[str, float] | None = None
+) -> DesignSpace:
+    return DesignSpace.build(
+        required=(GAIN, SHAPE), optional=(STRIDE,), chosen=chosen, fixed=fixed or {}
+    )
+
+
+def test_without_a_choice_all_required_variables_are_searched() -> None:
+    assert build().variables == (GAIN, SHAPE)
+
+
+def test_a_fixed_variable_is_not_searched_but_is_in_every_design() -> None:
+    space = build(fixed={"shape": 2.0})
+    assert space.variables == (GAIN,)
+    assert space.names == ("gain", "shape")
+    assert space.designs(np.array([[0.5], [1.5]])).tolist() == [[0.5, 2.0], [1.5, 2.0]]
+
+
+def test_optional_variables_are_searched_when_they_are_chosen() -> None:
+    space = build(["gain", "shape", "stride"])
+    assert space.low.tolist() == [0.0, 1.0, 0.1]
+    assert space.high.tolist() == [2.0, 3.0, 0.2]
+
+
+def test_integers_are_rounded_and_nothing_else_is() -> None:
+    designs = build().designs(np.array([[0.3, 1.4], [0.7, 2.6]]))
+    assert designs.tolist() == [[0.3, 1.0], [0.7, 3.0]]
+
+
+def test_positions_are_not_changed() -> None:
+    positions = np.array([[0.3, 1.4]])
+    build().designs(positions)
+    assert positions.tolist() == [[0.3, 1.4]]
+
+
+def test_own_bounds_keep_the_unit_of_the_catalogue() -> None:
+    narrow = Variable(name="gain", low=0.5, high=0.6, unit="furlong")
+    (variable, _) = build([narrow, "shape"]).variables
+    assert (variable.low, variable.high, variable.unit) == (0.5, 0.6, "1")
+
+
+@pytest.mark.parametrize(
+    ("chosen", "fixed", "message"),
+    [
+        (["gain", "shape", "colour"], {}, "unknown variable 'colour'; known are gain, shape"),
+        (["gain", "gain", "shape"], {}, "'gain' is named twice"),
+        (["gain", "shape"], {"gain": 1.0}, "'gain' is also among the variables"),
+        (["gain"], {}, "shape neither searched nor fixed"),
+        (None, {"colour": 1.0}, "unknown variable 'colour'"),
+        ([], {"gain": 1.0, "shape": 1.0}, "nothing is left to search"),
+        (["gain", Variable(name="shape", low=1.0, high=3.0)], {}, "shape is an integer variable"),
+    ],
+)
+def test_a_space_that_makes_no_sense_is_refused_by_name(
+    chosen: list[str | Variable] | None, fixed: dict[str, float], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        build(chosen, fixed)

@@ -1,0 +1,117 @@
+"""Eq. 4.1 and 4.2 against the thesis's published numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from services.optimizer.preference import PREFERENCES, Preference, aggregate, log_utilities
+from services.optimizer.single_scenario_fitness import general_fitness, single_scenario_fitness
+from sim.outcome import Outcome, Status
+
+TABLE_3_6 = (8.71, 1.77, 16.09, 41.96)
+SPEED = 0.156
+HEIGHT_LOSS = -3.8e-3
+
+
+def outcome(*rows: tuple[float, ...], statuses: tuple[int, ...] | None = None) -> Outcome:
+    return Outcome(
+        np.array([[*row, 0.0] for row in rows]),
+        np.array(statuses or [Status.OK] * len(rows), dtype=np.uint8),
+    )
+
+
+def utility(row: tuple[float, ...], preference: Preference) -> float:
+    _, utilities = aggregate([outcome(row)], preference)
+    return float(utilities[0, 0])
+
+
+def test_published_objectives_give_the_published_utility_with_f5_the_reciprocal_speed() -> None:
+    assert utility((*TABLE_3_6, 1.0 / SPEED), PREFERENCES["A"]) == pytest.approx(21.05, abs=0.01)
+
+
+def test_with_f5_the_speed_itself_the_published_utility_is_missed() -> None:
+    assert utility((*TABLE_3_6, SPEED), PREFERENCES["A"]) == pytest.approx(17.2, abs=0.05)
+
+
+def test_preference_c_is_the_plain_product() -> None:
+    row = (*TABLE_3_6, 1.0 / SPEED)
+    assert utility(row, PREFERENCES["C"]) == pytest.approx(math.prod(row), rel=1e-14)
+
+
+def test_fitness_is_the_geometric_mean_over_the_scenarios() -> None:
+    first, second = (2.0, 3.0, 5.0, 7.0, 11.0), (1.0, 4.0, 9.0, 16.0, 25.0)
+    fitness, utilities = aggregate([outcome(first), outcome(second)], PREFERENCES["B"])
+    assert utilities.shape == (1, 2)
+    assert fitness[0] == pytest.approx(math.sqrt(math.prod(utilities[0])), rel=1e-14)
+
+
+def test_a_design_that_fails_in_one_scenario_is_worth_nothing() -> None:
+    row = (*TABLE_3_6, 6.4)
+    good = outcome(row, row)
+    bad = outcome(row, (math.nan,) * 5, statuses=(Status.OK, Status.FELL))
+    fitness, utilities = aggregate([good, bad], PREFERENCES["A"])
+    assert math.isfinite(fitness[0]) and math.isinf(fitness[1])
+    assert np.isfinite(utilities[:, 0]).all() and math.isinf(utilities[1, 1])
+
+
+def test_a_failure_beats_a_perfect_scenario() -> None:
+    perfect = outcome((0.0,) * 5)
+    fallen = outcome((1.0,) * 5, statuses=(Status.FELL,))
+    fitness, _ = aggregate([perfect, fallen], PREFERENCES["C"])
+    assert math.isinf(fitness[0])
+
+
+def test_an_undefined_objective_counts_only_if_it_has_a_weight() -> None:
+    without_energy = Preference(bias=(0.0,) * 5, exponent=(1.0, 1.0, 1.0, 0.0, 1.0))
+    row = np.array([[2.0, 3.0, 5.0, math.nan, 7.0, 0.0]])
+    ok = np.array([False])
+    assert math.exp(log_utilities(row, ok, without_energy)[0]) == pytest.approx(210.0)
+    assert math.isinf(log_utilities(row, ok, PREFERENCES["A"])[0])
+
+
+@given(
+    rows=st.lists(st.tuples(*[st.floats(0.0, 1e6)] * 5), min_size=1, max_size=6),
+    bias=st.tuples(*[st.floats(0.0, 1e6)] * 5),
+    exponent=st.tuples(*[st.floats(0.01, 10.0)] * 5),
+)
+def test_no_objectives_below_a_million_overflow(
+    rows: list[tuple[float, ...]], bias: tuple[float, ...], exponent: tuple[float, ...]
+) -> None:
+    fitness, utilities = aggregate(
+        [outcome(row) for row in rows], Preference(bias=bias, exponent=exponent)
+    )
+    assert np.isfinite(fitness).all() and np.isfinite(utilities).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "values"),
+    [
+        ("bias", (-0.1, 0.0, 0.0, 0.0, 0.0)),
+        ("exponent", (-1.0, 1.0, 1.0, 1.0, 1.0)),
+        ("exponent", (math.nan, 1.0, 1.0, 1.0, 1.0)),
+        ("exponent", (0.0,) * 5),
+    ],
+)
+def test_a_preference_that_cannot_rank_is_refused(field: str, values: tuple[float, ...]) -> None:
+    sound = {"bias": (0.0,) * 5, "exponent": (1.0,) * 5}
+    with pytest.raises(ValidationError, match=field):
+        Preference.model_validate(sound | {field: values})
+
+
+def test_single_scenario_fitness_matches_the_published_row() -> None:
+    row = np.array([*TABLE_3_6, 1.0 / SPEED, HEIGHT_LOSS])
+    assert single_scenario_fitness(row) == pytest.approx(6.92, abs=0.005)
+
+
+def test_single_scenario_fitness_is_a_case_of_the_general_form() -> None:
+    row = (*TABLE_3_6, 1.0 / SPEED, HEIGHT_LOSS)
+    general = 1e5 * general_fitness(
+        (*TABLE_3_6, SPEED, abs(HEIGHT_LOSS)), (0.0,) * 5 + (0.03,), (-1.0,) * 4 + (2.0, -1.0)
+    )
+    assert general == pytest.approx(float(single_scenario_fitness(np.array(row))), rel=1e-12)

@@ -1,0 +1,270 @@
+"""Running claimed jobs: a real store, walks by formula, and clocks that do not wait."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from services.optimizer.backoff import Backoff
+from services.optimizer.errors import Conflict, EvaluatorUnavailable
+from services.optimizer.job import Command, CompletedIteration, Job, JobState
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.run_claim import Surroundings, run_claim
+from services.optimizer.runner import Runner
+from services.optimizer.store.base import Store
+from services.optimizer.store.sql_store import open_store
+from services.runtime import run_embedded
+from sim.errors import SimulationInputError
+from tests.optimizer.formula import SPEC, FormulaEvaluator
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    opened = open_store(f"sqlite:///{tmp_path}/jobs.db")
+    yield opened
+    opened.close()
+
+
+def queue(store: Store, spec: JobSpec = SPEC) -> str:
+    job, _ = store.create_job(spec)
+    return job.id
+
+
+def eventually(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen within 20 s"
+        time.sleep(0.01)
+
+
+def run(
+    store: Store, evaluator: FormulaEvaluator, stop: threading.Event | None = None, **given: object
+) -> Job:
+    claim = store.claim("runner", lease_seconds=0.3)
+    assert claim is not None
+    around = replace(Surroundings(store, evaluator, lease_seconds=0.3), **given)  # type: ignore[arg-type]
+    return run_claim(claim, around, stop)
+
+
+def history(store: Store, job_id: str) -> list[tuple[bytes, bytes, float]]:
+    found = store.evaluations_between(job_id, 0, 1000)
+    return [(e.design.tobytes(), e.objectives.tobytes(), e.fitness) for e in found]
+
+
+def test_a_claimed_job_runs_to_its_end(store: Store) -> None:
+    job_id = queue(store)
+    seen: list[tuple[int, JobState]] = []
+
+    def note(done: CompletedIteration, state: JobState) -> None:
+        seen.append((done.iteration, state))
+
+    job = run(store, FormulaEvaluator(), on_commit=note)
+    assert job.state is JobState.SUCCEEDED
+    assert job.progress.iterations == SPEC.iterations
+    assert len(history(store, job_id)) == SPEC.iterations * SPEC.optimizer.particles
+    running = [(k, JobState.RUNNING) for k in range(SPEC.iterations - 1)]
+    assert seen == [*running, (SPEC.iterations - 1, JobState.SUCCEEDED)]
+
+
+def test_a_pause_waits_for_the_iteration_and_resuming_changes_no_bit(store: Store) -> None:
+    whole = queue(store)
+    run(store, FormulaEvaluator())
+    paused = queue(store)
+
+    def pause(done: CompletedIteration, state: JobState) -> None:
+        if done.iteration == 2:
+            store.command(paused, Command.PAUSE)
+
+    job = run(store, FormulaEvaluator(), on_commit=pause)
+    assert (job.state, job.progress.iterations) == (JobState.PAUSED, 4)
+    store.command(paused, Command.RESUME)
+    assert run(store, FormulaEvaluator()).state is JobState.SUCCEEDED
+    assert history(store, paused) == history(store, whole)
+
+
+def test_a_cancellation_drops_the_walks_under_way(store: Store) -> None:
+    job_id = queue(store)
+    evaluator = FormulaEvaluator()
+    evaluator.hold.set()
+    canceller = threading.Thread(
+        target=lambda: (evaluator.entered.wait(), store.command(job_id, Command.CANCEL))
+    )
+    canceller.start()
+    assert run(store, evaluator).state is JobState.CANCELLED
+    canceller.join()
+    assert history(store, job_id) == []
+
+
+def test_a_job_longer_than_its_lease_is_kept_by_its_heartbeat(store: Store) -> None:
+    job_id = queue(store)
+    evaluator = FormulaEvaluator()
+    evaluator.hold.set()
+    stop = threading.Event()
+    thread = threading.Thread(target=run, args=(store, evaluator, stop))
+    thread.start()
+    evaluator.entered.wait()
+    time.sleep(0.6)
+    assert store.claim("thief", lease_seconds=1.0, job_id=job_id) is None
+    evaluator.hold.clear()
+    thread.join()
+    assert store.job(job_id).state is JobState.SUCCEEDED
+
+
+def test_a_stopped_run_gives_its_job_back_for_another_to_finish(store: Store) -> None:
+    whole = queue(store)
+    run(store, FormulaEvaluator())
+    job_id = queue(store)
+    evaluator = FormulaEvaluator()
+    evaluator.hold.set()
+    stop = threading.Event()
+    threading.Thread(target=lambda: (evaluator.entered.wait(), stop.set())).start()
+    assert run(store, evaluator, stop).state is JobState.QUEUED
+    assert run(store, FormulaEvaluator()).state is JobState.SUCCEEDED
+    assert history(store, job_id) == history(store, whole)
+
+
+def test_workers_out_of_reach_delay_a_job_and_change_no_bit(store: Store) -> None:
+    whole = queue(store)
+    run(store, FormulaEvaluator())
+    job_id = queue(store)
+    now = [0.0]
+    gone = EvaluatorUnavailable("no route to host")
+    job = run(
+        store,
+        FormulaEvaluator([None, gone, gone, gone, None, gone]),
+        clock=lambda: now[0],
+        sleep=lambda seconds: now.__setitem__(0, now[0] + seconds),
+        lease_seconds=1e6,
+    )
+    assert job.state is JobState.SUCCEEDED
+    assert now[0] == pytest.approx(1 + 2 + 4 + 1)
+    assert history(store, job_id) == history(store, whole)
+
+
+def test_a_job_whose_workers_stay_away_fails_with_the_reason_and_can_be_resumed(
+    store: Store,
+) -> None:
+    queue(store)
+    gone = EvaluatorUnavailable("no route to host")
+    job = run(
+        store,
+        FormulaEvaluator([None, gone, gone, gone]),
+        backoff=Backoff(first=0.01, attempts=2),
+    )
+    assert job.state is JobState.FAILED
+    assert job.error is not None and "no route to host" in job.error
+    assert job.progress.iterations == 1
+    store.command(job.id, Command.RESUME)
+    assert run(store, FormulaEvaluator()).state is JobState.SUCCEEDED
+
+
+def test_a_pause_need_not_wait_for_workers_out_of_reach(store: Store) -> None:
+    job_id = queue(store)
+    gone = EvaluatorUnavailable("no route to host")
+    evaluator = FormulaEvaluator([gone] * 100)
+    threading.Thread(
+        target=lambda: (evaluator.entered.wait(), store.command(job_id, Command.PAUSE))
+    ).start()
+    assert run(store, evaluator, backoff=Backoff(first=60.0)).state is JobState.PAUSED
+
+
+def test_a_simulation_error_fails_the_job_with_its_reason(store: Store) -> None:
+    queue(store)
+    job = run(store, FormulaEvaluator([SimulationInputError("FOMF: 7 is not a shape")]))
+    assert job.state is JobState.FAILED
+    assert job.error is not None and "FOMF: 7 is not a shape" in job.error
+
+
+def test_a_listener_that_breaks_leaves_the_job_to_others(store: Store) -> None:
+    job_id = queue(store)
+
+    def broken(done: CompletedIteration, state: JobState) -> None:
+        raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        run(store, FormulaEvaluator(), on_commit=broken)
+    assert store.job(job_id).state is JobState.QUEUED
+    assert run(store, FormulaEvaluator()).progress.iterations == SPEC.iterations
+
+
+def test_a_run_that_lost_its_lease_writes_nothing(store: Store) -> None:
+    job_id = queue(store)
+    claim = store.claim("slow", lease_seconds=0.0)
+    assert claim is not None
+    taken = store.claim("quick", lease_seconds=60.0)
+    assert taken is not None
+    job = run_claim(claim, Surroundings(store, FormulaEvaluator(), lease_seconds=60.0))
+    assert job.progress.iterations == 0
+    finished = run_claim(taken, Surroundings(store, FormulaEvaluator(), lease_seconds=60.0))
+    assert (finished.id, finished.state) == (job_id, JobState.SUCCEEDED)
+
+
+def test_a_runner_runs_jobs_side_by_side_to_the_bits_of_jobs_run_alone(store: Store) -> None:
+    specs = [SPEC, SPEC.model_copy(update={"seed": 12}), SPEC.model_copy(update={"iterations": 9})]
+    alone = []
+    for spec in specs:
+        job_id = queue(store, spec)
+        run(store, FormulaEvaluator())
+        alone.append(history(store, job_id))
+    together = [queue(store, spec) for spec in specs]
+    runner = Runner(store, FormulaEvaluator(), concurrency=3, poll_seconds=0.01)
+    runner.start()
+    eventually(lambda: all(store.job(j).state is JobState.SUCCEEDED for j in together))
+    runner.stop()
+    assert [history(store, job_id) for job_id in together] == alone
+
+
+def test_a_runner_that_stops_gives_its_jobs_back_at_once(store: Store) -> None:
+    jobs = [queue(store), queue(store), queue(store)]
+    evaluator = FormulaEvaluator()
+    evaluator.hold.set()
+    runner = Runner(store, evaluator, concurrency=2, poll_seconds=0.01)
+    runner.start()
+    eventually(lambda: evaluator.calls == 2)
+    begun = time.monotonic()
+    runner.stop()
+    assert time.monotonic() - begun < 2.0
+    assert not runner.running
+    assert {store.job(job_id).state for job_id in jobs} == {JobState.QUEUED}
+
+
+def test_an_embedded_run_takes_over_from_a_process_that_was_killed(store: Store) -> None:
+    job_id = queue(store)
+    assert store.claim("killed", lease_seconds=0.4) is not None
+    reasons: list[str] = []
+    job = run_embedded(store, FormulaEvaluator(), job_id, on_wait=reasons.append)
+    assert job.state is JobState.SUCCEEDED
+    assert len(reasons) == 1 and "killed" in reasons[0]
+
+
+def test_an_embedded_run_refuses_a_job_that_has_ended(store: Store) -> None:
+    job_id = queue(store)
+    run(store, FormulaEvaluator())
+    with pytest.raises(Conflict, match="succeeded"):
+        run_embedded(store, FormulaEvaluator(), job_id)
+
+
+def test_an_embedded_run_that_is_told_to_stop_leaves_the_job_queued(store: Store) -> None:
+    job_id = queue(store)
+    stop = threading.Event()
+
+    def interrupt(done: CompletedIteration, state: JobState) -> None:
+        stop.set()
+
+    job = run_embedded(store, FormulaEvaluator(), job_id, on_commit=interrupt, stop=stop)
+    assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
+
+
+def test_recorded_designs_are_what_was_evaluated(store: Store) -> None:
+    job_id = queue(store)
+    run(store, FormulaEvaluator())
+    space = SPEC.design_space()
+    for evaluation in store.evaluations(job_id, SPEC.iterations - 1):
+        searched = evaluation.design[: len(space.variables)]
+        assert np.all((searched >= space.low) & (searched <= space.high))

@@ -1,0 +1,183 @@
+"""A job killed at any instant ends as one that never was; two jobs at once end as each alone."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from services.optimizer.evaluator import Evaluator
+from services.optimizer.job import JobState
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.runner import Runner
+from services.optimizer.store.base import Store
+from services.runtime import open_evaluator, open_store, run_embedded
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SPEC = JobSpec.model_validate(
+    {
+        "controller": "fuzzy-pi",
+        "scenarios": [
+            {"name": "level", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "cycles": 2},
+            {
+                "name": "uphill",
+                "cycle_time": 1.5,
+                "radius": 0.2,
+                "withers": 0.14,
+                "slope": 10.0,
+                "cycles": 2,
+            },
+        ],
+        "optimizer": {"name": "pso", "particles": 5},
+        "iterations": 8,
+        "seed": 4,
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def evaluator() -> Iterator[Evaluator]:
+    opened = open_evaluator("in-process", cpus=2)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def url(tmp_path: Path) -> str:
+    return f"sqlite:///{tmp_path}/jobs.db"
+
+
+@pytest.fixture
+def store(url: str) -> Iterator[Store]:
+    opened = open_store(url)
+    yield opened
+    opened.close()
+
+
+def queue(store: Store, spec: JobSpec = SPEC) -> str:
+    job, _ = store.create_job(spec)
+    return job.id
+
+
+def history(store: Store, job_id: str) -> list[tuple[int, int, bytes, bytes, bytes, float]]:
+    """All that is remembered of every evaluation, to the bit, and nothing that is measured."""
+    return [
+        (
+            e.iteration,
+            e.particle,
+            e.design.tobytes(),
+            e.objectives.tobytes(),
+            e.statuses.tobytes(),
+            e.fitness,
+        )
+        for e in store.evaluations_between(job_id, 0, 1_000_000)
+    ]
+
+
+def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
+    job_id = queue(store, spec)
+    assert run_embedded(store, evaluator, job_id).state is JobState.SUCCEEDED
+    return job_id
+
+
+def start(url: str, job_id: str, kind: str = "in-process") -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, str(ROOT / "tests/resume/job_process.py"), url, job_id, kind],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def kill_group(process: subprocess.Popen[str]) -> None:
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert process.stdout is not None
+    process.stdout.close()
+
+
+def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: Evaluator) -> None:
+    begun = time.monotonic()
+    whole = run_alone(store, evaluator)
+    one_iteration = (time.monotonic() - begun) / SPEC.iterations
+
+    job_id = queue(store)
+    chance = random.Random(7)
+    progress = []
+    for _ in range(5):
+        process = start(url, job_id)
+        # The first life begins at the first commit, so that start-up is not all that is killed.
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(chance.uniform(0.0, 1.5 * one_iteration))
+        kill_group(process)
+        progress.append(store.job(job_id).progress.iterations)
+    last = start(url, job_id)
+    last.communicate(timeout=120)
+
+    assert last.returncode == 0
+    assert store.job(job_id).state is JobState.SUCCEEDED
+    assert progress[0] >= 1 and progress == sorted(progress)
+    assert history(store, job_id) == history(store, whole)
+
+
+def test_a_job_resumed_on_ray_equals_one_run_in_threads(
+    store: Store, url: str, evaluator: Evaluator
+) -> None:
+    whole = run_alone(store, evaluator)
+    job_id = queue(store)
+    killed = start(url, job_id, "ray")
+    assert killed.stdout is not None
+    killed.stdout.readline()
+    kill_group(killed)
+    resumed = start(url, job_id, "ray")
+    resumed.communicate(timeout=120)
+    assert resumed.returncode == 0
+    assert history(store, job_id) == history(store, whole)
+
+
+def test_two_jobs_at_once_equal_the_same_jobs_run_alone(store: Store, evaluator: Evaluator) -> None:
+    specs = [SPEC, SPEC.model_copy(update={"seed": 5, "iterations": 6})]
+    alone = [history(store, run_alone(store, evaluator, spec)) for spec in specs]
+    together = [queue(store, spec) for spec in specs]
+    runner = Runner(store, evaluator, concurrency=2, poll_seconds=0.05)
+    runner.start()
+    deadline = time.monotonic() + 120.0
+    both_running = False
+    while any(not store.job(job_id).state.terminal for job_id in together):
+        states = {store.job(job_id).state for job_id in together}
+        both_running = both_running or states == {JobState.RUNNING}
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    runner.stop()
+    assert both_running
+    assert [history(store, job_id) for job_id in together] == alone
+
+
+def test_a_job_that_is_stopped_and_taken_up_again_and_again_equals_one_never_stopped(
+    store: Store, evaluator: Evaluator
+) -> None:
+    whole = run_alone(store, evaluator)
+    job_id = queue(store)
+    lives = 0
+    while not store.job(job_id).state.terminal:
+        stop = threading.Event()
+        timer = threading.Timer(0.05 + 0.11 * lives, stop.set)
+        timer.start()
+        run_embedded(store, evaluator, job_id, stop=stop)
+        timer.cancel()
+        lives += 1
+    assert lives > 2
+    assert history(store, job_id) == history(store, whole)

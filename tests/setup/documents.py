@@ -1,0 +1,46 @@
+"""What README and docs/ tell users to type."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_SHELL = ("", "sh", "bash", "console", "shell")
+_ENDS = ("|", "||", "&&", ";", "&", ">", ">>", "2>", "<", "#")
+
+
+def documentation() -> str:
+    return "\n".join(path.read_text(encoding="utf-8") for path in DOCUMENTS)
+
+
+def blocks(kind: str) -> Iterator[str]:
+    """Contents of the code blocks of one language."""
+    return (body for language, body in _BLOCK.findall(documentation()) if language == kind)
+
+
+def shell_commands(program: str) -> list[list[str]]:
+    """Arguments of every call of a program in a shell block or between backquotes."""
+    text = documentation()
+    shell = [body for language, body in _BLOCK.findall(text) if language in _SHELL]
+    inline = re.findall(r"`([^`\n]+)`", _BLOCK.sub("", text))
+    lines = "\n".join([*shell, *inline]).replace("\\\n", " ").splitlines()
+    return [call for line in lines for call in _calls(line, program)]
+
+
+def _calls(line: str, program: str) -> Iterator[list[str]]:
+    for part in re.split(r"&&|\|\||[;|]|\$\(", line.removeprefix("$ ")):
+        try:
+            words = shlex.split(part.strip().rstrip(")"), comments=True)
+        except ValueError:
+            continue
+        words = [word for word in words if not re.fullmatch(r"[A-Z_]+=\S*", word)]
+        if words and words[0].rpartition("/")[2] == program:
+            ends = [k for k, word in enumerate(words) if word in _ENDS]
+            yield words[1 : ends[0] if ends else None]

@@ -1,0 +1,149 @@
+"""Dockerfile and docker-compose.yml name commands, settings and routes that exist.
+
+They are checked as texts: building and starting them takes a container engine.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, cast
+
+import check_jsonschema
+import jsonschema
+import pytest
+import yaml
+
+from api.app import create_app
+from api.settings import ApiSettings
+from services.optimizer.service import JobService
+from tests.setup import command_line, settings_classes
+from tests.setup.documents import ROOT
+
+COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text(encoding="utf-8"))
+SERVICES: dict[str, Any] = COMPOSE["services"]
+OURS = {name: service for name, service in SERVICES.items() if "build" in service}
+DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+
+
+def _words(command: str | list[str]) -> list[str]:
+    return shlex.split(command) if isinstance(command, str) else command
+
+
+def _health_command(service: dict[str, Any]) -> list[str]:
+    kind, *words = service["healthcheck"]["test"]
+    return shlex.split(words[0]) if kind == "CMD-SHELL" else words
+
+
+def test_the_file_is_what_the_compose_specification_allows() -> None:
+    folder = Path(check_jsonschema.__file__).parent / "builtin_schemas" / "vendor"
+    schema = json.loads((folder / "compose-spec.json").read_text(encoding="utf-8"))
+    validator = jsonschema.validators.validator_for(schema)(schema)
+    assert [error.message for error in validator.iter_errors(COMPOSE)] == []
+    assert "version" not in COMPOSE
+
+
+def test_there_is_everything_that_a_cluster_needs() -> None:
+    assert set(SERVICES) == {"postgres", "ray-head", "ray-worker", "optimizer", "api"}
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_commands_and_health_checks_are_programs_of_ours_or_ray(name: str) -> None:
+    for words in (_words(OURS[name]["command"]), _health_command(OURS[name])):
+        program, *arguments = words
+        if program == "gaitswarm":
+            assert command_line.problem(arguments) is None
+        elif words[:2] == ["python", "-m"]:
+            assert importlib.util.find_spec(f"{words[2]}.__main__") is not None
+        else:
+            assert program in ("ray", "python")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["start", "health-check"])
+def test_options_given_to_ray_exist(command: str) -> None:
+    ray = Path(sys.executable).with_name("ray")
+    done = subprocess.run(
+        [ray, command, "--help"], capture_output=True, text=True, check=True, timeout=120
+    )
+    used = {
+        word.partition("=")[0]
+        for service in OURS.values()
+        for words in (_words(service["command"]), _health_command(service))
+        if words[:2] == ["ray", command]
+        for word in words[2:]
+    }
+    assert used
+    assert [option for option in used if f"{option} " not in f"{done.stdout} "] == []
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_every_service_runs_without_root_and_is_checked(name: str) -> None:
+    service = SERVICES[name]
+    assert service["user"] not in ("root", "0")
+    assert service["healthcheck"]["test"][0] in ("CMD", "CMD-SHELL")
+    assert "privileged" not in service
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_services_wait_for_those_that_they_need_to_be_healthy(name: str) -> None:
+    for needed, how in SERVICES[name].get("depends_on", {}).items():
+        assert how["condition"] == "service_healthy"
+        shared = set(SERVICES[name]["networks"]) & set(SERVICES[needed]["networks"])
+        assert shared, f"{name} cannot reach {needed}"
+
+
+def test_settings_of_ours_exist() -> None:
+    known = settings_classes.variables()
+    given = {variable for service in OURS.values() for variable in service["environment"]}
+    given |= set(re.findall(r"\b(GAITSWARM_[A-Z_]+)=", DOCKERFILE))
+    ours = {variable for variable in given if variable.startswith("GAITSWARM_")}
+    assert ours
+    assert ours - known == set()
+
+
+def test_every_node_of_the_cluster_has_the_same_token_and_none_is_built_in() -> None:
+    nodes = [s["environment"] for name, s in OURS.items() if name != "api"]
+    assert len({node["RAY_AUTH_TOKEN"] for node in nodes}) == 1
+    assert nodes[0]["RAY_AUTH_TOKEN"].startswith("${RAY_AUTH_TOKEN:?")
+
+
+def test_secrets_that_must_be_given_are_in_the_example() -> None:
+    text = (ROOT / "docker-compose.yml").read_text(encoding="utf-8")
+    needed = set(re.findall(r"\$\{([A-Z_]+):\?", text))
+    example = (ROOT / ".env.example").read_text(encoding="utf-8")
+    assert needed == set(re.findall(r"^([A-Z_]+)=$", example, re.MULTILINE))
+    assert re.search(r"^\.env$", (ROOT / ".gitignore").read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def test_the_api_is_asked_for_its_health_where_it_answers() -> None:
+    paths = set(create_app(cast(JobService, None), settings=ApiSettings()).openapi()["paths"])
+    asked = re.findall(r"http://127\.0\.0\.1:8000(/[\w/]*)", DOCKERFILE + str(SERVICES["api"]))
+    assert len(asked) == 2
+    assert set(asked) <= paths
+
+
+def test_the_image_ends_without_root_and_starts_a_command_of_ours() -> None:
+    assert re.findall(r"^USER (\w+)$", DOCKERFILE, re.MULTILINE)[-1] == "gaitswarm"
+    (command,) = re.findall(r"^CMD (\[.*\])$", DOCKERFILE, re.MULTILINE)
+    program, *arguments = json.loads(command)
+    assert program == "gaitswarm"
+    assert command_line.problem(arguments) is None
+
+
+def test_what_the_image_copies_is_not_ignored() -> None:
+    ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    copied = [
+        source
+        for line in re.findall(r"^COPY (?!--from)(.*)$", DOCKERFILE, re.MULTILINE)
+        for source in line.split()[:-1]
+    ]
+    assert copied
+    for source in copied:
+        assert (ROOT / source).exists()
+        assert f"!{source}" in ignored

@@ -1,0 +1,66 @@
+"""README and docs/ say what is true: commands, settings, routes and scenarios exist, and all do."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import cast
+
+import pytest
+
+from api.app import create_app
+from api.settings import ApiSettings
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.service import JobService
+from sim.scenario import SCENARIOS
+from tests.setup import command_line, settings_classes
+from tests.setup.documents import ROOT, blocks, documentation, shell_commands
+
+
+def test_every_gaitswarm_command_that_is_written_exists_with_its_options() -> None:
+    written = shell_commands("gaitswarm")
+    assert len(written) > 20
+    assert [p for p in map(command_line.problem, written) if p] == []
+
+
+def test_every_command_is_shown() -> None:
+    shown = {" ".join(words[:n]) for words in shell_commands("gaitswarm") for n in (1, 2)}
+    assert sorted(set(command_line.commands()) - shown) == []
+
+
+def test_every_make_target_that_is_written_exists() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+    written = {words[0] for words in shell_commands("make") if words}
+    assert {"demo", "test"} <= written
+    assert written - targets == set()
+
+
+def test_every_setting_is_documented_and_no_other() -> None:
+    documented = set(re.findall(r"`(GAITSWARM_[A-Z_]+)", documentation()))
+    assert documented == settings_classes.variables()
+
+
+def test_every_route_is_documented_and_no_other() -> None:
+    app = create_app(cast(JobService, None), settings=ApiSettings())
+    routes = {
+        f"{method.upper()} {path}"
+        for path, item in app.openapi()["paths"].items()
+        for method in item
+    }
+    table = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (GET|POST|PUT|PATCH|DELETE) \| `([^`]+)` \|", table, re.MULTILINE)
+    assert {f"{method} {path}" for method, path in rows} == routes
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
+def test_every_scenario_is_documented(scenario: object) -> None:
+    assert f"`{getattr(scenario, 'name', '')}`" in documentation()
+
+
+def test_every_job_spec_that_is_shown_is_valid() -> None:
+    shown = [json.loads(body) for body in blocks("json")]
+    specs = [example for example in shown if {"iterations", "scenarios"} & set(example)]
+    assert specs
+    for spec in specs:
+        JobSpec.model_validate(spec)

@@ -1,0 +1,86 @@
+"""Every test that takes `store` or `database_url` runs against every database that there is."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.store.examples import Clock
+from tests.store.postgres_server import postgres_binaries, postgres_server
+
+_BINARIES = postgres_binaries()
+_DATABASES = ["sqlite"] + (
+    [pytest.param("postgresql", marks=pytest.mark.slow)] if _BINARIES is not None else []
+)
+
+
+@pytest.fixture(scope="session")
+def migrated_sqlite(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty database of the newest schema, to be copied."""
+    path = tmp_path_factory.mktemp("store") / "template.db"
+    open_store(str(path)).close()
+    return path
+
+
+@pytest.fixture(scope="session")
+def postgresql_server() -> Iterator[str]:
+    assert _BINARIES is not None
+    with postgres_server(_BINARIES) as url:
+        yield url
+
+
+@pytest.fixture(scope="session")
+def migrated_postgresql(postgresql_server: str) -> str:
+    url = f"{postgresql_server}/postgres"
+    open_store(url).close()
+    return url
+
+
+@pytest.fixture(params=_DATABASES)
+def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """URL of an empty database of the newest schema."""
+    if request.param == "sqlite":
+        path = tmp_path / "jobs.db"
+        shutil.copy(request.getfixturevalue("migrated_sqlite"), path)
+        return f"sqlite:///{path}"
+    url: str = request.getfixturevalue("migrated_postgresql")
+    database = connect(parse_url(url))
+    with database.transaction(write=True) as connection:
+        connection.execute(text("TRUNCATE jobs, iterations, evaluations"))
+    database.close()
+    return url
+
+
+@pytest.fixture(params=_DATABASES)
+def fresh_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """URL of a database without any table."""
+    if request.param == "sqlite":
+        yield f"sqlite:///{tmp_path / 'fresh.db'}"
+        return
+    server: str = request.getfixturevalue("postgresql_server")
+    server_engine = connect(parse_url(f"{server}/postgres")).engine
+    outside = server_engine.execution_options(isolation_level="AUTOCOMMIT")
+    with outside.connect() as connection:
+        connection.execute(text("CREATE DATABASE fresh"))
+    yield f"{server}/fresh"
+    with outside.connect() as connection:
+        connection.execute(text("DROP DATABASE fresh WITH (FORCE)"))
+    server_engine.dispose()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def store(database_url: str, clock: Clock) -> Iterator[SqlStore]:
+    store = open_store(database_url, clock=clock)
+    yield store
+    store.close()

@@ -1,0 +1,149 @@
+"""Who may write: claims, heartbeats, leases that run out, and fencing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.optimizer.errors import LeaseLost
+from services.optimizer.job import Claim, Command, JobState
+from services.optimizer.store.sql_store import SqlStore
+from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
+
+
+def taken(store: SqlStore, runner: str = "runner-b", job_id: str | None = None) -> Claim:
+    claim = store.claim(runner, lease_seconds=LEASE, job_id=job_id)
+    assert claim is not None
+    return claim
+
+
+def test_the_oldest_waiting_job_is_claimed_first(store: SqlStore, clock: Clock) -> None:
+    made = []
+    for _ in range(3):
+        made.append(store.create_job(spec())[0].id)
+        clock.advance(1.0)
+    assert [taken(store).job.id for _ in range(3)] == made
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
+
+
+def test_a_claimed_job_is_running_since_its_first_claim(store: SqlStore, clock: Clock) -> None:
+    job, _ = store.create_job(spec())
+    clock.advance(1.0)
+    first = taken(store)
+    assert first.job.state is JobState.RUNNING and first.job.started_at == clock.now
+    assert first.ask is None
+    assert first.job == store.job(job.id)
+    store.release(first, JobState.QUEUED)
+    clock.advance(1.0)
+    assert taken(store).job.started_at == first.job.started_at
+
+
+def test_a_certain_job_can_be_claimed_before_its_turn(store: SqlStore, clock: Clock) -> None:
+    store.create_job(spec())
+    clock.advance(1.0)
+    wanted, _ = store.create_job(spec())
+    assert taken(store, job_id=wanted.id).job.id == wanted.id
+    assert store.claim("runner-b", lease_seconds=LEASE, job_id=wanted.id) is None
+
+
+def test_a_job_is_nobody_elses_while_its_lease_lives(store: SqlStore, clock: Clock) -> None:
+    begun(store)
+    clock.advance(LEASE - 0.001)
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
+
+
+def test_a_heartbeat_prolongs_the_lease(store: SqlStore, clock: Clock) -> None:
+    claim = begun(store)
+    clock.advance(LEASE - 1.0)
+    assert store.renew(claim, lease_seconds=LEASE) is JobState.RUNNING
+    clock.advance(LEASE - 1.0)
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
+
+
+def test_a_job_whose_lease_ran_out_goes_on_with_the_ask_that_was_stored(
+    store: SqlStore, clock: Clock
+) -> None:
+    first = begun(store)
+    store.commit(first, completed(0), ask(1))
+    clock.advance(LEASE)
+    second = taken(store)
+    assert second.job.id == first.job.id and second.token > first.token
+    assert second.job.progress.iterations == 1
+    assert second.ask is not None
+    assert second.ask.iteration == 1 and second.ask.state == ask(1).state
+    np.testing.assert_array_equal(second.ask.positions, ask(1).positions)
+
+
+@pytest.mark.parametrize("ended", [JobState.PAUSED, JobState.FAILED])
+def test_a_resumed_job_goes_on_with_the_ask_that_was_stored(
+    store: SqlStore, ended: JobState
+) -> None:
+    first = begun(store)
+    store.release(first, ended)
+    store.command(first.job.id, Command.RESUME)
+    second = taken(store)
+    assert second.ask is not None and second.ask.iteration == 0
+    assert second.token > first.token
+
+
+def test_a_pausing_job_whose_runner_died_is_paused_and_not_claimed(
+    store: SqlStore, clock: Clock
+) -> None:
+    claim = begun(store)
+    store.command(claim.job.id, Command.PAUSE)
+    clock.advance(1.0)
+    waiting, _ = store.create_job(spec())
+    clock.advance(LEASE)
+    assert taken(store).job.id == waiting.id
+    assert store.job(claim.job.id).state is JobState.PAUSED
+
+
+def overtaken(store: SqlStore, clock: Clock, claim: Claim) -> None:
+    clock.advance(LEASE)
+    taken(store)
+
+
+def overtaken_by_itself(store: SqlStore, clock: Clock, claim: Claim) -> None:
+    clock.advance(LEASE)
+    taken(store, claim.runner)
+
+
+def cancelled(store: SqlStore, clock: Clock, claim: Claim) -> None:
+    store.command(claim.job.id, Command.CANCEL)
+
+
+def released(store: SqlStore, clock: Clock, claim: Claim) -> None:
+    store.release(claim, JobState.QUEUED)
+
+
+def finished(store: SqlStore, clock: Clock, claim: Claim) -> None:
+    store.commit(claim, completed(0), None)
+
+
+@pytest.mark.parametrize(
+    "lose",
+    [overtaken, overtaken_by_itself, cancelled, released, finished],
+    ids=lambda f: f.__name__,
+)
+def test_a_stale_claim_can_write_nothing(store: SqlStore, clock: Clock, lose) -> None:
+    claim = begun(store)
+    lose(store, clock, claim)
+    before = store.job(claim.job.id), store.iterations(claim.job.id)
+    for write in (
+        lambda: store.commit(claim, completed(0), ask(1)),
+        lambda: store.commit(claim, completed(0), None),
+        lambda: store.begin(claim, ask(0)),
+        lambda: store.renew(claim, lease_seconds=LEASE),
+        lambda: store.release(claim, JobState.FAILED, error="late"),
+    ):
+        with pytest.raises(LeaseLost, match="runner-a has lost job"):
+            write()
+    assert (store.job(claim.job.id), store.iterations(claim.job.id)) == before
+
+
+def test_a_lease_that_ran_out_but_was_not_taken_is_still_good(
+    store: SqlStore, clock: Clock
+) -> None:
+    claim = begun(store)
+    clock.advance(1000 * LEASE)
+    assert store.commit(claim, completed(0), ask(1)) is JobState.RUNNING

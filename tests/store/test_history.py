@@ -1,0 +1,170 @@
+"""What is remembered of an iteration, and how it is read."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from services.optimizer.job import Claim, JobState
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
+from sim.outcome import Status
+from tests.store.examples import Clock, ask, begun, completed
+
+INF = math.inf
+
+
+def run(store: SqlStore, *fitness: tuple[float, ...]) -> Claim:
+    """A job with one committed iteration for every swarm's fitness, and one more asked."""
+    claim = begun(store)
+    for index, values in enumerate(fitness):
+        store.commit(claim, completed(index, values), ask(index + 1))
+    return claim
+
+
+def test_an_asked_iteration_is_no_history_until_it_is_committed(store: SqlStore) -> None:
+    job_id = begun(store).job.id
+    assert store.iterations(job_id).items == ()
+    assert store.best(job_id) is None
+    with pytest.raises(NotFound, match="no committed iteration 0"):
+        store.evaluations(job_id, 0)
+
+
+def test_every_particle_is_kept_with_its_raw_objectives(store: SqlStore) -> None:
+    job_id = run(store, (4.0, INF)).job.id
+    done = completed(0, (4.0, INF))
+    found = store.evaluations(job_id, 0)
+    assert [(e.iteration, e.particle) for e in found] == [(0, 0), (0, 1)]
+    for e in found:
+        np.testing.assert_array_equal(e.design, done.designs[e.particle])
+        for k, outcome in enumerate(done.outcomes):
+            np.testing.assert_array_equal(e.objectives[k], outcome.objectives[e.particle])
+            assert e.statuses[k] == outcome.statuses[e.particle]
+    assert found[0].fitness == 4.0 and found[1].fitness == INF
+    assert found[1].statuses.tolist() == [Status.OK, Status.FELL]
+    assert np.isnan(found[1].objectives[1]).all()
+    assert found[1].statuses.dtype == np.uint8
+
+
+def test_an_iteration_is_summed_up_over_its_finite_fitnesses(store: SqlStore, clock: Clock) -> None:
+    job_id = run(store, (5.0, INF, 2.0, 3.5)).job.id
+    (iteration,) = store.iterations(job_id).items
+    assert (iteration.best, iteration.mean, iteration.median, iteration.worst) == (2, 3.5, 3.5, 5)
+    assert (iteration.failed, iteration.evaluate_seconds) == (1, 0.5)
+    assert iteration.committed_at == clock.now
+
+
+def test_a_swarm_that_failed_wholly_has_no_best(store: SqlStore) -> None:
+    job_id = run(store, (INF, INF)).job.id
+    (iteration,) = store.iterations(job_id).items
+    assert iteration.best is iteration.mean is iteration.worst is iteration.best_so_far is None
+    assert iteration.failed == 2
+    assert store.best(job_id) is None
+
+
+def test_the_best_so_far_never_rises(store: SqlStore) -> None:
+    job_id = run(store, (INF, INF), (4.0, 6.0), (5.0, 7.0), (3.0, 9.0)).job.id
+    found = [iteration.best_so_far for iteration in store.iterations(job_id).items]
+    assert found == [None, 4.0, 4.0, 3.0]
+
+
+def test_of_equal_designs_the_earliest_is_the_best(store: SqlStore) -> None:
+    job_id = run(store, (4.0, 3.0, 3.0), (3.0, 3.0, 3.0)).job.id
+    best = store.best(job_id)
+    assert best is not None and (best.iteration, best.particle, best.fitness) == (0, 1, 3.0)
+
+
+def test_progress_counts_what_is_committed(store: SqlStore) -> None:
+    progress = store.job(run(store, (4.0, 3.0), (2.0, INF)).job.id).progress
+    assert (progress.iterations, progress.evaluations, progress.compute_seconds) == (2, 4, 1.0)
+    assert (progress.best_fitness, progress.best_iteration, progress.best_particle) == (2.0, 1, 0)
+
+
+def test_a_repeated_commit_changes_nothing(store: SqlStore) -> None:
+    claim = run(store, (4.0, 3.0))
+    before = store.job(claim.job.id), store.iterations(claim.job.id)
+    assert store.commit(claim, completed(0, (1.0, 1.0)), ask(1)) is JobState.RUNNING
+    assert (store.job(claim.job.id), store.iterations(claim.job.id)) == before
+    assert [e.fitness for e in store.evaluations(claim.job.id, 0)] == [4.0, 3.0]
+
+
+def test_a_repeated_begin_keeps_the_ask_that_is_there(store: SqlStore) -> None:
+    claim = begun(store)
+    store.begin(claim, ask(0, particles=7))
+    store.release(claim, JobState.QUEUED)
+    again = store.claim("runner-b", lease_seconds=1.0)
+    assert again is not None and again.ask is not None
+    np.testing.assert_array_equal(again.ask.positions, ask(0).positions)
+
+
+def test_an_iteration_that_was_not_asked_cannot_be_committed(store: SqlStore) -> None:
+    claim = run(store, (4.0, 3.0))
+    before = store.job(claim.job.id)
+    with pytest.raises(Conflict, match="its next is 1"):
+        store.commit(claim, completed(2), ask(3))
+    with pytest.raises(Conflict, match="its next is 2"):
+        store.commit(claim, completed(1), ask(3))
+    assert store.job(claim.job.id) == before
+
+
+def test_the_next_ask_and_the_iteration_are_stored_together_or_not_at_all(
+    store: SqlStore,
+) -> None:
+    claim = begun(store)
+    following = ask(1)
+    following.state["not json"] = math.nan
+    with pytest.raises(Exception, match=r"(?i)json"):
+        store.commit(claim, completed(0), following)
+    assert store.iterations(claim.job.id).items == ()
+    assert store.evaluations_between(claim.job.id, 0, 10) == ()
+    assert store.job(claim.job.id).progress.iterations == 0
+
+
+def test_iterations_are_paged_by_index(store: SqlStore) -> None:
+    job_id = run(store, *[(1.0, 2.0)] * 5).job.id
+    first = store.iterations(job_id, limit=2)
+    second = store.iterations(job_id, after=int(first.next or 0), limit=2)
+    third = store.iterations(job_id, after=int(second.next or 0), limit=2)
+    indices = [[i.index for i in page.items] for page in (first, second, third)]
+    assert indices == [[0, 1], [2, 3], [4]]
+    assert third.next is None
+    assert store.iterations(job_id, after=4).items == ()
+
+
+@pytest.mark.parametrize("index", [-(2**70), -1, 1, 2**31, 2**70])
+def test_an_index_beyond_any_iteration_finds_nothing(store: SqlStore, index: int) -> None:
+    job_id = run(store, (1.0, 2.0)).job.id
+    with pytest.raises(NotFound):
+        store.evaluations(job_id, index)
+    assert len(store.iterations(job_id, after=index).items) == (1 if index < 0 else 0)
+
+
+def test_a_page_of_no_iterations_is_refused(store: SqlStore) -> None:
+    with pytest.raises(InvalidRequest, match="limit"):
+        store.iterations(begun(store).job.id, limit=0)
+
+
+def test_evaluations_of_several_iterations_come_in_order(store: SqlStore) -> None:
+    job_id = run(store, *[(1.0, 2.0)] * 4).job.id
+    found = store.evaluations_between(job_id, 1, 3)
+    assert [(e.iteration, e.particle) for e in found] == [(1, 0), (1, 1), (2, 0), (2, 1)]
+
+
+def test_the_whole_history_is_read_piece_by_piece(store: SqlStore) -> None:
+    claim = run(store, *[(1.0, 2.0)] * 20)
+    history = JobService(store).history(claim.job.id)
+    head = next(history)
+    # A reader that dawdles holds no transaction open, so the job goes on and is followed.
+    store.commit(claim, completed(20), ask(21))
+    rest = list(history)
+    assert [iteration.index for iteration, _ in [head, *rest]] == list(range(21))
+    assert all([e.particle for e in found] == [0, 1] for _, found in rest)
+    assert all(e.iteration == iteration.index for iteration, found in rest for e in found)
+
+
+def test_history_after_an_iteration_leaves_out_the_earlier_ones(store: SqlStore) -> None:
+    job_id = run(store, *[(1.0, 2.0)] * 4).job.id
+    assert [i.index for i, _ in JobService(store).history(job_id, after=1)] == [2, 3]

@@ -1,0 +1,252 @@
+"""Opening a database: which URLs there are, and what is said when it cannot be used."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import text
+
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.store import engine as engine_module
+from services.optimizer.store.engine import Database, connect, parse_url
+from services.optimizer.store.migrate import head, lock_for_migration
+from services.optimizer.store.sql_store import SqlStore, open_store
+from services.optimizer.store.tables import metadata
+from tests.store.examples import LEASE, spec
+
+
+def edit(url: str, statement: str) -> None:
+    database = connect(parse_url(url))
+    with database.transaction(write=True) as connection:
+        connection.execute(text(statement))
+    database.close()
+
+
+@pytest.mark.parametrize(
+    ("url", "meant"),
+    [
+        ("runs.db", "sqlite+pysqlite:///runs.db"),
+        ("/data/runs.db", "sqlite+pysqlite:////data/runs.db"),
+        ("sqlite:///runs.db", "sqlite+pysqlite:///runs.db"),
+        ("sqlite:////data/runs.db", "sqlite+pysqlite:////data/runs.db"),
+        ("postgresql://u:p@h:1/d", "postgresql+psycopg://u:p@h:1/d"),
+        ("postgres://h/d", "postgresql+psycopg://h/d"),
+        ("postgresql+psycopg://h/d", "postgresql+psycopg://h/d"),
+    ],
+)
+def test_a_url_means(url: str, meant: str) -> None:
+    assert parse_url(url).render_as_string(hide_password=False) == meant
+
+
+def test_a_home_folder_is_expanded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", "/home/someone")
+    assert parse_url("~/runs.db").database == "/home/someone/runs.db"
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "",
+        " ",
+        "sqlite://",
+        "sqlite:///:memory:",
+        ":memory:",
+        "mysql://h/d",
+        "http://[",
+        "a://b:x/d",
+    ],
+)
+def test_a_url_that_cannot_be_used_is_answered_by_those_that_can(url: str) -> None:
+    with pytest.raises(StoreUnavailable, match="sqlite:///FILE or postgresql://"):
+        open_store(url)
+
+
+def test_a_database_is_made_ready_when_it_is_opened(fresh_url: str) -> None:
+    store = open_store(fresh_url)
+    store.ping()
+    job, _ = store.create_job(spec())
+    store.close()
+    again = open_store(fresh_url)
+    assert again.job(job.id) == job
+    again.close()
+
+
+def test_the_migrations_make_exactly_the_tables_that_the_code_uses(fresh_url: str) -> None:
+    open_store(fresh_url).close()
+    database = connect(parse_url(fresh_url))
+    with database.transaction(write=False) as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        assert compare_metadata(context, metadata) == []
+    database.close()
+
+
+def test_a_database_of_a_newer_gaitswarm_is_left_alone(fresh_url: str) -> None:
+    open_store(fresh_url).close()
+    edit(fresh_url, "UPDATE alembic_version SET version_num = '9999'")
+    with pytest.raises(StoreUnavailable, match=r"9999.*upgrade gaitswarm"):
+        open_store(fresh_url)
+
+
+def test_a_store_whose_database_lost_its_schema_says_so(fresh_url: str) -> None:
+    store = open_store(fresh_url)
+    edit(fresh_url, "DELETE FROM alembic_version")
+    with pytest.raises(StoreUnavailable, match=f"revision none, this gaitswarm needs {head()}"):
+        store.ping()
+    store.close()
+
+
+def test_another_programs_tables_are_not_taken_over(fresh_url: str) -> None:
+    edit(fresh_url, "CREATE TABLE jobs (id TEXT)")
+    with pytest.raises(StoreUnavailable, match=r"jobs.*already exists"):
+        open_store(fresh_url)
+    edit(fresh_url, "INSERT INTO jobs VALUES ('theirs')")
+
+
+def test_a_database_can_be_opened_by_several_threads_at_once(fresh_url: str) -> None:
+    failures: list[BaseException] = []
+
+    def open_it() -> None:
+        try:
+            open_store(fresh_url).close()
+        except BaseException as error:  # noqa: BLE001
+            failures.append(error)
+
+    threads = [threading.Thread(target=open_it) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failures == []
+
+
+def test_different_databases_can_be_opened_by_several_threads_at_once(tmp_path: Path) -> None:
+    failures: list[BaseException] = []
+
+    def open_one(index: int) -> None:
+        try:
+            open_store(str(tmp_path / f"{index}.db")).close()
+        except BaseException as error:  # noqa: BLE001
+            failures.append(error)
+
+    threads = [threading.Thread(target=open_one, args=(index,)) for index in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failures == []
+
+
+def test_a_migration_under_way_elsewhere_is_waited_for(fresh_url: str) -> None:
+    database = connect(parse_url(fresh_url), for_migration=True)
+    opened: list[SqlStore] = []
+    thread = threading.Thread(target=lambda: opened.append(open_store(fresh_url)))
+    with database.transaction(write=True) as connection:
+        lock_for_migration(connection)
+        thread.start()
+        thread.join(timeout=0.3)
+        assert thread.is_alive()
+    thread.join(timeout=30.0)
+    opened[0].close()
+
+
+@pytest.mark.slow
+def test_a_database_can_be_opened_by_several_processes_at_once(fresh_url: str) -> None:
+    code = (
+        "import sys; from services.optimizer.store.sql_store import open_store;"
+        "sys.stdin.readline(); open_store(sys.argv[1]).ping()"
+    )
+    processes = [
+        subprocess.Popen([sys.executable, "-c", code, fresh_url], stdin=subprocess.PIPE)
+        for _ in range(3)
+    ]
+    for process in processes:
+        assert process.stdin is not None
+        process.stdin.write(b"go\n")
+        process.stdin.close()
+    assert [process.wait(timeout=60) for process in processes] == [0, 0, 0]
+
+
+def test_a_closed_store_can_be_closed_again(store: SqlStore) -> None:
+    store.close()
+    store.close()
+
+
+def test_a_file_in_no_folder_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "nowhere" / "runs.db"
+    with pytest.raises(StoreUnavailable, match=r"nowhere/runs\.db.*directory exists"):
+        open_store(str(path))
+    assert not path.parent.exists()
+
+
+def test_a_folder_is_no_database(tmp_path: Path) -> None:
+    with pytest.raises(StoreUnavailable, match=str(tmp_path)):
+        open_store(str(tmp_path))
+
+
+def test_a_file_that_is_no_database_is_named_and_kept(tmp_path: Path) -> None:
+    path = tmp_path / "spec.json"
+    path.write_text('{"iterations": 25}' * 100)
+    with pytest.raises(StoreUnavailable, match=r"spec\.json.*not a database"):
+        open_store(str(path))
+    assert path.read_text() == '{"iterations": 25}' * 100
+
+
+def test_a_server_that_does_not_answer_is_named_without_its_password() -> None:
+    with pytest.raises(StoreUnavailable) as refused:
+        open_store("postgresql://u:secret@127.0.0.1:1/d")
+    assert "127.0.0.1:1/d" in str(refused.value) and "secret" not in str(refused.value)
+
+
+def test_a_committed_iteration_survives_a_power_cut(tmp_path: Path) -> None:
+    database = connect(parse_url(str(tmp_path / "runs.db")))
+    with database.transaction(write=False) as connection:
+
+        def pragma(name: str) -> object:
+            return connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
+
+        full = 2
+        assert (pragma("journal_mode"), pragma("synchronous")) == ("wal", full)
+        assert pragma("foreign_keys") == 1
+        assert pragma("busy_timeout") == engine_module.BUSY_SECONDS * 1000
+    database.close()
+
+
+def test_a_database_that_stays_locked_is_unavailable_to_writers_but_not_to_readers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine_module, "BUSY_SECONDS", 0.05)
+    path = tmp_path / "runs.db"
+    store = open_store(str(path))
+    job, _ = store.create_job(spec())
+    other = sqlite3.connect(path, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    with pytest.raises(StoreUnavailable, match=r"runs\.db.*locked"):
+        store.claim("runner", lease_seconds=LEASE)
+    assert store.job(job.id) == job
+    other.execute("ROLLBACK")
+    assert store.claim("runner", lease_seconds=LEASE) is not None
+    other.close()
+    store.close()
+
+
+def test_an_exception_rolls_back_and_keeps_its_type(database_url: str) -> None:
+    database: Database = connect(parse_url(database_url))
+
+    def delete_and_fail() -> None:
+        with database.transaction(write=True) as connection:
+            connection.execute(text("DELETE FROM alembic_version"))
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        delete_and_fail()
+    with database.transaction(write=False) as connection:
+        found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
+    assert found == head()
+    database.close()

@@ -1,0 +1,104 @@
+"""The service: what is checked before a job is queued, and how long it will take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.estimate import Estimate, estimate
+from services.optimizer.job import Job, JobState, Progress
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import open_store
+from tests.store.examples import spec
+
+NOW = datetime(2030, 1, 1, tzinfo=UTC)
+
+
+def job(state: JobState, *, iterations: int, seconds: float = 8.0) -> Job:
+    """A job of ten iterations of five particles in two scenarios, last changed now."""
+    progress = Progress(iterations=iterations, evaluations=5 * iterations, compute_seconds=seconds)
+    return Job("b" * 12, spec(iterations=10, particles=5), state, NOW, NOW, progress=progress)
+
+
+def test_the_rest_takes_as_long_as_what_was_done() -> None:
+    found = estimate(job(JobState.RUNNING, iterations=4), NOW)
+    assert found == Estimate(12.0, 2.5, 5.0)
+
+
+def test_the_iteration_under_way_counts_for_the_time_it_has_run() -> None:
+    running = job(JobState.RUNNING, iterations=4)
+    assert estimate(running, NOW + timedelta(seconds=1.5)).eta_seconds == 10.5
+
+
+def test_a_late_iteration_counts_for_no_more_than_one() -> None:
+    running = job(JobState.RUNNING, iterations=4)
+    assert estimate(running, NOW + timedelta(hours=1)).eta_seconds == 10.0
+    assert estimate(replace(running, progress=Progress(10, 50, compute_seconds=8.0)), NOW) == (
+        Estimate(0.0, 6.25, 12.5)
+    )
+
+
+def test_a_clock_that_lags_behind_the_database_adds_nothing() -> None:
+    running = job(JobState.RUNNING, iterations=4)
+    assert estimate(running, NOW - timedelta(hours=1)).eta_seconds == 12.0
+
+
+@pytest.mark.parametrize(
+    "state", [s for s in JobState if s not in (JobState.RUNNING, JobState.SUCCEEDED)]
+)
+def test_a_job_that_does_not_run_has_rates_but_no_end(state: JobState) -> None:
+    assert estimate(job(state, iterations=4), NOW) == Estimate(None, 2.5, 5.0)
+
+
+def test_a_finished_job_has_no_time_left() -> None:
+    assert estimate(job(JobState.SUCCEEDED, iterations=10), NOW).eta_seconds == 0.0
+
+
+@pytest.mark.parametrize(("iterations", "seconds"), [(0, 0.0), (3, 0.0)])
+def test_before_anything_was_measured_nothing_is_estimated(iterations: int, seconds: float) -> None:
+    running = job(JobState.RUNNING, iterations=iterations, seconds=seconds)
+    assert estimate(running, NOW) == Estimate(None, None, None)
+
+
+HIGH_LEGS = {"name": "mine", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "stride": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("asked", "field", "message"),
+    [
+        ({"fixed": {"stride": 0.9}}, "scenarios.0", "right_front"),
+        ({"scenarios": ["1", HIGH_LEGS]}, "scenarios.1", "'mine'.*reduce stride"),
+        ({"fixed": {"I": -5.0}}, "fixed", "I: -5"),
+        ({"variables": ["P", {"name": "I", "low": -5.0, "high": 1.0}]}, "variables", "I: -5"),
+        ({"variables": ["P", {"name": "I", "low": 0.0, "high": 500.0}]}, "variables", "I: 500"),
+        (
+            {"variables": ["P", "I", {"name": "duty_factor", "low": 0.5, "high": 2.0}]},
+            "variables",
+            "duty_factor",
+        ),
+        ({"fixed": {"fir_ms": 2.5}}, "fixed", "fir_ms"),
+    ],
+)
+def test_a_job_that_cannot_be_simulated_is_refused_and_not_stored(
+    tmp_path: Path, asked: dict[str, Any], field: str, message: str
+) -> None:
+    store = open_store(str(tmp_path / "jobs.db"))
+    with pytest.raises(InvalidRequest, match=message) as refused:
+        JobService(store).submit(JobSpec.model_validate({"controller": "pi", **asked}))
+    assert refused.value.field == field
+    assert store.jobs().items == ()
+    store.close()
+
+
+def test_a_scenario_is_fine_if_a_searched_gait_can_stay_within_reach(tmp_path: Path) -> None:
+    store = open_store(str(tmp_path / "jobs.db"))
+    asked = {"controller": "pi", "scenarios": [HIGH_LEGS], "variables": ["P", "I", "stride"]}
+    job, new = JobService(store).submit(JobSpec.model_validate(asked))
+    assert new and JobService(store).job(job.id) == job
+    store.close()

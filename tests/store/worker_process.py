@@ -1,0 +1,48 @@
+"""A runner in a process of its own: `python -m tests.store.worker_process claim|commit URL`.
+
+It begins when a line comes on its standard input, and prints what it has done, line by line.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.store.examples import ask, completed
+
+PARTICLES = 25
+
+
+def say(word: object) -> None:
+    """One line, at once."""
+    sys.stdout.write(f"{word}\n")
+    sys.stdout.flush()
+
+
+def claim_all(store: SqlStore) -> None:
+    """Claim until there is nothing left; prints the ids."""
+    while (claim := store.claim("process", lease_seconds=600.0)) is not None:
+        say(claim.job.id)
+
+
+def commit_for_ever(store: SqlStore) -> None:
+    """Claim a job and commit iteration after iteration; prints the index of each."""
+    # A lease of no time: whoever comes after this process's death need not wait.
+    claim = store.claim("process", lease_seconds=0.0)
+    assert claim is not None
+    if claim.ask is None:
+        store.begin(claim, ask(0, particles=PARTICLES))
+    index = claim.ask.iteration if claim.ask is not None else 0
+    while True:
+        fitness = [1.0 / (index + 1) + particle for particle in range(PARTICLES)]
+        store.commit(claim, completed(index, fitness), ask(index + 1, particles=PARTICLES))
+        say(index)
+        index += 1
+
+
+if __name__ == "__main__":
+    what, url = sys.argv[1:]
+    opened = open_store(url)
+    say("ready")
+    sys.stdin.readline()
+    {"claim": claim_all, "commit": commit_for_ever}[what](opened)

@@ -1,0 +1,34 @@
+"""Requests for real walks, short ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from services.optimizer.evaluator import EvaluationRequest
+from sim import simulate
+from sim.outcome import Outcome
+from sim.scenario import Scenario
+
+SCENARIOS = (
+    Scenario(name="level", cycle_time=1.0, radius=0.16, withers=0.15, cycles=1),
+    Scenario(name="uphill", cycle_time=1.5, radius=0.2, withers=0.14, slope=10.0, cycles=1),
+)
+
+
+def request(
+    count: int, *, job_id: str = "job", scenarios: tuple[Scenario, ...] = SCENARIOS, seed: int = 1
+) -> EvaluationRequest:
+    gains = np.random.default_rng(seed).uniform((0.1, 0.0), (0.5, 0.5), (count, 2))
+    return EvaluationRequest(job_id, "szabadka2", "pi", scenarios, ("P", "I"), gains)
+
+
+def walked_at_once(wanted: EvaluationRequest) -> tuple[Outcome, ...]:
+    """The same walks without any evaluator: one batch per scenario."""
+    return tuple(
+        simulate.simulate(scenario, wanted.controller, wanted.variables, wanted.designs).outcome
+        for scenario in wanted.scenarios
+    )
+
+
+def bits(outcomes: tuple[Outcome, ...]) -> list[tuple[bytes, bytes]]:
+    return [(outcome.objectives.tobytes(), outcome.statuses.tobytes()) for outcome in outcomes]

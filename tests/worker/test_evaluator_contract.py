@@ -1,0 +1,128 @@
+"""What every evaluator keeps to, wherever it lets robots walk."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.evaluator import EvaluationStopped, Evaluator
+from services.worker.in_process import InProcessEvaluator
+from sim.errors import SimulationInputError
+from sim.outcome import Outcome
+from sim.scenario import Scenario
+from tests.worker.requests import SCENARIOS, bits, request, walked_at_once
+
+
+def never() -> bool:
+    return False
+
+
+@pytest.mark.parametrize("count", [1, 7, 41])
+def test_results_are_those_of_one_batch_in_index_order_to_the_bit(
+    evaluator: Evaluator, count: int
+) -> None:
+    wanted = request(count)
+    assert bits(evaluator.evaluate(wanted, never)) == bits(walked_at_once(wanted))
+
+
+def test_a_design_is_worth_the_same_in_whatever_company(evaluator: Evaluator) -> None:
+    wanted = request(13)
+    shuffled = np.random.default_rng(2).permutation(13)
+    straight = evaluator.evaluate(wanted, never)
+    mixed = evaluator.evaluate(replace(wanted, designs=wanted.designs[shuffled]), never)
+    for a, b in zip(straight, mixed, strict=True):
+        assert a.objectives[shuffled].tobytes() == b.objectives.tobytes()
+
+
+def test_designs_are_not_changed(evaluator: Evaluator) -> None:
+    wanted = request(5)
+    before = wanted.designs.copy()
+    wanted.designs.flags.writeable = False
+    evaluator.evaluate(wanted, never)
+    np.testing.assert_array_equal(wanted.designs, before)
+
+
+def test_an_error_of_the_simulation_comes_through_as_itself(evaluator: Evaluator) -> None:
+    wanted = request(9)
+    wanted.designs[6, 0] = 1e9
+    with pytest.raises(SimulationInputError, match="P"):
+        evaluator.evaluate(wanted, never)
+    sound = request(3)
+    assert bits(evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
+
+
+def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
+    long = Scenario(name="long", cycle_time=2.0, radius=0.16, withers=0.15, cycles=5)
+    stop = threading.Event()
+    threading.Timer(0.3, stop.set).start()
+    begun = time.monotonic()
+    with pytest.raises(EvaluationStopped):
+        evaluator.evaluate(request(8000, scenarios=(long,)), stop.is_set)
+    assert time.monotonic() - begun < 2.0
+
+
+def test_jobs_at_the_same_time_do_not_disturb_each_others_bits(evaluator: Evaluator) -> None:
+    wanted = [request(5 + 3 * k, job_id=f"job {k}", seed=k) for k in range(4)]
+    found: dict[int, tuple[Outcome, ...]] = {}
+
+    def run(k: int) -> None:
+        found[k] = evaluator.evaluate(wanted[k], never)
+
+    threads = [threading.Thread(target=run, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for k in range(4):
+        assert bits(found[k]) == bits(walked_at_once(wanted[k]))
+
+
+def test_a_small_job_is_served_while_a_big_one_runs(evaluator: Evaluator) -> None:
+    big_ended = threading.Event()
+    stop = threading.Event()
+    # A minute and more of work, in pieces of a second.
+    long = Scenario(name="long", cycle_time=2.0, radius=0.16, withers=0.15, cycles=5)
+
+    def run_big() -> None:
+        try:
+            evaluator.evaluate(request(8000, job_id="big", scenarios=(long,)), stop.is_set)
+        except EvaluationStopped:
+            return
+        big_ended.set()
+
+    thread = threading.Thread(target=run_big)
+    thread.start()
+    time.sleep(0.2)
+    evaluator.evaluate(request(8, job_id="small"), never)
+    assert not big_ended.is_set()
+    stop.set()
+    thread.join()
+
+
+def test_slots_are_the_processors_it_was_given(evaluator: Evaluator) -> None:
+    assert evaluator.slots == 2
+
+
+def test_a_closed_evaluator_says_so() -> None:
+    evaluator = InProcessEvaluator(1)
+    evaluator.close()
+    evaluator.close()
+    with pytest.raises(EvaluatorUnavailable, match="closed"):
+        evaluator.evaluate(request(1, scenarios=SCENARIOS[:1]), never)
+
+
+def test_closing_ends_requests_under_way() -> None:
+    evaluator = InProcessEvaluator(1)
+    threading.Timer(0.2, evaluator.close).start()
+    with pytest.raises(EvaluatorUnavailable):
+        evaluator.evaluate(request(500), never)
+
+
+def test_no_processors_are_refused() -> None:
+    with pytest.raises(ValueError, match="cpus"):
+        InProcessEvaluator(0)

@@ -1,0 +1,165 @@
+"""What is Ray's own: processes that die, the memory they take, and what they leave behind."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from services.optimizer.errors import EvaluatorUnavailable
+from services.worker.ray_evaluator import RayEvaluator
+from services.worker.task import transportable
+from sim.errors import SimulationError, SimulationInputError, UnreachablePose
+from tests.worker.processes import Process, descendants, walkers
+from tests.worker.requests import bits, request
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def never() -> bool:
+    return False
+
+
+def within(seconds: float, condition: Callable[[], bool]) -> bool:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+@pytest.mark.slow
+def test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits(
+    ray_evaluator: RayEvaluator,
+) -> None:
+    wanted = request(300)
+    expected = bits(ray_evaluator.evaluate(wanted, never))
+    killed: list[int] = []
+
+    def kill_one_at_work() -> None:
+        while not killed:
+            for worker in walkers(os.getpid()):
+                if "run_in_worker" in worker.title:
+                    os.kill(worker.pid, signal.SIGKILL)
+                    killed.append(worker.pid)
+                    return
+
+    killer = threading.Thread(target=kill_one_at_work)
+    killer.start()
+    found = ray_evaluator.evaluate(wanted, never)
+    killer.join()
+    assert len(killed) == 1
+    assert bits(found) == expected
+
+
+@pytest.mark.slow
+def test_a_worker_takes_at_most_500_megabytes_and_has_loaded_only_what_walks_need(
+    ray_evaluator: RayEvaluator,
+) -> None:
+    ray_evaluator.evaluate(request(200), never)
+    at_work = walkers(os.getpid())
+    assert len(at_work) >= 2
+    assert max(worker.resident for worker in at_work) <= 500e6
+    for library in ("casadi", "pinocchio", "sqlalchemy"):
+        assert not any(worker.has_loaded(library) for worker in at_work)
+
+
+@pytest.mark.slow
+def test_a_second_ray_in_the_same_process_is_refused(ray_evaluator: RayEvaluator) -> None:
+    with pytest.raises(EvaluatorUnavailable, match="already"):
+        RayEvaluator(cpus=1)
+
+
+@contextmanager
+def driver(ending: str, home: Path) -> Iterator[subprocess.Popen[str]]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(home)}
+    for name in [name for name in environment if name.startswith("RAY_")]:
+        del environment[name]
+    with subprocess.Popen(
+        [sys.executable, str(ROOT / "tests/worker/driver.py"), ending],
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as started:
+        try:
+            assert started.stdout is not None
+            line = started.stdout.readline()
+            assert line == "walked\n", started.stderr.read() if started.stderr else ""
+            yield started
+        finally:
+            if started.poll() is None:
+                os.killpg(started.pid, signal.SIGKILL)
+
+
+def traces(pid: int) -> list[Path]:
+    return list(Path(tempfile.gettempdir()).glob(f"gaitswarm-ray-{pid}-*"))
+
+
+@pytest.mark.slow
+def test_after_closing_nothing_runs_nothing_lies_about_and_nothing_was_said(
+    tmp_path: Path,
+) -> None:
+    with driver("close", tmp_path) as started:
+        below = descendants(started.pid)
+        assert traces(started.pid)
+        _, said = started.communicate("now\n", timeout=60)
+        assert started.returncode == 0
+        assert said == ""
+        assert within(10.0, lambda: not any(p.alive for p in below))
+        assert not traces(started.pid)
+    assert not (tmp_path / ".ray").exists()
+
+
+@pytest.mark.slow
+def test_after_a_driver_is_killed_its_cluster_is_gone_within_seconds(tmp_path: Path) -> None:
+    with driver("wait", tmp_path) as started:
+        below = descendants(started.pid)
+        vital = [p for p in below if p in walkers(started.pid) or is_daemon(p)]
+        assert len(vital) >= 3
+        os.kill(started.pid, signal.SIGKILL)
+        gone = within(5.0, lambda: not any(p.alive for p in vital))
+        survivors = [p.title for p in vital if p.alive]
+        assert gone, survivors
+        for directory in traces(started.pid):
+            shutil.rmtree(directory, ignore_errors=True)
+
+
+@pytest.mark.slow
+def test_a_cluster_that_was_lost_is_noticed_and_opened_again_with_the_same_bits(
+    tmp_path: Path,
+) -> None:
+    with driver("lose", tmp_path) as started:
+        said, complaints = started.communicate("now\n", timeout=150)
+        assert started.returncode == 0, complaints
+        assert "Ray was lost" in said
+
+
+def is_daemon(candidate: Process) -> bool:
+    return any(name in candidate.title for name in ("gcs_server", "raylet/raylet"))
+
+
+def test_an_error_that_cannot_be_pickled_keeps_its_family_and_its_words() -> None:
+    carried = transportable(UnreachablePose("slope-fast", "left front", 0.0123))
+    assert isinstance(carried, SimulationError)
+    again = pickle.loads(pickle.dumps(carried))  # noqa: S301
+    assert "12.3 mm" in str(again)
+
+
+def test_an_error_that_can_be_pickled_is_carried_as_itself() -> None:
+    error = SimulationInputError("FOMF: 7")
+    assert transportable(error) is error

@@ -14,7 +14,6 @@ import numpy as np
 
 from cli.atomic_file import replacing
 from services.optimizer.errors import InvalidRequest
-from sim.controllers.base import TABLE_SHAPE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,12 +66,13 @@ def draw_surface(drive: Drive, *, title: str) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
-    if drive.table is None:
+    table = drive.direct
+    if table is None:
         raise InvalidRequest("this controller has no table, so there is no surface to draw")
-    rows, columns = TABLE_SHAPE
-    error = (np.arange(rows) - rows // 2) * _FRACTION / drive.error_gain
-    current = np.arange(columns) * _FRACTION / drive.current_gain
-    output = drive.table.astype(np.float64) * drive.output_gain / _FRACTION
+    rows, columns, _ = table.values.shape
+    error = (np.arange(rows) - rows // 2) * _FRACTION / table.error_gain
+    current = np.arange(columns) * _FRACTION / table.current_gain
+    output = table.values[:, :, 0].astype(np.float64) * table.output_gain / _FRACTION
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes: Axes3D = figure.add_subplot(projection="3d")
     drawn = axes.plot_surface(

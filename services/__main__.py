@@ -27,7 +27,7 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="GAITSWARM_", env_ignore_empty=True)
 
-    database_url: str = Field(
+    db: str = Field(
         default="sqlite:///gaitswarm.db", description="Where jobs and their history are kept."
     )
     evaluator: EvaluatorKind = Field(default="ray", description="Where walks run.")
@@ -57,6 +57,8 @@ def main() -> int:
             name = "_".join(str(part) for part in problem["loc"]).upper()
             print(f"GAITSWARM_{name}: {problem['msg']}", file=sys.stderr)  # noqa: T201
         return _EXIT_CONFIG
+    # Every start would tell of migrations that are already done.
+    logging.getLogger("alembic").setLevel(logging.WARNING)
     stop = threading.Event()
     try:
         with stop_on_signals(stop), open_runtime(_runtime_settings(settings)) as runtime:
@@ -72,7 +74,7 @@ def main() -> int:
 
 def _runtime_settings(settings: Settings) -> RuntimeSettings:
     return RuntimeSettings(
-        database=settings.database_url,
+        database=settings.db,
         evaluator=settings.evaluator,
         ray_address=settings.ray_address,
         cpus=settings.cpus,

@@ -26,7 +26,11 @@ class BenchmarkResult:
 
 
 def measure(
-    *, repeats: int = 3, walkers: int = 24, backend: Backend = "auto", robot: str = "szabadka2"
+    *,
+    repeats: int = 3,
+    walkers: int = 24,
+    backend: Backend = "auto",
+    robot: str = "szabadka2",
 ) -> BenchmarkResult:
     """Time whole walks (control, physics, objectives) of the six scenarios in this thread.
 
@@ -45,7 +49,14 @@ def measure(
     for _ in range(repeats):
         start = time.perf_counter()
         for scenario in scenarios:
-            simulate(scenario, "fuzzy-pi", list(design), designs, robot=robot, backend=backend)
+            simulate(
+                scenario,
+                "fuzzy-pi",
+                list(design),
+                designs,
+                robot=robot,
+                backend=backend,
+            )
         passes.append(time.perf_counter() - start)
     elapsed = min(passes)
     return BenchmarkResult(

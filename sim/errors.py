@@ -36,6 +36,10 @@ class UnreachablePose(SimulationInputError):
             f" {miss * 1000:.1f} mm; reduce stride, radius or withers"
         )
 
+    def __reduce__(self) -> tuple[type[UnreachablePose], tuple[str, str, float]]:
+        """Pickle by the arguments, so that it comes back from another process as itself."""
+        return type(self), (self.scenario, self.leg, self.miss)
+
 
 class RobotFileError(SimulationInputError):
     """A robot description that cannot be used."""

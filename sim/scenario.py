@@ -40,7 +40,10 @@ class Scenario(BaseModel):
         examples=[0.16],
     )
     withers: float = Field(
-        gt=0.0, le=1.0, description="Height of the coxa axes over the ground [m].", examples=[0.15]
+        gt=0.0,
+        le=1.0,
+        description="Height of the coxa axes over the ground [m].",
+        examples=[0.15],
     )
     load: float = Field(
         default=0.0, ge=0.0, le=50.0, description="Extra mass carried on the body [kg]."
@@ -52,16 +55,34 @@ class Scenario(BaseModel):
         description="Share by which the inner legs' stride is shortened [1]; right turns positive.",
     )
     slope: float = Field(
-        default=0.0, ge=-45.0, le=45.0, description="Inclination of the ground [deg], up positive."
+        default=0.0,
+        ge=-45.0,
+        le=45.0,
+        description="Inclination of the ground [deg], up positive.",
+    )
+    slope_direction: float = Field(
+        default=0.0,
+        ge=-180.0,
+        le=180.0,
+        description="Where the ground rises, from straight ahead towards the left [deg].",
     )
     stride: float = Field(
-        default=0.16, gt=0.0, le=1.0, description="Length of a foot's stroke on the ground [m]."
+        default=0.16,
+        gt=0.0,
+        le=1.0,
+        description="Length of a foot's stroke on the ground [m].",
     )
     height: float = Field(
-        default=0.03, ge=0.0, le=0.5, description="Height of the swing half-ellipse [m]."
+        default=0.03,
+        ge=0.0,
+        le=0.5,
+        description="Height of the swing half-ellipse [m].",
     )
     duty_factor: float = Field(
-        default=0.56, ge=0.1, le=0.95, description="Support phase's share of the cycle [1]."
+        default=0.56,
+        ge=0.1,
+        le=0.95,
+        description="Support phase's share of the cycle [1].",
     )
     fir_ms: int = Field(
         default=12, ge=0, le=1000, description="Length of the low-pass FIR filter [ms]."
@@ -84,7 +105,13 @@ class Scenario(BaseModel):
 
 GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
     Variable(name="cycle_time", low=0.9, high=1.7, unit="s", description="Walking cycle."),
-    Variable(name="stride", low=0.10, high=0.18, unit="m", description="Stroke on the ground."),
+    Variable(
+        name="stride",
+        low=0.10,
+        high=0.18,
+        unit="m",
+        description="Stroke on the ground.",
+    ),
     Variable(name="height", low=0.01, high=0.04, unit="m", description="Height of the swing."),
     Variable(name="duty_factor", low=0.45, high=0.75, unit="1", description="Support share."),
     Variable(

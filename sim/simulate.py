@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -17,11 +18,12 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.kernel.native import native_kernel
 from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.parameters import gravity_on, pack_parameters
+from sim.kernel.parameters import body_of, gravity_on, pack_parameters
 from sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup
 from sim.native.compilation import target
+from sim.noise import LinkNoise
 from sim.outcome import N_OBJECTIVES, Outcome, Status
-from sim.robot import Robot, load_robot
+from sim.robot import Robot, RobotVariant, load_robot
 from sim.robot.posture import resting_height
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
 
@@ -29,6 +31,13 @@ Backend = Literal["auto", "native", "reference"]
 
 PHYSICS_RATE: Final = 5000
 """Physics steps a second [Hz]; the control rate is 500 Hz."""
+
+GEARLASH_PHYSICS_RATE: Final = 20_000
+"""Rate [Hz] for robots with gearlash: without their rotors, tibias answer the ground too fast for
+5 kHz."""
+
+RobotChoice = str | RobotVariant | Robot
+"""How a robot is named to the simulator."""
 
 SHORTEST_WALK: Final = 1e-3
 """Distance [m] under which a robot counts as not walking: energy per metre has no value."""
@@ -51,13 +60,16 @@ def simulate(
     variables: Sequence[str],
     designs: NDArray[np.float64],
     *,
-    robot: str = "szabadka2",
+    robot: RobotChoice = "szabadka2",
+    noise: LinkNoise | None = None,
     log: bool = False,
     backend: Backend = "auto",
     physics_rate: int = PHYSICS_RATE,
 ) -> Simulation:
     """Let every design walk through a scenario.
 
+    robot: a shipped robot by name, a variant of one, or a `Robot` of your own; with gearlash it is
+        simulated at `GEARLASH_PHYSICS_RATE` at least.
     designs: (n, len(variables)); columns are controller variables (all of them) and gait
         variables (any of them, replacing the scenario's value).
     backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first
@@ -68,21 +80,24 @@ def simulate(
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
     kernel = _kernel(machine, backend)
+    if machine.has_gearlash:
+        physics_rate = max(physics_rate, GEARLASH_PHYSICS_RATE)
     substeps = round(physics_rate * CONTROL_PERIOD)
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
     setups: dict[int, WalkSetup] = {}
-    courses: dict[tuple[float, ...], _Course | None] = {}
+    courses: dict[tuple[float, ...], Callable[[Drive], WalkSetup] | None] = {}
     for index, row in enumerate(designs.tolist()):
         design = dict(zip(variables, row, strict=True))
         gait = {name: design.pop(name) for name in variables if name in GAIT_VARIABLE_NAMES}
         drive = CONTROLLERS[controller].compile(design)  # type: ignore[index]
         key = tuple(gait.values())
         if key not in courses:
-            courses[key] = _course(machine, kernel, with_gait(scenario, gait), 1.0 / physics_rate)
+            walked = with_gait(scenario, gait)
+            courses[key] = course_of(machine, kernel, walked, 1.0 / physics_rate, noise)
         course = courses[key]
         if course is not None:
-            setups[index] = course.driven_by(drive)
+            setups[index] = course(drive)
     results = kernel.walk(list(setups.values()), Coding.of(machine, substeps), log=log)
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
@@ -110,7 +125,11 @@ def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
 
 
 def check_reach(
-    scenario: Scenario, variables: Sequence[str], design: Sequence[float], *, robot: str
+    scenario: Scenario,
+    variables: Sequence[str],
+    design: Sequence[float],
+    *,
+    robot: RobotChoice,
 ) -> None:
     """Raise UnreachablePose if the gait of this design leaves the legs' reach in this scenario."""
     gait = {
@@ -121,7 +140,7 @@ def check_reach(
     require_reachable(load_robot(robot), with_gait(scenario, gait))
 
 
-def prepare(robot: str = "szabadka2", *, backend: Backend = "auto") -> str:
+def prepare(robot: RobotChoice = "szabadka2", *, backend: Backend = "auto") -> str:
     """Build (or find in the cache) the kernel; returns the backend in use, native or reference."""
     return _kernel(load_robot(robot), backend).backend
 
@@ -132,7 +151,10 @@ def lanes() -> int:
 
 
 def _check_arguments(
-    controller: str, variables: Sequence[str], designs: NDArray[np.float64], physics_rate: int
+    controller: str,
+    variables: Sequence[str],
+    designs: NDArray[np.float64],
+    physics_rate: int,
 ) -> None:
     if controller not in CONTROLLERS:
         raise SimulationInputError(
@@ -176,34 +198,42 @@ def _kernel(robot: Robot, backend: Backend) -> Kernel:
     return reference_kernel(robot)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Course:
-    """All of a walk but its drive: designs of one gait share it."""
+def course_of(
+    robot: Robot,
+    kernel: Kernel,
+    scenario: Scenario,
+    timestep: float,
+    noise: LinkNoise | None = None,
+) -> Callable[[Drive], WalkSetup] | None:
+    """All of a walk but its drive, which designs of one gait share.
 
-    start: NDArray[np.float64]
-    parameters: NDArray[np.float64]
-    desired: NDArray[np.int32]
-    fall_height: float
-
-    def driven_by(self, drive: Drive) -> WalkSetup:
-        return WalkSetup(self.start, self.parameters, self.desired, drive, self.fall_height)
-
-
-def _course(robot: Robot, kernel: Kernel, scenario: Scenario, timestep: float) -> _Course | None:
-    """None for a gait out of the legs' reach."""
+    None for a gait out of the legs' reach.
+    """
     trajectory = desired_angles(robot, scenario)
     if not trajectory.reachable:
         return None
+    ticks, n_joints = trajectory.angles.shape
+    body = body_of(robot, kernel.body)
+    mass = kernel.total_mass - kernel.body.mass + body.mass + scenario.load
+    weight = mass * -gravity_on(scenario.slope)[2]
     joints = trajectory.angles[0]
-    weight = (kernel.total_mass + scenario.load) * -gravity_on(scenario.slope)[2]
+    memory = np.zeros(kernel.memory)
+    if robot.has_gearlash:
+        memory[:n_joints] = joints
     codes = np.rint(trajectory.angles * robot.description.sensors.angle_counts)
-    return _Course(
-        start=np.concatenate(
-            [[0.0, 0.0, resting_height(robot, joints, weight), 0.0, 0.0, 0.0, 1.0], joints]
+    return partial(
+        WalkSetup,
+        np.concatenate(
+            [
+                [0.0, 0.0, resting_height(robot, joints, weight), 0.0, 0.0, 0.0, 1.0],
+                joints,
+            ]
         ),
-        parameters=pack_parameters(robot, kernel.body, scenario, timestep),
-        desired=codes.astype(np.int32),
+        memory,
+        pack_parameters(robot, body, scenario, timestep),
+        codes.astype(np.int32),
         fall_height=0.5 * scenario.withers,
+        push=None if noise is None else noise.torques(ticks, n_joints),
     )
 
 

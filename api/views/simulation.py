@@ -14,6 +14,7 @@ from api.views.evaluation import ScenarioResultView, scenario_results
 from services.optimizer.preference import Preference, geometric_mean, log_utilities
 from sim.kernel.observation import WalkLog
 from sim.outcome import Status
+from sim.robot import RobotVariant
 
 LOG_RATE: Final = 500
 """Rows of a log per second of simulated time [Hz]."""
@@ -26,6 +27,7 @@ _COLUMNS: Final[dict[str, tuple[str, str]]] = {
     "base_orientation": ("1", "orientation of the body in the world: quaternion x, y, z, w"),
     "base_velocity": ("m/s, rad/s", "velocity in the body frame: 3 linear, then 3 angular"),
     "joint_angle": ("rad", "angle of every joint"),
+    "motor_angle": ("rad", "angle of every joint at its encoder, before any gearlash"),
     "joint_velocity": ("rad/s", "angular velocity of every joint"),
     "desired_angle": ("rad", "desired angle of every joint"),
     "current": ("A", "motor current of every joint"),
@@ -85,7 +87,9 @@ class SimulatedScenarioView(ScenarioResultView):
 class SimulationView(View):
     """What one design is worth."""
 
-    robot: str = Field(description="Robot that walked.", examples=["szabadka2"])
+    robot: str | RobotVariant = Field(
+        description="Robot that walked, as it was asked for.", examples=["szabadka2"]
+    )
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
     design: dict[str, float] = Field(
         description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]
@@ -104,7 +108,7 @@ class SimulationView(View):
     def from_walks(
         cls,
         *,
-        robot: str,
+        robot: str | RobotVariant,
         controller: str,
         design: Mapping[str, float],
         preference: Preference,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.outcome import Outcome
+from sim.robot import RobotVariant
 from sim.scenario import Scenario
 
 
@@ -21,7 +22,7 @@ class EvaluationRequest:
     """
 
     job_id: str
-    robot: str
+    robot: str | RobotVariant
     controller: str
     scenarios: tuple[Scenario, ...]
     variables: tuple[str, ...]

@@ -10,7 +10,7 @@ from services.optimizer.design_space import DesignSpace
 from services.optimizer.optimizers.pso import PsoSettings
 from services.optimizer.preference import PREFERENCES, Preference, PreferenceName
 from sim.controllers import CONTROLLERS, ControllerName
-from sim.robot import RobotName
+from sim.robot import RobotName, RobotVariant
 from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, ScenarioName, find_scenario
 from sim.variables import Variable, VariableName
 
@@ -38,7 +38,11 @@ class JobSpec(BaseModel):
 
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
     name: str = Field(default="", max_length=200, description="For people; need not be unique.")
-    robot: RobotName = Field(default="szabadka2", description="Robot description to simulate.")
+    robot: RobotName | RobotVariant = Field(
+        default="szabadka2",
+        description="Robot to simulate, by name, or a variant with another law of friction or with"
+        " gearlash.",
+    )
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller to be tuned; see /v1/controllers."
     )

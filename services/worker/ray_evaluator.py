@@ -51,7 +51,7 @@ class RayEvaluator:
         try:
             # Compiling and starting processes take seconds each, and can be done side by side.
             simulate.prepare()
-            self._slots = self._link.dispatcher().slots
+            self._link.dispatcher()
         except BaseException:
             self._link.close()
             raise
@@ -59,7 +59,7 @@ class RayEvaluator:
     @property
     def slots(self) -> int:
         """See `Evaluator.slots`."""
-        return self._slots
+        return self._link.dispatcher().slots
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
@@ -82,7 +82,6 @@ class RayEvaluator:
             if not self._link.alive:
                 self._link.close()
                 self._link = _Link(self._address, self._cpus)
-                self._slots = self._link.dispatcher().slots
             return self._link.dispatcher()
 
 
@@ -179,6 +178,10 @@ class _Pump:
         self._misses = 0 if self._session.head_answers() else self._misses + 1
         if self._misses >= 3:
             raise EvaluatorUnavailable("the head of the cluster does not answer")
+        if not self._misses:
+            # Nodes come and go.
+            self._dispatcher.slots = self._session.count_slots()
+            self._most = self._dispatcher.slots * _LOOK_AHEAD
 
     def _settle(self, reference: Any, work: Work) -> None:
         exceptions = self._ray.exceptions

@@ -55,6 +55,12 @@ class RaySession:
     head: tuple[str, int] | None
     directory: Path | None = None
 
+    def count_slots(self) -> int:
+        """CPUs that the cluster has now; nodes come and go."""
+        if self.directory is None:
+            self.slots = max(int(self.ray.cluster_resources().get("CPU", 0)), 1)
+        return self.slots
+
     def head_answers(self) -> bool:
         """Whether the control service takes connections.
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sim import simulate
 from sim.errors import SimulationError
 from sim.outcome import Outcome
+from sim.robot import RobotVariant
 from sim.scenario import Scenario
 
 
@@ -18,7 +19,7 @@ from sim.scenario import Scenario
 class Task:
     """Some designs in one scenario. designs: (n, len(variables))."""
 
-    robot: str
+    robot: str | RobotVariant
     controller: str
     scenario: Scenario
     variables: tuple[str, ...]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -11,30 +11,39 @@ from numpy.typing import NDArray
 
 from sim.variables import Variable
 
-ERROR_BITS = 10
-CURRENT_BITS = 6
-TABLE_SHAPE = (1 << ERROR_BITS, 1 << CURRENT_BITS)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LookupTable:
+    """A quantised function of error, current and velocity error, as the microcontroller has it.
+
+    values: (n_error, n_current, n_velocity) int8, each a power of two, 1 for an input that does
+    not matter. Gains have 16 fractional bits and shifts round half up; indices clamp:
+    i_error = n_error / 2 + (error * error_gain) >> 16, i_current = (current * current_gain) >> 16,
+    i_velocity = n_velocity / 2 + (change * velocity_gain) >> 16, where change is the error's over
+    one tick. The output is value * output_gain.
+    """
+
+    values: NDArray[np.int8]
+    output_gain: int
+    error_gain: int
+    current_gain: int
+    velocity_gain: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A controller as the microcontroller runs it: integers only.
+    """A controller as it runs on the robot: integers only, errors and PWM in coded counts.
 
-    Proportional part in PWM counts: (table[i_e, i_c] * output_gain) >> 16 where the table is
-    given, else (error * proportional_gain) >> 16. Integral part: the sum over ticks of
-    (error * integral_gain), clamped to the PWM range, >> 20. Shifts round half up.
-
-    table: (1024, 64) int8, or None.
-    error_gain, current_gain: index scale, 16 fractional bits: i_e = 512 + (error * error_gain)
-        >> 16, i_c = (current * current_gain) >> 16, each clamped to the table.
+    Direct part, >> 16: error * proportional_gain + change * derivative_gain + `direct` table's
+    output. Integral part: the sum over ticks of error * integral_gain + `integrated` table's
+    output, clamped to the PWM's range, >> 20. change: the error's over one tick.
     """
 
     proportional_gain: int = 0
     integral_gain: int = 0
-    table: NDArray[np.int8] | None = field(default=None, repr=False)
-    error_gain: int = 0
-    current_gain: int = 0
-    output_gain: int = 0
+    derivative_gain: int = 0
+    direct: LookupTable | None = None
+    integrated: LookupTable | None = None
 
 
 class Controller(Protocol):

@@ -18,6 +18,10 @@ CONTROL_PERIOD: Final = 0.002
 """One control tick [s]."""
 
 
+CURRENT_COUNTS: Final = 2079.0
+"""Code of one ampere [counts/A], table 4.4."""
+
+
 def required(design: Mapping[str, float], name: str, *, low: float, high: float) -> float:
     """A design's value, checked against what the controller can represent."""
     try:
@@ -31,6 +35,14 @@ def required(design: Mapping[str, float], name: str, *, low: float, high: float)
     if not low <= value <= high:
         raise SimulationInputError(f"{name}: {value:g} is outside [{low:g}, {high:g}]")
     return value
+
+
+def required_integer(design: Mapping[str, float], name: str, *, low: int, high: int) -> int:
+    """A design's whole value."""
+    value = required(design, name, low=low, high=high)
+    if not value.is_integer():
+        raise SimulationInputError(f"{name}: {value:g} is not a whole number {low} to {high}")
+    return int(value)
 
 
 def to_fixed(value: float, fraction_bits: int) -> int:

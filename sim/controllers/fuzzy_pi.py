@@ -15,15 +15,20 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import CURRENT_BITS, ERROR_BITS, Drive
-from sim.controllers.fixed_point import FRACTION_BITS, integral_gain, required, to_fixed
+from sim.controllers.base import Drive, LookupTable
+from sim.controllers.fixed_point import (
+    FRACTION_BITS,
+    integral_gain,
+    required,
+    required_integer,
+    to_fixed,
+)
 from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
-from sim.controllers.native_inference import infer
-from sim.errors import SimulationInputError
+from sim.controllers.quantisation import OUTPUT_SCALE, Axis, quantised
 from sim.variables import Variable
 
-OUTPUT_SCALE: Final = 127
-"""Table value of the full output range."""
+ERROR: Final = Axis(bits=10, centred=True)
+CURRENT: Final = Axis(bits=6, centred=False)
 
 _ERROR_SETS: Final = {
     "negative": FuzzySet(-1.0, 1.0),
@@ -54,33 +59,13 @@ def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Sh
     return Mamdani(inputs, _OUTPUT_SETS, rules, shape)
 
 
-def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1) -> int:
-    """Memory of a lookup table, eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits)."""
-    return outputs * output_bits * (1 << sum(input_bits)) // 8
-
-
-def table_axes() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Normalised error (1024,) and current (64,) that the table's rows and columns stand for.
-
-    Zero error falls on row 512, so rows are symmetric about it and row 0 repeats row 1.
-    """
-    half = 1 << (ERROR_BITS - 1)
-    error = np.maximum(np.arange(-half, half) / (half - 1), -1.0)
-    current = np.arange(1 << CURRENT_BITS) / ((1 << CURRENT_BITS) - 1)
-    return error, current
-
-
 @lru_cache(maxsize=256)
 def quantised_table(
     fw1: float, fw23: float, fw4: float, fw56: float, shape: Shape
 ) -> NDArray[np.int8]:
-    """The inference on the table's grid in 1/127ths of the output range, (1024, 64), read-only."""
+    """The inference on the axes' grid in 1/127ths of the output range, (1024, 64), read-only."""
     system = inference_system(fw1, fw23, fw4, fw56, shape)
-    error, current = table_axes()
-    crisp = infer(system, {"error": error, "current": current})
-    table = np.rint(crisp * OUTPUT_SCALE).astype(np.int8)
-    table.flags.writeable = False
-    return table
+    return quantised(system, {"error": ERROR, "current": CURRENT})
 
 
 class FuzzyPi:
@@ -100,13 +85,25 @@ class FuzzyPi:
             description="Gain of the integrator.",
         ),
         Variable(
-            name="FI1R", low=1500, high=6000, unit="counts", description="Range of the angle error."
+            name="FI1R",
+            low=1500,
+            high=6000,
+            unit="counts",
+            description="Range of the angle error.",
         ),
         Variable(
-            name="FI2R", low=6000, high=24000, unit="counts", description="Range of the current."
+            name="FI2R",
+            low=6000,
+            high=24000,
+            unit="counts",
+            description="Range of the current.",
         ),
         Variable(
-            name="FOR", low=500, high=2000, unit="PWM counts", description="Range of the output."
+            name="FOR",
+            low=500,
+            high=2000,
+            unit="PWM counts",
+            description="Range of the output.",
         ),
         Variable(
             name="FOMF",
@@ -118,7 +115,10 @@ class FuzzyPi:
         ),
         Variable(name="FW1", low=0.1, high=1.0, description="Weight of rule 1: zero -> null."),
         Variable(
-            name="FW23", low=0.1, high=1.0, description="Weight of rules 2, 3: follow the error."
+            name="FW23",
+            low=0.1,
+            high=1.0,
+            description="Weight of rules 2, 3: follow the error.",
         ),
         Variable(
             name="FW4",
@@ -157,14 +157,14 @@ class FuzzyPi:
         current_range = required(design, "FI2R", low=64.0, high=65535.0)
         output_range = required(design, "FOR", low=1.0, high=32767.0)
         weights = [required(design, w, low=0.0, high=1.0) for w in ("FW1", "FW23", "FW4", "FW56")]
-        shape = required(design, "FOMF", low=1.0, high=3.0)
-        if not shape.is_integer():
-            raise SimulationInputError(f"FOMF: {shape:g} is not 1, 2 or 3")
+        shape = Shape(required_integer(design, "FOMF", low=1, high=3))
         fw1, fw23, fw4, fw56 = weights
         return Drive(
             integral_gain=integral_gain(required(design, "I", low=0.0, high=100.0)),
-            table=quantised_table(fw1, fw23, fw4, fw56, Shape(int(shape))),
-            error_gain=to_fixed(((1 << (ERROR_BITS - 1)) - 1) / error_range, FRACTION_BITS),
-            current_gain=to_fixed(((1 << CURRENT_BITS) - 1) / current_range, FRACTION_BITS),
-            output_gain=to_fixed(output_range / OUTPUT_SCALE, FRACTION_BITS),
+            direct=LookupTable(
+                values=quantised_table(fw1, fw23, fw4, fw56, shape)[:, :, np.newaxis],
+                output_gain=to_fixed(output_range / OUTPUT_SCALE, FRACTION_BITS),
+                error_gain=ERROR.gain(error_range),
+                current_gain=CURRENT.gain(current_range),
+            ),
         )

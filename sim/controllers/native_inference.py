@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, reduce
 from importlib import resources
 
 import numpy as np
@@ -17,11 +17,12 @@ _VECTORS_IN_A_BLOCK = 4
 
 
 def infer(system: Mamdani, grid: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Same arguments and same bits as `Mamdani.infer`, for systems of two inputs."""
-    outer, inner = system.degrees(grid)
+    """Same arguments and same bits as `Mamdani.infer`, for systems of two inputs or more."""
+    *firsts, inner = system.degrees(grid)
     library = _library()
     if library is None or inner.shape[1] % (_VECTORS_IN_A_BLOCK * target().lanes):
         return system.infer(grid)
+    outer = reduce(_both_hold, firsts)
     arrays = (
         np.ascontiguousarray(outer),
         np.ascontiguousarray(inner),
@@ -42,7 +43,12 @@ def infer(system: Mamdani, grid: Mapping[str, NDArray[np.float64]]) -> NDArray[n
         *(ctypes.c_int64(size) for size in sizes),
         *(ctypes.c_void_p(array.ctypes.data) for array in arrays),
     )
-    return arrays[-1]
+    return arrays[-1].reshape([len(values) for values in grid.values()])
+
+
+def _both_hold(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Degrees (rules, n) and (rules, m) over the product of their values: (rules, n m)."""
+    return np.minimum(a[:, :, np.newaxis], b[:, np.newaxis, :]).reshape(len(a), -1)
 
 
 @lru_cache(maxsize=1)

@@ -66,7 +66,8 @@ class Inertia:
         return Force(
             add(apply(self.linear, motion.linear), apply(self.coupling, motion.angular)),
             add(
-                apply(transpose(self.coupling), motion.linear), apply(self.angular, motion.angular)
+                apply(transpose(self.coupling), motion.linear),
+                apply(self.angular, motion.angular),
             ),
         )
 
@@ -150,11 +151,13 @@ class Link:
 class LinkState:
     """Where a link is and how it moves: what external forces may depend on.
 
-    up: the ground's normal in the link's frame; height: of the link's origin over ground [m].
+    up, ahead: the ground's normal and the world's x axis in the link's frame; height: of the
+    link's origin over ground [m].
     """
 
     velocity: Motion
     up: Vector
+    ahead: Vector
     height: Scalar
 
 
@@ -224,6 +227,7 @@ def kinematics(
                     add(apply(inverse, w), scale(rate, link.axis)),
                 ),
                 up=apply(inverse, parent.up),
+                ahead=apply(inverse, parent.ahead),
                 height=parent.height + dot(parent.up, link.offset),
             )
         )
@@ -260,7 +264,8 @@ def articulated_body(
         if k in external:
             applied = external[k]
             bias = Force(
-                subtract(bias.linear, applied.linear), subtract(bias.angular, applied.angular)
+                subtract(bias.linear, applied.linear),
+                subtract(bias.angular, applied.angular),
             )
         forces.append(bias)
 
@@ -271,7 +276,8 @@ def articulated_body(
         inertia, state = inertias[k], states[k]
         turning = scale(rate, link.axis)
         coriolis = Motion(
-            cross(state.velocity.linear, turning), cross(state.velocity.angular, turning)
+            cross(state.velocity.linear, turning),
+            cross(state.velocity.angular, turning),
         )
         column = Force(apply(inertia.coupling, link.axis), apply(inertia.angular, link.axis))
         pivot = invert(dot(link.axis, column.angular) + armature[k - 1])

@@ -1,41 +1,136 @@
-"""Ground contact of a point foot, law `linear_zone` (thesis 2.2.6, table 2.6)."""
+"""Ground contact of a point foot and its laws of friction (thesis 2.2.6).
+
+Each law is a function (foot, ground, memory, timestep) -> (force, memory after the step); memory is
+the state that a law carries from step to step, for most of them none.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from sim.kernel.articulated_body import Force, LinkState
 from sim.kernel.spatial import Scalar, Vector, add, cross, dot, scale
+from sim.robot.description import ContactLaw
+
+Memory = tuple[Scalar, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
-    """Parameters of one foot: see `sim.robot.description.Contact`."""
+class Foot:
+    """A foot in its link's frame.
 
-    stiffness: Scalar
-    damping: Scalar
-    sole: Scalar
-    friction: Scalar
-    slip_velocity: Scalar
-
-
-def linear_zone(ca: Any, link: LinkState, foot: Vector, ground: Ground) -> Force:
-    """Force of the ground on a link, in the link's frame.
-
-    foot: the tibia's end in the link's frame [m]; the sole's spring hangs below it, along the
-    ground's normal. F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling;
-    F_t = -mu F_z v / max(|v|, v_lin).
+    at: the tibia's end [m]; up, ahead, left: the world's axes; velocity [m/s], rising: its part
+    along `up`; normal: force of the ground's spring [N]; touching: 1 or 0.
     """
-    v = add(link.velocity.linear, cross(link.velocity.angular, foot))
-    penetration = ground.sole - (link.height + dot(link.up, foot))
-    rising = dot(link.up, v)
-    elastic = ground.stiffness * penetration - ground.damping * rising
-    normal = ca.fmax(elastic, 0.0) * (penetration > 0.0)
-    # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
-    slip = ca.sqrt(
-        ca.fmax(dot(v, v) - rising * rising, ground.slip_velocity * ground.slip_velocity)
+
+    at: Vector
+    up: Vector
+    ahead: Vector
+    left: Vector
+    velocity: Vector
+    rising: Scalar
+    normal: Scalar
+    touching: Scalar
+
+    def push(self, force: Vector) -> Force:
+        """A force at the foot as a spatial force on its link."""
+        return Force(force, cross(self.at, force))
+
+
+def foot_on_ground(ca: Any, link: LinkState, at: Vector, ground: Mapping[str, Scalar]) -> Foot:
+    """F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling.
+
+    The sole's spring hangs below the tibia's end along the ground's normal. ground: parameters of
+    the foot by the names of `sim.robot.description.Contact`.
+    """
+    velocity = add(link.velocity.linear, cross(link.velocity.angular, at))
+    penetration = ground["sole"] - (link.height + dot(link.up, at))
+    rising = dot(link.up, velocity)
+    touching = penetration > 0.0
+    elastic = ground["stiffness"] * penetration - ground["damping"] * rising
+    return Foot(
+        at=at,
+        up=link.up,
+        ahead=link.ahead,
+        left=cross(link.up, link.ahead),
+        velocity=velocity,
+        rising=rising,
+        normal=ca.fmax(elastic, 0.0) * touching,
+        touching=touching,
     )
-    drag = ground.friction * normal / slip
-    force = add(scale(normal + drag * rising, link.up), scale(-drag, v))
-    return Force(force, cross(foot, force))
+
+
+def linear_zone(
+    ca: Any, foot: Foot, ground: Mapping[str, Scalar], memory: Memory, timestep: Scalar
+) -> tuple[Force, Memory]:
+    """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6)."""
+    del memory, timestep
+    zone = ground["slip_velocity"]
+    # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
+    squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
+    slip = ca.sqrt(ca.fmax(squared, zone * zone))
+    drag = ground["friction"] * foot.normal / slip
+    force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
+    return foot.push(force), ()
+
+
+def karnopp(
+    ca: Any, foot: Foot, ground: Mapping[str, Scalar], memory: Memory, timestep: Scalar
+) -> tuple[Force, Memory]:
+    """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14)."""
+    del ca, memory, timestep
+    threshold, limit = ground["stick_velocity"], ground["friction"] * foot.normal
+    force = scale(foot.normal, foot.up)
+    for axis in (foot.ahead, foot.left):
+        speed = dot(axis, foot.velocity)
+        sign = (threshold < speed) - (speed < -threshold)
+        force = add(force, scale(-limit * sign, axis))
+    return foot.push(force), ()
+
+
+def stick(
+    ca: Any, foot: Foot, ground: Mapping[str, Scalar], memory: Memory, timestep: Scalar
+) -> tuple[Force, Memory]:
+    """Spring and damper along the ground from where the foot came down, saturated at mu F_z.
+
+    memory: the spring's elongation along the world's x and y [m]; it shrinks when the foot slips,
+    and is gone when it lifts off.
+    """
+    k, c = ground["stick_stiffness"], ground["stick_damping"]
+    stretched, wanted = [], []
+    for axis, elongation in zip((foot.ahead, foot.left), memory, strict=True):
+        speed = dot(axis, foot.velocity)
+        longer = (elongation + timestep * speed) * foot.touching
+        stretched.append(longer)
+        wanted.append(-(k * longer + c * speed))
+    limit = ground["friction"] * foot.normal
+    squared = wanted[0] * wanted[0] + wanted[1] * wanted[1]
+    # A foot in the air wants nothing and may have nothing: the bound keeps 0 / 0 away.
+    share = limit / ca.sqrt(ca.fmax(ca.fmax(squared, limit * limit), 1e-18))
+    force = scale(foot.normal, foot.up)
+    for axis, component in zip((foot.ahead, foot.left), wanted, strict=True):
+        force = add(force, scale(share * component, axis))
+    return foot.push(force), tuple(share * longer for longer in stretched)
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A law of friction. memory: numbers that it carries a foot; parameters: that it reads."""
+
+    force: Callable[..., tuple[Force, Memory]]
+    memory: int
+    parameters: Sequence[str]
+
+
+_NORMAL: Final = ("stiffness", "damping", "sole", "friction")
+
+LAWS: Final[Mapping[ContactLaw, Law]] = MappingProxyType(
+    {
+        "linear_zone": Law(linear_zone, 0, (*_NORMAL, "slip_velocity")),
+        "karnopp": Law(karnopp, 0, (*_NORMAL, "stick_velocity")),
+        "stick": Law(stick, 2, (*_NORMAL, "stick_stiffness", "stick_damping")),
+    }
+)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import hashlib
+import threading
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from importlib import metadata, resources
@@ -13,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.controllers.base import LookupTable
 from sim.kernel.parameters import BodyInertia, Layout
 from sim.kernel.walk import Coding, WalkResult, WalkSetup
 from sim.native.compilation import load_library, vector_header
@@ -28,6 +30,8 @@ _GENERATOR: Final = (
     "drive.py",
     "driver.c",
     "emit_c.py",
+    "gearlash.py",
+    "integration.py",
     "native.py",
     "parameters.py",
     "physics_step.py",
@@ -51,17 +55,31 @@ class _Coding(ctypes.Structure):
     ]
 
 
+class _Table(ctypes.Structure):
+    _fields_ = [
+        ("values", ctypes.c_void_p),
+        ("n_error", ctypes.c_int64),
+        ("n_current", ctypes.c_int64),
+        ("n_velocity", ctypes.c_int64),
+        ("error_gain", ctypes.c_int64),
+        ("current_gain", ctypes.c_int64),
+        ("velocity_gain", ctypes.c_int64),
+        ("output_gain", ctypes.c_int64),
+    ]
+
+
 class _Walker(ctypes.Structure):
     _fields_ = [
         ("q0", ctypes.c_void_p),
+        ("x0", ctypes.c_void_p),
         ("parameters", ctypes.c_void_p),
         ("desired", ctypes.c_void_p),
-        ("table", ctypes.c_void_p),
+        ("push", ctypes.c_void_p),
         ("proportional_gain", ctypes.c_int64),
         ("integral_gain", ctypes.c_int64),
-        ("error_gain", ctypes.c_int64),
-        ("current_gain", ctypes.c_int64),
-        ("output_gain", ctypes.c_int64),
+        ("derivative_gain", ctypes.c_int64),
+        ("direct", _Table),
+        ("integrated", _Table),
         ("ticks", ctypes.c_int64),
         ("fall_height", ctypes.c_double),
         ("fall_cosine", ctypes.c_double),
@@ -72,6 +90,30 @@ class _Walker(ctypes.Structure):
     ]
 
 
+class _Addresses:
+    """Addresses of arrays, which stay where they are as long as this object lives."""
+
+    def __init__(self) -> None:
+        self._kept: list[NDArray[Any]] = []
+
+    def of(self, array: NDArray[Any], dtype: Any) -> int:
+        contiguous = np.ascontiguousarray(array, dtype=dtype)
+        self._kept.append(contiguous)
+        return int(contiguous.ctypes.data)
+
+    def table(self, table: LookupTable | None) -> _Table:
+        if table is None:
+            return _Table()
+        return _Table(
+            self.of(table.values, np.int8),
+            *table.values.shape,
+            table.error_gain,
+            table.current_gain,
+            table.velocity_gain,
+            table.output_gain,
+        )
+
+
 class NativeKernel:
     """See `walk.Kernel`. The lock-step loop runs outside the interpreter's lock."""
 
@@ -79,14 +121,19 @@ class NativeKernel:
 
     def __init__(self, robot: Robot, library: ctypes.CDLL) -> None:
         self._library = library
-        self.layout = Layout(robot.n_joints, len(robot.legs))
+        self.layout = Layout(robot)
         self._n_q = 7 + robot.n_joints
         self.lanes = int(library.gaitswarm_lanes())
+        self.memory = int(library.gaitswarm_memory())
         self._log_width = int(library.gaitswarm_log_width())
         exported = np.array((ctypes.c_double * 14).in_dll(library, "gaitswarm_body"))
         self.total_mass = float(exported[13])
         self.body = BodyInertia(float(exported[0]), exported[1:4], exported[4:13].reshape(3, 3))
-        library.gaitswarm_walk.argtypes = [_pointer(_Walker), ctypes.c_int64, _pointer(_Coding)]
+        library.gaitswarm_walk.argtypes = [
+            _pointer(_Walker),
+            ctypes.c_int64,
+            _pointer(_Coding),
+        ]
         library.gaitswarm_walk.restype = None
 
     def walk(
@@ -97,24 +144,19 @@ class NativeKernel:
         sums, end = np.empty((n, _N_TERMS)), np.empty((n, self._n_q))
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
         walkers = (_Walker * n)()
-        kept: list[NDArray[Any]] = []
-
-        def address(array: NDArray[Any], dtype: Any) -> int:
-            contiguous = np.ascontiguousarray(array, dtype=dtype)
-            kept.append(contiguous)
-            return int(contiguous.ctypes.data)
-
+        addresses = _Addresses()
         for k, (walker, setup) in enumerate(zip(walkers, setups, strict=True)):
             drive, record = setup.drive, logs[k]
-            walker.q0 = address(setup.start, np.float64)
-            walker.parameters = address(setup.parameters, np.float64)
-            walker.desired = address(setup.desired, np.int32)
-            walker.table = None if drive.table is None else address(drive.table, np.int8)
+            walker.q0 = addresses.of(setup.start, np.float64)
+            walker.x0 = addresses.of(setup.memory, np.float64)
+            walker.parameters = addresses.of(setup.parameters, np.float64)
+            walker.desired = addresses.of(setup.desired, np.int32)
+            walker.push = None if setup.push is None else addresses.of(setup.push, np.float64)
             walker.proportional_gain = drive.proportional_gain
             walker.integral_gain = drive.integral_gain
-            walker.error_gain = drive.error_gain
-            walker.current_gain = drive.current_gain
-            walker.output_gain = drive.output_gain
+            walker.derivative_gain = drive.derivative_gain
+            walker.direct = addresses.table(drive.direct)
+            walker.integrated = addresses.table(drive.integrated)
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height
             walker.fall_cosine = setup.fall_cosine
@@ -128,33 +170,47 @@ class NativeKernel:
             for k, w in enumerate(walkers)
         )
 
-    def step(
-        self, q: Floats, v: Floats, duty: Floats, p: Floats
-    ) -> tuple[Floats, Floats, Floats, Floats]:
-        """The bare physics step of one walker: q', v', current, terms; for tests and benchmarks."""
-        outputs = (np.empty(len(q)), np.empty(len(v)), np.empty(len(duty)), np.empty(_N_TERMS))
-        inputs = [np.ascontiguousarray(x, dtype=np.float64) for x in (q, v, duty, p)]
-        self._library.gaitswarm_step(
-            *(x.ctypes.data_as(ctypes.c_void_p) for x in (*inputs, *outputs))
-        )
-        return outputs
+
+_loaded: Final[dict[bytes, NativeKernel | None]] = {}
+_loading: Final = threading.Lock()
 
 
-@lru_cache(maxsize=8)
 def native_kernel(robot: Robot) -> NativeKernel | None:
-    """The robot's kernel, compiled at first use; None on a machine without a C compiler."""
-    library = load_library(f"kernel-{robot.description.name}", _identity(robot), _source_of(robot))
-    return None if library is None else NativeKernel(robot, library)
+    """The robot's kernel, compiled at first use; None on a machine without a C compiler.
+
+    Robots that differ in run-time parameters only share one.
+    """
+    identity = _identity(robot)
+    with _loading:
+        if identity not in _loaded:
+            name = f"kernel-{robot.description.name}"
+            library = load_library(name, identity, _source_of(robot))
+            _loaded[identity] = None if library is None else NativeKernel(robot, library)
+        return _loaded[identity]
 
 
-def _identity(robot: Robot) -> bytes:
+@lru_cache(maxsize=1)
+def _generator() -> bytes:
+    """What the source of every robot's kernel depends on."""
     digest = hashlib.sha256(vector_header().encode())
     folder = resources.files("sim.kernel")
     for name in _GENERATOR:
         digest.update((folder / name).read_bytes())
-    digest.update(robot.urdf.encode())
-    digest.update(robot.description.model_dump_json().encode())
     digest.update(f"{metadata.version('casadi')} {metadata.version('pin')}".encode())
+    return digest.digest()
+
+
+def _identity(robot: Robot) -> bytes:
+    """All that the source depends on; run-time parameters are left out, so they share a kernel."""
+    digest = hashlib.sha256(_generator())
+    digest.update(robot.urdf.encode())
+    drives = robot.drives()
+    for array in (drives.torque, drives.resistance, drives.armature):
+        digest.update(array.tobytes())
+    if robot.has_gearlash:
+        digest.update(drives.shaft_stiffness.tobytes() + drives.shaft_damping.tobytes())
+    legs = [(*leg.joints, leg.foot) for leg in robot.description.legs]
+    digest.update(repr((legs, robot.description.contact_law, robot.has_gearlash)).encode())
     return digest.digest()
 
 
@@ -162,7 +218,7 @@ def _source_of(robot: Robot) -> Callable[[], str]:
     def source() -> str:
         # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
         from sim.kernel.emit_c import emit_c  # noqa: PLC0415
-        from sim.kernel.physics_step import physics_model  # noqa: PLC0415
+        from sim.kernel.physics_step import memory_size, physics_model  # noqa: PLC0415
 
         model = physics_model(robot)
         folder = resources.files("sim.kernel")
@@ -177,6 +233,8 @@ def _source_of(robot: Robot) -> Callable[[], str]:
             [
                 f"#define NJ {robot.n_joints}",
                 f"#define NP {model.layout.size}",
+                f"#define NX {memory_size(robot)}",
+                f"#define ENCODER(q, x) ({'(x)' if robot.has_gearlash else '(q) + 7'})",
                 vector_header(),
                 f"const double gaitswarm_body[14] = {{{numbers}}};",
                 emit_c(model.step, "step"),

@@ -18,7 +18,8 @@ class WalkLog:
 
     time (T,) [s]; base_position (T, 3) [m], base_orientation (T, 4) quaternion x y z w,
     base_velocity (T, 6) linear [m/s] and angular [rad/s] in the body frame;
-    joint_angle, desired_angle (T, J) [rad]; joint_velocity (T, J) [rad/s];
+    joint_angle, desired_angle (T, J) [rad]; motor_angle (T, J) [rad]: what the encoders see,
+    which differs from the link's with gearlash; joint_velocity (T, J) [rad/s];
     current (T, J) [A]; voltage (T, J) [V]; load_torque (T, J) [N m];
     foot_force (T, L, 3) [N], world frame; supply (T,) [V].
     """
@@ -28,6 +29,7 @@ class WalkLog:
     base_orientation: NDArray[np.float64]
     base_velocity: NDArray[np.float64]
     joint_angle: NDArray[np.float64]
+    motor_angle: NDArray[np.float64]
     joint_velocity: NDArray[np.float64]
     desired_angle: NDArray[np.float64]
     current: NDArray[np.float64]
@@ -47,16 +49,17 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
 
     observe = physics_model(robot).observe
     n, feet, ticks = robot.n_joints, len(robot.legs), len(states)
-    position, orientation, angle, twist, rate, _ = np.split(
-        states, np.cumsum([3, 4, n, 6, n]), axis=1
+    carried = len(setup.memory)
+    position, orientation, angle, twist, rate, memory, duty = np.split(
+        states, np.cumsum([3, 4, n, 6, n, carried]), axis=1
     )
     walked = int(np.isfinite(states).all(axis=1).sum())
     seen = [np.full((ticks, observe.numel_out(k)), np.nan) for k in range(5)]
     if walked:
-        rows = states[:walked].T
-        parts = observe.map(walked)(
-            rows[: 7 + n], rows[7 + n : 13 + 2 * n], rows[13 + 2 * n :], setup.parameters
-        )
+        push = np.zeros_like(angle) if setup.push is None else setup.push
+        q = np.concatenate([position, orientation, angle], axis=1)
+        inputs = (q, np.concatenate([twist, rate], axis=1), memory, duty, push)
+        parts = observe.map(walked)(*(part[:walked].T for part in inputs), setup.parameters)
         for target, part in zip(seen, parts, strict=False):
             target[:walked] = np.array(part).T
     current, voltage, load, force, supply = seen
@@ -66,6 +69,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         base_orientation=orientation,
         base_velocity=twist,
         joint_angle=angle,
+        motor_angle=memory[:, :n] if robot.has_gearlash else angle,
         joint_velocity=rate,
         desired_angle=setup.desired / robot.description.sensors.angle_counts,
         current=current,

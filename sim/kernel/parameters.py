@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.kernel.contact import LAWS
 from sim.robot import Robot
 from sim.scenario import Scenario
 
@@ -31,10 +32,13 @@ class Layout:
 
     field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
-    supply_resistance (1), and by foot stiffness, damping, sole, friction, slip_velocity (L each).
+    supply_resistance (1), gearlash (J, if the robot has any), and by foot (L each) the parameters
+    of the contact law.
     """
 
-    def __init__(self, n_joints: int, n_feet: int) -> None:
+    def __init__(self, robot: Robot) -> None:
+        n_joints, n_feet = robot.n_joints, len(robot.legs)
+        law = LAWS[robot.description.contact_law]
         lengths = {
             "timestep": 1,
             "gravity": 3,
@@ -44,11 +48,8 @@ class Layout:
             "viscous": n_joints,
             "supply_voltage": 1,
             "supply_resistance": 1,
-            "stiffness": n_feet,
-            "damping": n_feet,
-            "sole": n_feet,
-            "friction": n_feet,
-            "slip_velocity": n_feet,
+            "gearlash": n_joints if robot.has_gearlash else 0,
+            **dict.fromkeys(law.parameters, n_feet),
         }
         self.slices: dict[str, slice] = {}
         start = 0
@@ -67,19 +68,37 @@ class Layout:
         return packed
 
 
-def gravity_on(slope: float) -> Floats:
-    """Gravity (3,) [m/s2] in a world whose z axis is normal to ground rising by slope [deg]."""
-    angle = math.radians(slope)
-    return GRAVITY * np.array([-math.sin(angle), 0.0, -math.cos(angle)])
+def gravity_on(slope: float, direction: float = 0.0) -> Floats:
+    """Gravity (3,) [m/s2] in a world whose z axis is normal to the ground.
+
+    The ground rises by slope [deg] towards direction [deg], counted from x to y.
+    """
+    angle, towards = math.radians(slope), math.radians(direction)
+    along = -GRAVITY * math.sin(angle)
+    return np.array(
+        [
+            along * math.cos(towards),
+            along * math.sin(towards),
+            -GRAVITY * math.cos(angle),
+        ]
+    )
+
+
+def body_of(robot: Robot, urdf_body: BodyInertia) -> BodyInertia:
+    """The body with the description's own mass, if it has one; its shape stays."""
+    mass = robot.description.body_mass
+    if mass is None:
+        return urdf_body
+    return BodyInertia(mass, urdf_body.centre, urdf_body.rotational * (mass / urdf_body.mass))
 
 
 def pack_parameters(robot: Robot, body: BodyInertia, scenario: Scenario, timestep: float) -> Floats:
     """The kernel's parameters for one robot in one scenario, (Layout.size,).
 
-    A load is a point mass at `load_height` over the body's centre.
+    body: see `body_of`. A load is a point mass at `load_height` over the body's centre.
     """
     d = robot.description
-    contacts = robot.contacts()
+    drives, contacts = robot.drives(), robot.contacts()
     at = np.array([0.0, 0.0, d.load_height])
     inertia = (
         body.rotational
@@ -88,17 +107,18 @@ def pack_parameters(robot: Robot, body: BodyInertia, scenario: Scenario, timeste
     )
     by_foot = {
         name: np.array([getattr(contact, name) for contact in contacts])
-        for name in ("stiffness", "damping", "sole", "friction", "slip_velocity")
+        for name in LAWS[d.contact_law].parameters
     }
-    return Layout(robot.n_joints, len(robot.legs)).pack(
+    return Layout(robot).pack(
         timestep=timestep,
-        gravity=gravity_on(scenario.slope),
+        gravity=gravity_on(scenario.slope, scenario.slope_direction),
         base_mass=body.mass + scenario.load,
         base_moment=body.mass * body.centre + scenario.load * at,
         base_inertia=inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
-        viscous=robot.drives().viscous,
+        viscous=drives.viscous,
         supply_voltage=d.supply.voltage,
         supply_resistance=d.supply.resistance,
+        gearlash=drives.gearlash if robot.has_gearlash else np.empty(0),
         **by_foot,
     )
 

@@ -12,17 +12,17 @@ import numpy as np
 from sim.kernel.articulated_body import (
     BASE,
     Acceleration,
-    Force,
     Inertia,
-    Link,
     LinkState,
     Motion,
     articulated_body,
     kinematics,
     links_of,
 )
-from sim.kernel.contact import Ground, linear_zone
+from sim.kernel.contact import LAWS, Foot, Memory, foot_on_ground
 from sim.kernel.drive import Electrical, electrical
+from sim.kernel.gearlash import shaft_torque
+from sim.kernel.integration import integrated
 from sim.kernel.parameters import BodyInertia, Layout
 from sim.kernel.spatial import (
     Matrix,
@@ -32,27 +32,40 @@ from sim.kernel.spatial import (
     apply,
     cross,
     dot,
-    multiply,
     rotation_of,
     transpose,
     vector,
 )
 from sim.robot import Robot
 
-TERMS: Final = ("torque", "acceleration", "angular_acceleration", "power", "forward_speed")
+TERMS: Final = (
+    "torque",
+    "acceleration",
+    "angular_acceleration",
+    "power",
+    "forward_speed",
+)
 """Rates that the driver accumulates: squared gear torque sum [N2 m2], squared accelerations
 [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]."""
+
+
+def memory_size(robot: Robot) -> int:
+    """Numbers that a walk carries beside q and v: motors behind gearlash, then feet (`stick`)."""
+    motors = 2 * robot.n_joints if robot.has_gearlash else 0
+    return motors + LAWS[robot.description.contact_law].memory * len(robot.legs)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicsModel:
     """CasADi functions of one robot, and the body's own inertia.
 
-    step: (q, v, duty, p) -> (q', v', current, terms); observe: (q, v, duty, p) ->
+    step: (q, v, x, duty, push, p) -> (q', v', x', current, terms); observe: the same inputs ->
     (current (J), voltage (J), load torque (J), foot force (3 L) in the world, supply (1),
     acceleration (6+J) as `pinocchio.aba` gives it).
     q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its own frame,
-    joint rates; duty (J): motor voltage per supply voltage; p: see `parameters.Layout`.
+    joint rates; x (memory_size): with gearlash the motors' angles (J) [rad] and rates (J) [rad/s]
+    at the gearhead's output, with `stick` two elongations [m] a foot; duty (J): motor voltage per
+    supply voltage; push (J): disturbing torque on each link [N m]; p: see `parameters.Layout`.
     """
 
     step: Any
@@ -66,18 +79,23 @@ class PhysicsModel:
 class _Symbols:
     q: list[Scalar]
     v: list[Scalar]
+    memory: list[Scalar]
     duty: list[Scalar]
+    push: list[Scalar]
     p: dict[str, list[Scalar]]
     inputs: tuple[Any, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class _Dynamics:
+    """loads: torque that each gearhead passes to its link (J); memory: x after the step."""
+
     attitude: Matrix
     electrical: Electrical
-    feet: dict[int, Force]
-    axes: list[Matrix]
+    loads: Sequence[Scalar]
+    foot_forces: Sequence[Scalar]
     acceleration: Acceleration
+    memory: Sequence[Scalar]
 
 
 @lru_cache(maxsize=8)
@@ -87,11 +105,28 @@ def physics_model(robot: Robot) -> PhysicsModel:
     import pinocchio as pin  # noqa: PLC0415
 
     model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
-    layout = Layout(robot.n_joints, len(robot.legs))
-    s = _symbols(ca, robot.n_joints, layout)
-    dynamics = _dynamics(ca, robot, model, s)
-    step = [*_integrate(s, dynamics), *_measures(ca, robot, s, dynamics)]
-    observe = _observations(robot, dynamics)
+    layout = Layout(robot)
+    s = _symbols(ca, robot, layout)
+    d = _dynamics(ca, robot, model, s)
+    rates = [
+        *d.acceleration.base.linear,
+        *d.acceleration.base.angular,
+        *d.acceleration.joints,
+    ]
+    step = [
+        *integrated(s.q, s.v, rates, d.attitude, s.p["timestep"][0]),
+        list(d.memory),
+        list(d.electrical.currents),
+        _terms(ca, s, d),
+    ]
+    observe = [
+        list(d.electrical.currents),
+        list(d.electrical.voltages),
+        list(d.loads),
+        list(d.foot_forces),
+        [d.electrical.supply],
+        rates,
+    ]
     own = model.inertias[BASE]
     return PhysicsModel(
         step=_function(ca, "step", s, step),
@@ -102,45 +137,38 @@ def physics_model(robot: Robot) -> PhysicsModel:
     )
 
 
-def _symbols(ca: Any, n_joints: int, layout: Layout) -> _Symbols:
-    inputs = (
-        ca.SX.sym("q", 7 + n_joints),
-        ca.SX.sym("v", 6 + n_joints),
-        ca.SX.sym("duty", n_joints),
-        ca.SX.sym("p", layout.size),
-    )
-    q, v, duty, p = ([x[k] for k in range(x.numel())] for x in inputs)
+def _symbols(ca: Any, robot: Robot, layout: Layout) -> _Symbols:
+    n = robot.n_joints
+    sizes = {
+        "q": 7 + n,
+        "v": 6 + n,
+        "x": memory_size(robot),
+        "duty": n,
+        "push": n,
+        "p": layout.size,
+    }
+    inputs = tuple(ca.SX.sym(name, size) for name, size in sizes.items())
+    q, v, x, duty, push, p = ([s[k] for k in range(s.numel())] for s in inputs)
     fields = {name: p[where] for name, where in layout.slices.items()}
-    return _Symbols(q, v, duty, fields, inputs)
+    return _Symbols(q, v, x, duty, push, fields, inputs)
 
 
 def _dynamics(ca: Any, robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
+    """Kinematics, then the forces of drives and ground, then accelerations."""
     links = links_of(model, robot.joint_names)
     attitude = rotation_of(s.q[3:7])
-    rates = s.v[6:]
+    angles, rates = s.q[7:], s.v[6:]
     base = LinkState(
-        velocity=Motion(_triple(s.v[0:3]), _triple(s.v[3:6])), up=attitude[2], height=s.q[2]
+        velocity=Motion(_triple(s.v[0:3]), _triple(s.v[3:6])),
+        up=attitude[2],
+        ahead=attitude[0],
+        height=s.q[2],
     )
-    angles = s.q[7:]
     states, rotations = kinematics(
         links, base, [ca.sin(x) for x in angles], [ca.cos(x) for x in angles], rates
     )
-    drive = robot.drives()
-    motors = electrical(
-        drive, s.duty, rates, s.p["viscous"], s.p["supply_voltage"][0], s.p["supply_resistance"][0]
-    )
-    feet, axes = {}, []
-    for n, leg in enumerate(robot.description.legs):
-        frame = model.frames[model.getFrameId(leg.foot)]
-        index = 1 + robot.joint_names.index(model.names[frame.parentJoint])
-        ground = Ground(
-            *(
-                s.p[name][n]
-                for name in ("stiffness", "damping", "sole", "friction", "slip_velocity")
-            )
-        )
-        feet[index] = linear_zone(ca, states[index], vector(frame.placement.translation), ground)
-        axes.append(_to_world(attitude, index, links, rotations))
+    drive = _drive(ca, robot, s)
+    feet, pushes, memory = _feet(ca, robot, model, s, states)
     xx, yy, zz, xy, xz, yz = s.p["base_inertia"]
     acceleration = articulated_body(
         links,
@@ -152,51 +180,105 @@ def _dynamics(ca: Any, robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
         states,
         rotations,
         rates,
-        motors.torques,
-        drive.armature.tolist(),
-        feet,
-        _to_body(attitude, _triple(s.p["gravity"])),
+        drive.torques,
+        drive.armature,
+        pushes,
+        apply(transpose(attitude), _triple(s.p["gravity"])),
     )
-    return _Dynamics(attitude, motors, feet, axes, acceleration)
+    return _Dynamics(
+        attitude,
+        drive.electrical,
+        # M_L = r K_M I - B omega - J r^2 domega; behind gearlash the rotor is not in the joint.
+        [
+            torque - inertia * joint
+            for torque, inertia, joint in zip(
+                drive.torques, drive.armature, acceleration.joints, strict=True
+            )
+        ],
+        [
+            dot(axis, force.linear)
+            for foot, force in zip(feet, pushes.values(), strict=True)
+            for axis in (foot.ahead, foot.left, foot.up)
+        ],
+        acceleration,
+        [*drive.memory, *memory],
+    )
 
 
-def _integrate(s: _Symbols, d: _Dynamics) -> list[list[Scalar]]:
-    """Semi-implicit Euler: velocities first, then positions with the new velocities."""
-    dt = s.p["timestep"][0]
-    rates = [*d.acceleration.base.linear, *d.acceleration.base.angular, *d.acceleration.joints]
-    v = [old + dt * rate for old, rate in zip(s.v, rates, strict=True)]
-    position = add(_triple(s.q[0:3]), apply(d.attitude, _triple([dt * x for x in v[0:3]])))
-    quaternion = _turned(s.q[3:7], [dt * x for x in v[3:6]])
-    joints = [angle + dt * rate for angle, rate in zip(s.q[7:], v[6:], strict=True)]
-    return [[*position, *quaternion, *joints], v]
+@dataclass(frozen=True, slots=True)
+class _Drive:
+    """torques: on each link (J); armature: rotor inertia that turns with the link (J)."""
+
+    electrical: Electrical
+    torques: Sequence[Scalar]
+    armature: Sequence[float]
+    memory: Sequence[Scalar]
 
 
-def _turned(quaternion: Sequence[Scalar], turn: Sequence[Scalar]) -> list[Scalar]:
-    """Quaternion times the exponential of a small turn vector [rad], renormalised.
-
-    Series in the squared angle (2e-3 rad at 10 rad/s) exact to rounding; one Newton step
-    towards unit length instead of a square root.
-    """
-    x, y, z, w = quaternion
-    half = [0.5 * component for component in turn]
-    square = dot(_triple(half), _triple(half))
-    a, b, c = (component * (1.0 - square * (1.0 / 6.0)) for component in half)
-    e = 1.0 - square * (0.5 - square * (1.0 / 24.0))
-    product = [
-        w * a + x * e + y * c - z * b,
-        w * b - x * c + y * e + z * a,
-        w * c + x * b - y * a + z * e,
-        w * e - x * a - y * b - z * c,
+def _drive(ca: Any, robot: Robot, s: _Symbols) -> _Drive:
+    n, data = robot.n_joints, robot.drives()
+    rotors = s.memory[n : 2 * n] if robot.has_gearlash else s.v[6:]
+    motors = electrical(
+        data,
+        s.duty,
+        rotors,
+        s.p["viscous"],
+        s.p["supply_voltage"][0],
+        s.p["supply_resistance"][0],
+    )
+    if not robot.has_gearlash:
+        torques = [torque + push for torque, push in zip(motors.torques, s.push, strict=True)]
+        return _Drive(motors, torques, data.armature.tolist(), ())
+    shafts = [
+        shaft_torque(ca, motor - link, rotor - rate, play, stiffness, damping)
+        for motor, link, rotor, rate, play, stiffness, damping in zip(
+            s.memory[:n],
+            s.q[7:],
+            rotors,
+            s.v[6:],
+            s.p["gearlash"],
+            data.shaft_stiffness.tolist(),
+            data.shaft_damping.tolist(),
+            strict=True,
+        )
     ]
-    length = sum(component * component for component in product)
-    correction = 1.5 - 0.5 * length
-    return [component * correction for component in product]
+    dt = s.p["timestep"][0]
+    faster = [
+        rotor + dt * ((torque - shaft) * (1.0 / inertia))
+        for rotor, torque, shaft, inertia in zip(
+            rotors, motors.torques, shafts, data.armature.tolist(), strict=True
+        )
+    ]
+    further = [angle + dt * rotor for angle, rotor in zip(s.memory[:n], faster, strict=True)]
+    torques = [shaft + push for shaft, push in zip(shafts, s.push, strict=True)]
+    return _Drive(motors, torques, [0.0] * n, [*further, *faster])
 
 
-def _measures(ca: Any, robot: Robot, s: _Symbols, d: _Dynamics) -> list[list[Scalar]]:
-    """Currents, and the rates of TERMS at the state before the step."""
-    loads = _load_torques(robot.drives().armature.tolist(), d)
-    torque = sum(ca.fabs(load) for load in loads)
+def _feet(
+    ca: Any, robot: Robot, model: Any, s: _Symbols, states: Sequence[LinkState]
+) -> tuple[list[Foot], dict[int, Any], list[Scalar]]:
+    """Every foot, the ground's force on its link (by index of the link), and the law's memory."""
+    law = LAWS[robot.description.contact_law]
+    start = 2 * robot.n_joints if robot.has_gearlash else 0
+    feet: list[Foot] = []
+    forces: dict[int, Any] = {}
+    memory: list[Scalar] = []
+    for n, leg in enumerate(robot.description.legs):
+        frame = model.frames[model.getFrameId(leg.foot)]
+        index = 1 + robot.joint_names.index(model.names[frame.parentJoint])
+        ground = {name: s.p[name][n] for name in law.parameters}
+        foot = foot_on_ground(ca, states[index], vector(frame.placement.translation), ground)
+        begin = start + n * law.memory
+        before: Memory = tuple(s.memory[begin : begin + law.memory])
+        forces[index], after = law.force(ca, foot, ground, before, s.p["timestep"][0])
+        feet.append(foot)
+        memory += after
+    return feet, forces, memory
+
+
+def _terms(ca: Any, s: _Symbols, d: _Dynamics) -> list[Scalar]:
+    """The rates of TERMS at the state before the step."""
+    torque = sum(ca.fabs(load) for load in d.loads)
     v, w = _triple(s.v[0:3]), _triple(s.v[3:6])
     # The base's twist is in its own frame, so the material acceleration adds omega x v.
     linear = add(d.acceleration.base.linear, cross(w, v))
@@ -210,50 +292,7 @@ def _measures(ca: Any, robot: Robot, s: _Symbols, d: _Dynamics) -> list[list[Sca
     forward = (world[0] * ahead_x + world[1] * ahead_y) / ca.sqrt(
         ahead_x * ahead_x + ahead_y * ahead_y
     )
-    terms = [torque * torque, dot(linear, linear), dot(angular, angular), power, forward]
-    return [list(d.electrical.currents), terms]
-
-
-def _observations(robot: Robot, d: _Dynamics) -> list[list[Scalar]]:
-    forces = [
-        component
-        for axes, force in zip(d.axes, d.feet.values(), strict=True)
-        for component in apply(axes, force.linear)
-    ]
-    base = d.acceleration.base
-    return [
-        list(d.electrical.currents),
-        list(d.electrical.voltages),
-        _load_torques(robot.drives().armature.tolist(), d),
-        forces,
-        [d.electrical.supply],
-        [*base.linear, *base.angular, *d.acceleration.joints],
-    ]
-
-
-def _load_torques(armature: Sequence[float], d: _Dynamics) -> list[Scalar]:
-    """M_L = r K_M I - B omega - J r^2 domega: what the gearhead passes on to the link."""
-    return [
-        torque - inertia * joint
-        for torque, inertia, joint in zip(
-            d.electrical.torques, armature, d.acceleration.joints, strict=True
-        )
-    ]
-
-
-def _to_world(
-    attitude: Matrix, index: int, links: Sequence[Link], rotations: Sequence[Matrix]
-) -> Matrix:
-    chain = rotations[index - 1]
-    parent = links[index - 1].parent
-    while parent:
-        chain = multiply(rotations[parent - 1], chain)
-        parent = links[parent - 1].parent
-    return multiply(attitude, chain)
-
-
-def _to_body(attitude: Matrix, world: Vector) -> Vector:
-    return apply(transpose(attitude), world)
+    return [torque * torque, dot(linear, linear), dot(angular, angular), power, forward]
 
 
 def _triple(values: Sequence[Scalar]) -> Vector:

@@ -7,13 +7,14 @@ twin of driver.c; the physics agrees to rounding, the integer arithmetic exactly
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import TABLE_SHAPE, Drive
+from sim.controllers.base import Drive, LookupTable
 from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS
 from sim.kernel.physics_step import TERMS, PhysicsModel, physics_model
 from sim.kernel.walk import CODE_LIMIT, Coding, WalkResult, WalkSetup
@@ -30,9 +31,11 @@ class ReferenceKernel:
     backend: Final = "reference"
     lanes: Final = 1
 
-    def __init__(self, model: PhysicsModel) -> None:
+    def __init__(self, robot: Robot, model: PhysicsModel) -> None:
         self._model = model
+        self._has_gearlash = robot.has_gearlash
         self.layout = model.layout
+        self.memory = model.step.numel_in(2)
         self.body = model.body
         self.total_mass = model.total_mass
 
@@ -43,19 +46,20 @@ class ReferenceKernel:
         return tuple(self._walk(setup, coding, log=log) for setup in setups)
 
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
-        n_joints = setup.desired.shape[1]
-        step = Stepper(self._model.step, len(setup.start), n_joints, setup.parameters)
-        step.q[:] = setup.start
-        integral = np.zeros(n_joints, dtype=np.int64)
+        step = Stepper(self._model.step, setup)
+        past = _Past.of(setup.desired.shape[1])
         sums = np.zeros(len(TERMS))
         rows: list[Floats] = []
         status = Status.OK
-        for desired in setup.desired:
-            error, load = _read_sensors(step.q[7:], step.current, desired, coding)
-            output = _control(setup.drive, coding, error, load, integral)
+        for tick, desired in enumerate(setup.desired):
+            encoder = step.x[: len(desired)] if self._has_gearlash else step.q[7:]
+            error, load = _read_sensors(encoder, step.current, desired, coding)
+            output = _control(setup.drive, coding, error, load, past)
             step.duty[:] = output * coding.duty_per_count
+            if setup.push is not None:
+                step.push[:] = setup.push[tick]
             if log:
-                rows.append(np.concatenate([step.q, step.v, step.duty]))
+                rows.append(np.concatenate([step.q, step.v, step.x, step.duty]))
             for _ in range(coding.substeps):
                 step.advance()
                 sums += step.terms
@@ -68,22 +72,40 @@ class ReferenceKernel:
 class Stepper:
     """CasADi's step on fixed buffers: several times cheaper than calling the function."""
 
-    def __init__(self, function: Any, n_q: int, n_joints: int, parameters: Floats) -> None:
-        self.q, self.v = np.zeros(n_q), np.zeros(n_q - 1)
-        self.duty, self.parameters = np.zeros(n_joints), np.ascontiguousarray(parameters)
-        self.current, self.terms = np.zeros(n_joints), np.zeros(len(TERMS))
-        self._next_q, self._next_v = np.zeros(n_q), np.zeros(n_q - 1)
+    def __init__(self, function: Any, setup: WalkSetup) -> None:
+        n_joints = setup.desired.shape[1]
+        self.q, self.v = setup.start.copy(), np.zeros(6 + n_joints)
+        self.x, self.parameters = (
+            setup.memory.copy(),
+            np.ascontiguousarray(setup.parameters),
+        )
+        self.duty, self.push, self.current = (np.zeros(n_joints) for _ in range(3))
+        self.terms = np.zeros(len(TERMS))
+        self._after = [np.zeros_like(array) for array in (self.q, self.v, self.x)]
         self._buffer, self._evaluate = function.buffer()
-        for k, array in enumerate((self.q, self.v, self.duty, self.parameters)):
+        arguments = (self.q, self.v, self.x, self.duty, self.push, self.parameters)
+        for k, array in enumerate(arguments):
             self._buffer.set_arg(k, array.data)
-        for k, array in enumerate((self._next_q, self._next_v, self.current, self.terms)):
+        for k, array in enumerate((*self._after, self.current, self.terms)):
             self._buffer.set_res(k, array.data)
 
     def advance(self) -> None:
         """One physics step, in place."""
         self._evaluate()
-        self.q[:] = self._next_q
-        self.v[:] = self._next_v
+        for array, after in zip((self.q, self.v, self.x), self._after, strict=True):
+            array[:] = after
+
+
+@dataclass(slots=True)
+class _Past:
+    """What the controllers remember from tick to tick: (J,) each; no error before the first."""
+
+    integral: Ints
+    error: Ints | None = None
+
+    @classmethod
+    def of(cls, n_joints: int) -> _Past:
+        return cls(np.zeros(n_joints, dtype=np.int64))
 
 
 def _read_sensors(
@@ -96,22 +118,35 @@ def _read_sensors(
     return np.clip(error, -CODE_LIMIT, CODE_LIMIT), _coarsen(amperes, coding.current_step)
 
 
-def _control(drive: Drive, coding: Coding, error: Ints, load: Ints, integral: Ints) -> Ints:
-    """PWM counts (J,); the integral is updated in place (thesis 5.3)."""
-    if drive.table is None:
-        output = _descale(error * drive.proportional_gain, FRACTION_BITS)
-    else:
-        rows, columns = TABLE_SHAPE
-        row = _descale(error * drive.error_gain, FRACTION_BITS) + rows // 2
-        column = _descale(load * drive.current_gain, FRACTION_BITS)
-        entry = drive.table[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
-        output = _descale(entry.astype(np.int64) * drive.output_gain, FRACTION_BITS)
-    full = coding.pwm_counts << INTEGRAL_BITS
-    integral[:] = np.clip(integral + error * drive.integral_gain, -full, full)
-    limit = coding.pwm_counts
-    output = np.clip(output + _descale(integral, INTEGRAL_BITS), -limit, limit)
-    pwm: Ints = np.clip(_coarsen(output, coding.pwm_step), -limit, limit)
+def _control(drive: Drive, coding: Coding, error: Ints, load: Ints, past: _Past) -> Ints:
+    """PWM counts (J,); what is past is updated in place (thesis 5.3)."""
+    change = np.zeros_like(error) if past.error is None else error - past.error
+    direct = error * drive.proportional_gain + change * drive.derivative_gain
+    grown = past.integral + error * drive.integral_gain
+    if drive.direct is not None:
+        direct = direct + _look_up(drive.direct, error, load, change)
+    if drive.integrated is not None:
+        grown = grown + _look_up(drive.integrated, error, load, change)
+    full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
+    past.error, past.integral = error, np.clip(grown, -full, full)
+    output = _descale(direct, FRACTION_BITS) + _descale(past.integral, INTEGRAL_BITS)
+    coarse = _coarsen(np.clip(output, -limit, limit), coding.pwm_step)
+    pwm: Ints = np.clip(coarse, -limit, limit)
     return pwm
+
+
+def _look_up(table: LookupTable, error: Ints, load: Ints, change: Ints) -> Ints:
+    rows, columns, layers = table.values.shape
+    row = _descale(error * table.error_gain, FRACTION_BITS) + rows // 2
+    column = _descale(load * table.current_gain, FRACTION_BITS)
+    layer = _descale(change * table.velocity_gain, FRACTION_BITS) + layers // 2
+    entry = table.values[
+        np.clip(row, 0, rows - 1),
+        np.clip(column, 0, columns - 1),
+        np.clip(layer, 0, layers - 1),
+    ]
+    output: Ints = entry.astype(np.int64) * table.output_gain
+    return output
 
 
 def _status_of(q: Floats, v: Floats, setup: WalkSetup) -> Status:
@@ -150,4 +185,4 @@ def _padded(rows: list[Floats], ticks: int) -> Floats:
 @lru_cache(maxsize=8)
 def reference_kernel(robot: Robot) -> ReferenceKernel:
     """The robot's interpreter kernel."""
-    return ReferenceKernel(physics_model(robot))
+    return ReferenceKernel(robot, physics_model(robot))

@@ -53,16 +53,20 @@ class Coding:
 class WalkSetup:
     """One walk to be computed.
 
-    start (7+J,): initial q, at rest; parameters (P,), see `parameters.Layout`; desired (T, J)
-    int32 coded angles; fall_height [m] and fall_cosine: below either the robot has fallen.
+    start (7+J,): initial q, at rest; memory: initial x, see `physics_step.PhysicsModel`;
+    parameters (P,), see `parameters.Layout`; desired (T, J) int32 coded angles; push (T, J):
+    disturbing torques on the links [N m] or None; fall_height [m] and fall_cosine: below either
+    the robot has fallen.
     """
 
     start: Floats
+    memory: Floats
     parameters: Floats
     desired: NDArray[np.int32]
     drive: Drive
     fall_height: float
     fall_cosine: float = 0.5**0.5
+    push: Floats | None = None
 
     @property
     def ticks(self) -> int:
@@ -74,8 +78,8 @@ class WalkSetup:
 class WalkResult:
     """sums (5,): `physics_step.TERMS` summed over physics steps; end (7+J,): final q.
 
-    states (T, 7+J + 6+J + J): q, v and duty at every control tick after its control, NaN after an
-    early end; None if not asked for. `observation.observe` tells the rest.
+    states (T, 7+J + 6+J + X + J): q, v, x and duty at every control tick after its control, NaN
+    after an early end; None if not asked for. `observation.walk_log` tells the rest.
     """
 
     status: Status
@@ -102,6 +106,10 @@ class Kernel(Protocol):
     @property
     def total_mass(self) -> float:
         """Mass of the whole robot without load [kg]."""
+
+    @property
+    def memory(self) -> int:
+        """Numbers that a walk carries beside q and v: the length of `WalkSetup.memory`."""
 
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool

@@ -72,7 +72,10 @@ class Target:
 # Micro-architecture levels of the x86-64 ABI by the CPU flags that tell them. Named levels rather
 # than -march=native: one binary for all machines of a level, and the same bits on every level.
 _LEVELS: Final = (
-    ({"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}, Target(8, "x86-64-v4")),
+    (
+        {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
+        Target(8, "x86-64-v4"),
+    ),
     ({"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}, Target(4, "x86-64-v3")),
 )
 _PLAIN: Final = Target(2, "")

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from sim.robot.robot import Robot, parse_robot
+from sim.robot.variant import RobotName, RobotVariant, load_robot
 
-from sim.robot.robot import Robot, load_robot, parse_robot
-
-RobotName = Literal["szabadka2"]
-"""Robots that ship with gaitswarm."""
-
-__all__ = ["Robot", "RobotName", "load_robot", "parse_robot"]
+__all__ = ["Robot", "RobotName", "RobotVariant", "load_robot", "parse_robot"]

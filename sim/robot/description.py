@@ -6,6 +6,8 @@ say what they mean, in which unit, and what is refused.
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 JOINTS_PER_LEG = 3
@@ -41,6 +43,22 @@ class DriveTrain(_Data):
     motor: str
     gearhead: str
     bevel: float = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
+    gearlash: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=0.5,
+        description="play between gearhead and link, end to end [rad]",
+    )
+    shaft_stiffness: float = Field(
+        default=500.0,
+        gt=0.0,
+        description="of the closed play, only with gearlash [N m/rad]",
+    )
+    shaft_damping: float = Field(
+        default=0.5,
+        ge=0.0,
+        description="of the closed play, only with gearlash [N m s/rad]",
+    )
 
 
 class Supply(_Data):
@@ -70,14 +88,29 @@ class Sensors(_Data):
     current_step: int = Field(default=16, ge=1, description="resolution of the ADC [counts]")
 
 
+ContactLaw = Literal["linear_zone", "karnopp", "stick"]
+"""How a sole rubs on the ground; see `sim.kernel.contact`."""
+
+
 class Contact(_Data):
-    """Sole on ground (thesis 2.2.6): spring and damper, friction with a linear zone."""
+    """Sole on ground (thesis 2.2.6): spring and damper, and parameters of the friction laws."""
 
     stiffness: float = Field(gt=0.0, description="k [N/m]")
     damping: float = Field(ge=0.0, description="c [N s/m]")
     sole: float = Field(ge=0.0, description="length of the sole's spring below the tibia [m]")
     friction: float = Field(ge=0.0, description="mu [1]")
-    slip_velocity: float = Field(gt=0.0, description="v_lin: full friction from here on [m/s]")
+    slip_velocity: float = Field(
+        gt=0.0, description="linear_zone: v_lin, full friction from here on [m/s]"
+    )
+    stick_velocity: float = Field(
+        default=0.005, gt=0.0, description="karnopp: v_d, no friction below [m/s]"
+    )
+    stick_stiffness: float = Field(
+        default=10000.0, gt=0.0, description="stick: of the sole along the ground [N/m]"
+    )
+    stick_damping: float = Field(
+        default=100.0, ge=0.0, description="stick: of the sole along the ground [N s/m]"
+    )
 
 
 class Leg(_Data):
@@ -105,6 +138,12 @@ class RobotDescription(_Data):
     name: str
     description: str = ""
     load_height: float = Field(description="height of a load over the body's centre [m]")
+    contact_law: ContactLaw = Field(default="linear_zone", description="friction of all feet")
+    body_mass: float | None = Field(
+        default=None,
+        gt=0.0,
+        description="body's mass in place of the URDF's, its inertia scaled alike [kg]",
+    )
     motors: dict[str, Motor]
     gearheads: dict[str, Gearhead]
     drives: dict[str, DriveTrain]

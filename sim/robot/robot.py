@@ -44,7 +44,8 @@ class JointDrive:
 
     torque: r K_M [N m/A], also the back-EMF [V s/rad]; resistance [ohm]; inductance [H];
     armature: J_M r^2 [kg m2]; motor_friction: B_M r^2, gear_friction: B_G at eta = 0
-    [N m s/rad], to be multiplied by 1 - eta; efficiency: eta [1].
+    [N m s/rad], to be multiplied by 1 - eta; efficiency: eta [1]; gearlash: play, end to end
+    [rad]; shaft_stiffness [N m/rad] and shaft_damping [N m s/rad] of the closed play.
     """
 
     torque: Floats
@@ -54,6 +55,9 @@ class JointDrive:
     motor_friction: Floats
     gear_friction: Floats
     efficiency: Floats
+    gearlash: Floats
+    shaft_stiffness: Floats
+    shaft_damping: Floats
 
     @property
     def viscous(self) -> Floats:
@@ -79,6 +83,15 @@ class Robot:
         """J."""
         return JOINTS_PER_LEG * len(self.legs)
 
+    @property
+    def has_gearlash(self) -> bool:
+        """Motors and links move apart: any joint has play."""
+        return any(
+            self.description.drives[name].gearlash > 0.0
+            for leg in self.description.legs
+            for name in leg.drives
+        )
+
     def contacts(self) -> tuple[Contact, ...]:
         """Each foot's contact parameters, its own or the robot's."""
         return tuple(leg.contact or self.description.contact for leg in self.description.legs)
@@ -101,13 +114,16 @@ class Robot:
                         motor.viscous_friction * ratio**2,
                         gear.nominal_torque * gear.ratio / gear.nominal_speed * drive.bevel**2,
                         gear.efficiency,
+                        drive.gearlash,
+                        drive.shaft_stiffness,
+                        drive.shaft_damping,
                     )
                 )
         return JointDrive(*np.array(rows).T.copy())
 
 
 @lru_cache(maxsize=8)
-def load_robot(name: str) -> Robot:
+def shipped_robot(name: str) -> Robot:
     """A robot that ships with gaitswarm. Raises SimulationInputError for an unknown name."""
     if name not in SHIPPED:
         raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
@@ -129,7 +145,11 @@ def parse_robot(toml: str, urdf: str) -> Robot:
         where = ".".join(str(part) for part in first["loc"])
         raise RobotFileError(f"robot.toml: {where}: {first['msg']}") from error
     joints = _joint_origins(urdf)
-    return Robot(description, urdf, tuple(_geometry(leg.name, joints) for leg in description.legs))
+    return Robot(
+        description,
+        urdf,
+        tuple(_geometry(leg.name, joints) for leg in description.legs),
+    )
 
 
 def _joint_origins(urdf: str) -> dict[str, tuple[float, float, float]]:

@@ -68,7 +68,7 @@ def test_runs_what_is_queued_and_gives_back_what_it_has_not_finished(
     store = open_store(url)
     short, _ = store.create_job(spec(2))
     endless, _ = store.create_job(spec(1_000_000))
-    with runner(DATABASE_URL=url, CPUS="1") as started:
+    with runner(DB=url, CPUS="1") as started:
         eventually(lambda: store.job(short.id).state is JobState.SUCCEEDED)
         eventually(lambda: store.job(endless.id).progress.iterations > 0)
         started.send_signal(ending)
@@ -88,7 +88,7 @@ def test_a_setting_that_makes_no_sense_is_named(name: str, value: str) -> None:
 
 
 def test_a_database_out_of_reach_is_reported_without_a_traceback(tmp_path: Path) -> None:
-    with runner(DATABASE_URL=f"sqlite:///{tmp_path}/no/such/folder/jobs.db") as started:
+    with runner(DB=f"sqlite:///{tmp_path}/no/such/folder/jobs.db") as started:
         _, said = started.communicate(timeout=60)
     assert started.returncode == 69
     assert "Traceback" not in said and "no/such/folder" in said

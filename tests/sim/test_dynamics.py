@@ -101,8 +101,9 @@ def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
     for _ in range(1000):
         q, v = random_state(rng, robot.n_joints)
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
+        push = rng.normal(size=robot.n_joints)
         current, voltage, load, forces, battery, found = (
-            np.array(part).ravel() for part in model.observe(q, v, duty, p)
+            np.array(part).ravel() for part in model.observe(q, v, [], duty, push, p)
         )
         # The battery's equation, solved here by its fixed point instead of in closed form.
         assert battery[0] == pytest.approx(
@@ -111,7 +112,7 @@ def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
         expected = (duty * battery[0] - drive.torque * v[6:]) / drive.resistance
         np.testing.assert_allclose(current, expected, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(voltage, duty * battery[0], rtol=1e-12)
-        torque = drive.torque * current - drive.viscous * v[6:]
+        torque = drive.torque * current - drive.viscous * v[6:] + push
         external, world = oracle.contact_forces(q, v)
         touching += int((world[:, 2] > 0).any())
         tau = np.zeros(oracle.model.nv)
@@ -141,7 +142,8 @@ def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -
         q, v = random_state(rng, robot.n_joints)
         q[2] = 5.0
         current, *_, found = (
-            np.array(part).ravel() for part in model.observe(q, v, np.zeros(18), p)
+            np.array(part).ravel()
+            for part in model.observe(q, v, [], np.zeros(18), np.zeros(18), p)
         )
         tau = np.zeros(oracle.model.nv)
         tau[oracle.v_index[6:]] = drive.torque * current - drive.viscous * v[6:]
@@ -180,7 +182,8 @@ def energy_drift(robot: Robot, timestep: float) -> float:
 
     before = energy()
     for _ in range(round(0.2 / timestep)):
-        q, v, *_ = (np.array(part).ravel() for part in model.step(q, v, np.zeros(18), p))
+        still = np.zeros(18)
+        q, v, *_ = (np.array(part).ravel() for part in model.step(q, v, [], still, still, p))
     assert abs(np.linalg.norm(q[3:7]) - 1.0) < 1e-12
     return abs(energy() - before) / abs(before)
 

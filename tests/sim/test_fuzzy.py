@@ -9,9 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.controllers import CONTROLLERS
-from sim.controllers.fuzzy_pi import inference_system, quantised_table, table_axes, table_bytes
+from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
+from sim.controllers.fuzzy_pi_3 import integral_system
 from sim.controllers.mamdani import FuzzySet, Shape, output_points
 from sim.controllers.native_inference import infer
+from sim.controllers.quantisation import Axis, quantised, table_bytes
 
 WEIGHTS = st.floats(0.1, 1.0)
 
@@ -78,8 +80,7 @@ def test_where_no_rule_fires_the_output_is_the_middle_of_its_range() -> None:
 
 @pytest.mark.parametrize("shape", Shape)
 def test_compiled_inference_has_the_same_bits(shape: Shape) -> None:
-    error, current = table_axes()
-    grid = {"error": error, "current": current}
+    grid = {"error": ERROR.grid(), "current": CURRENT.grid()}
     system = inference_system(0.187, 0.961, 0.789, 0.927, shape)
     np.testing.assert_array_equal(infer(system, grid), system.infer(grid))
 
@@ -99,9 +100,8 @@ def test_high_current_reverses_the_drive() -> None:
 
 
 def test_quantisation_error_is_half_a_step() -> None:
-    error, current = table_axes()
     exact = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS).infer(
-        {"error": error, "current": current}
+        {"error": ERROR.grid(), "current": CURRENT.grid()}
     )
     table = quantised_table(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
     assert np.abs(exact - table / 127).max() <= 0.5 / 127 + 1e-12
@@ -112,14 +112,43 @@ def test_table_memory_follows_equation_5_1() -> None:
     assert table_bytes((8, 8), 8) == 64 * 1024
     assert table_bytes((6, 6, 6), 8, outputs=2) == 512 * 1024
     drive = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
-    assert drive.table is not None
-    assert drive.table.nbytes == table_bytes((10, 6), 8)
+    assert drive.direct is not None
+    assert drive.direct.values.nbytes == table_bytes((10, 6), 8)
 
 
 def test_drive_scales_are_those_of_the_ranges() -> None:
     drive = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
-    assert (5837 * drive.error_gain + (1 << 15)) >> 16 == 511
-    assert (20111 * drive.current_gain + (1 << 15)) >> 16 == 63
-    assert (127 * drive.output_gain + (1 << 15)) >> 16 == 781
+    table = drive.direct
+    assert table is not None
+    assert (5837 * table.error_gain + (1 << 15)) >> 16 == 511
+    assert (20111 * table.current_gain + (1 << 15)) >> 16 == 63
+    assert (127 * table.output_gain + (1 << 15)) >> 16 == 781
     # 0.171 PWM counts per count and second, at 500 Hz, in 20 fractional bits.
     assert drive.integral_gain == round(0.171 * 0.002 * 2**20)
+
+
+def test_a_table_of_three_inputs_is_its_inference() -> None:
+    """Chapter 3's integral part, every 17th cell inferred alone."""
+    system = integral_system(0.066, 0.996, 0.783, Shape.TRIANGLE)
+    axes = {"error": Axis(6, True), "current": Axis(4, False), "velocity": Axis(6, True)}
+    table = quantised(system, axes)
+    assert table.shape == (64, 16, 64)
+    cells = list(np.ndindex(table.shape))[::1717]
+    for cell in cells:
+        grid = {
+            name: axis.grid()[[index]]
+            for (name, axis), index in zip(axes.items(), cell, strict=True)
+        }
+        assert table[cell] == np.rint(127 * system.infer(grid)[0, 0, 0])
+
+
+def test_chapter_3s_rules_follow_error_and_velocity_and_yield_to_current() -> None:
+    drive = CONTROLLERS["fuzzy-pi-3"].compile(CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"])
+    assert drive.direct is not None
+    assert drive.integrated is not None
+    voltage, rate = drive.direct.values[:, :, 0].astype(int), drive.integrated.values.astype(int)
+    assert voltage[900, 0] > 0 > voltage[120, 0]
+    assert voltage[900, 63] < 0 < voltage[120, 63]
+    assert rate[32, 0, 60] > 0 > rate[32, 0, 4]
+    # The velocity's full range, reached within one tick of 2 ms, is the table's last layer.
+    assert (round(11682 * 0.002) * drive.integrated.velocity_gain + (1 << 15)) >> 16 == 31

@@ -16,8 +16,7 @@ from sim.kernel.walk import Coding, Kernel, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot, load_robot
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import PHYSICS_RATE, lanes, simulate
-from sim.simulate import _course as course_of
+from sim.simulate import PHYSICS_RATE, course_of, lanes, simulate
 
 FUZZY = CONTROLLERS["fuzzy-pi"]
 OPTIMUM = FUZZY.published["A"]
@@ -91,7 +90,7 @@ def test_a_log_does_not_change_the_walk() -> None:
 def _setup(robot: Robot, kernel: Kernel, scenario: Scenario) -> WalkSetup:
     course = course_of(robot, kernel, scenario, 1.0 / PHYSICS_RATE)
     assert course is not None
-    return course.driven_by(FUZZY.compile(OPTIMUM))
+    return course(FUZZY.compile(OPTIMUM))
 
 
 def _sums(kernel: Kernel, setups: Sequence[WalkSetup], robot: Robot) -> list[tuple[Status, bytes]]:

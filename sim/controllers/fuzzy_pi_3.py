@@ -1,0 +1,224 @@
+"""Fuzzy-PI of chapter 3: error, current and velocity error in, voltage and its integral out.
+
+Rule 1 speaks of both outputs. The voltage FzzP does not depend on the velocity error, so its table
+has two inputs; the integrated FzzI has three (thesis 3.3.2, fig. 3.5, table 3.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.base import Drive, LookupTable
+from sim.controllers.fixed_point import (
+    CONTROL_PERIOD,
+    CURRENT_COUNTS,
+    FRACTION_BITS,
+    INTEGRAL_BITS,
+    required,
+    required_integer,
+    to_fixed,
+)
+from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
+from sim.controllers.quantisation import OUTPUT_SCALE, Axis, quantised
+from sim.variables import Variable
+
+ERROR: Final = Axis(bits=10, centred=True)
+CURRENT: Final = Axis(bits=6, centred=False)
+COARSE_ERROR: Final = Axis(bits=6, centred=True)
+COARSE_CURRENT: Final = Axis(bits=4, centred=False)
+VELOCITY: Final = Axis(bits=6, centred=True)
+"""A range of 30 000 counts/s is 60 counts a tick, so 6 bits resolve all that can be measured."""
+
+_SIGNED: Final = {
+    "negative": FuzzySet(-1.0, 1.0),
+    "zero": FuzzySet(0.0, 1.0),
+    "positive": FuzzySet(1.0, 1.0),
+}
+_AMOUNT: Final = {"small": FuzzySet(0.0, 1.0), "large": FuzzySet(1.0, 1.0)}
+_OUTPUT: Final = {
+    "null": FuzzySet(0.0, 0.5),
+    "positive": FuzzySet(0.5, 0.5),
+    "negative": FuzzySet(-0.5, 0.5),
+}
+
+
+def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
+    """FzzP of angle error and current: rules 1 and 3 to 6."""
+    rules = (
+        Rule({"error": "zero"}, "null", w1),
+        Rule({"error": "positive"}, "positive", w34),
+        Rule({"error": "negative"}, "negative", w34),
+        Rule({"error": "positive", "current": "large"}, "negative", w56),
+        Rule({"error": "negative", "current": "large"}, "positive", w56),
+    )
+    return Mamdani({"error": _SIGNED, "current": _AMOUNT}, _OUTPUT, rules, shape)
+
+
+def integral_system(w1: float, w2: float, w78: float, shape: Shape) -> Mamdani:
+    """FzzI of angle error, current and velocity error: rules 1, 2, 7 and 8."""
+    rules = (
+        Rule({"error": "zero"}, "null", w1),
+        Rule({"velocity": "zero"}, "null", w2),
+        Rule({"velocity": "positive", "current": "small"}, "positive", w78),
+        Rule({"velocity": "negative", "current": "small"}, "negative", w78),
+    )
+    inputs = {"error": _SIGNED, "current": _AMOUNT, "velocity": _SIGNED}
+    return Mamdani(inputs, _OUTPUT, rules, shape)
+
+
+@lru_cache(maxsize=256)
+def _voltage_table(w1: float, w34: float, w56: float, shape: Shape) -> NDArray[np.int8]:
+    return quantised(voltage_system(w1, w34, w56, shape), {"error": ERROR, "current": CURRENT})
+
+
+@lru_cache(maxsize=256)
+def _integral_table(w1: float, w2: float, w78: float, shape: Shape) -> NDArray[np.int8]:
+    axes = {"error": COARSE_ERROR, "current": COARSE_CURRENT, "velocity": VELOCITY}
+    return quantised(integral_system(w1, w2, w78, shape), axes)
+
+
+class FuzzyPi3:
+    """See the module."""
+
+    name: Final = "fuzzy-pi-3"
+    description: Final = (
+        "Fuzzy-PI of chapter 3: voltage and integrated voltage by tables of angle error, motor"
+        " current and velocity error; tuned together with the gait in the thesis."
+    )
+    variables: Final = (
+        Variable(
+            name="A_ERR",
+            low=500,
+            high=10000,
+            unit="counts",
+            description="Range of the angle error",
+        ),
+        Variable(
+            name="I_MA",
+            low=1.0,
+            high=6.0,
+            unit="A",
+            description="Range of the current.",
+        ),
+        Variable(
+            name="V_ERR",
+            low=1000,
+            high=30000,
+            unit="counts/s",
+            description="Range of the velocity error.",
+        ),
+        Variable(
+            name="FzzP",
+            low=200,
+            high=5000,
+            unit="PWM counts",
+            description="Range of the voltage.",
+        ),
+        Variable(
+            name="FzzI",
+            low=500,
+            high=10000,
+            unit="PWM counts/s",
+            description="Range of the integrated voltage's rate.",
+        ),
+        Variable(
+            name="FzzP_MF",
+            low=1,
+            high=2,
+            kind="integer",
+            description="Membership functions of the voltage: 1 triangle, 2 Gauss.",
+        ),
+        Variable(
+            name="FzzI_MF",
+            low=1,
+            high=2,
+            kind="integer",
+            description="Membership functions of the integrated voltage: 1 triangle, 2 Gauss.",
+        ),
+        Variable(
+            name="W1",
+            low=0.0,
+            high=1.0,
+            description="Weight of rule 1: error zero -> null.",
+        ),
+        Variable(
+            name="W2",
+            low=0.0,
+            high=1.0,
+            description="Weight of rule 2: velocity zero -> null.",
+        ),
+        Variable(
+            name="W34",
+            low=0.0,
+            high=1.0,
+            description="Weight of rules 3, 4: follow the error.",
+        ),
+        Variable(
+            name="W56",
+            low=0.0,
+            high=1.0,
+            description="Weight of rules 5, 6: current large.",
+        ),
+        Variable(
+            name="W78",
+            low=0.0,
+            high=1.0,
+            description="Weight of rules 7, 8: follow the velocity.",
+        ),
+    )
+    published: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
+        {
+            "PSO-PS": MappingProxyType(
+                {
+                    "A_ERR": 5126.0,
+                    "I_MA": 4.4,
+                    "V_ERR": 11682.0,
+                    "FzzP": 2227.0,
+                    "FzzI": 2176.0,
+                    "FzzP_MF": 2.0,
+                    "FzzI_MF": 1.0,
+                    "W1": 0.066,
+                    "W2": 0.996,
+                    "W34": 0.215,
+                    "W56": 0.385,
+                    "W78": 0.783,
+                }
+            )
+        }
+    )
+
+    def compile(self, design: Mapping[str, float]) -> Drive:
+        """See `Controller.compile`."""
+        error_range = required(design, "A_ERR", low=64.0, high=65535.0)
+        current_range = required(design, "I_MA", low=0.1, high=30.0) * CURRENT_COUNTS
+        # The kernel's change of error is over one tick.
+        change_range = required(design, "V_ERR", low=100.0, high=1e7) * CONTROL_PERIOD
+        voltage_range = required(design, "FzzP", low=1.0, high=32767.0)
+        rate_range = required(design, "FzzI", low=1.0, high=1e6)
+        weights = [
+            required(design, w, low=0.0, high=1.0) for w in ("W1", "W2", "W34", "W56", "W78")
+        ]
+        w1, w2, w34, w56, w78 = weights
+        voltage_shape = Shape(required_integer(design, "FzzP_MF", low=1, high=3))
+        rate_shape = Shape(required_integer(design, "FzzI_MF", low=1, high=3))
+        return Drive(
+            direct=LookupTable(
+                values=_voltage_table(w1, w34, w56, voltage_shape)[:, :, np.newaxis],
+                output_gain=to_fixed(voltage_range / OUTPUT_SCALE, FRACTION_BITS),
+                error_gain=ERROR.gain(error_range),
+                current_gain=CURRENT.gain(current_range),
+            ),
+            integrated=LookupTable(
+                values=_integral_table(w1, w2, w78, rate_shape),
+                output_gain=to_fixed(rate_range * CONTROL_PERIOD / OUTPUT_SCALE, INTEGRAL_BITS),
+                error_gain=COARSE_ERROR.gain(error_range),
+                current_gain=COARSE_CURRENT.gain(current_range),
+                velocity_gain=VELOCITY.gain(change_range),
+            ),
+        )

@@ -1,0 +1,79 @@
+"""P, PI and PID controllers in coded units (thesis 2.2.2, 3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from sim.controllers.base import Drive
+from sim.controllers.fixed_point import (
+    CONTROL_PERIOD,
+    FRACTION_BITS,
+    integral_gain,
+    required,
+    to_fixed,
+)
+from sim.variables import Variable
+
+_P: Final = Variable(
+    name="P",
+    low=0.05,
+    high=1.0,
+    unit="PWM counts/count",
+    description="Proportional gain.",
+)
+_I: Final = Variable(
+    name="I",
+    low=0.0,
+    high=1.0,
+    unit="PWM counts/(count s)",
+    description="Integral gain.",
+)
+_D: Final = Variable(
+    name="D",
+    low=0.0,
+    high=0.02,
+    unit="PWM counts s/count",
+    description="Derivative gain.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LinearController:
+    """PWM = P error + I integral of error dt + D derivative of error; terms left out are zero."""
+
+    name: str
+    description: str
+    variables: tuple[Variable, ...]
+    published: Mapping[str, Mapping[str, float]]
+
+    def compile(self, design: Mapping[str, float]) -> Drive:
+        """See `Controller.compile`."""
+        gains = {v.name: required(design, v.name, low=0.0, high=100.0) for v in self.variables}
+        return Drive(
+            proportional_gain=to_fixed(gains["P"], FRACTION_BITS),
+            integral_gain=integral_gain(gains.get("I", 0.0)),
+            derivative_gain=to_fixed(gains.get("D", 0.0) / CONTROL_PERIOD, FRACTION_BITS),
+        )
+
+
+P: Final = LinearController(
+    "p",
+    "P on the angle error, in coded units (thesis 2.2.2); the robot's drive of 2011.",
+    (_P,),
+    MappingProxyType({"2011": MappingProxyType({"P": 0.25})}),
+)
+PI: Final = LinearController(
+    "pi",
+    "PI on the angle error, in coded units (thesis 2.2.2, 3.4).",
+    (_P, _I),
+    MappingProxyType({"validation": MappingProxyType({"P": 0.25, "I": 0.0})}),
+)
+PID: Final = LinearController(
+    "pid",
+    "PID on the angle error, in coded units (thesis 2.2.2, 3.4).",
+    (_P, _I, _D),
+    MappingProxyType({}),
+)

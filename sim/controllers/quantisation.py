@@ -1,0 +1,57 @@
+"""Fuzzy inference as lookup tables (thesis 5.3): axes, indices, 8-bit values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import FRACTION_BITS, to_fixed
+from sim.controllers.mamdani import Mamdani
+from sim.controllers.native_inference import infer
+
+OUTPUT_BITS: Final = 8
+OUTPUT_SCALE: Final = 127
+"""Table value of the full output range."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One input of a table. centred: about zero, as errors are; else from zero up, as currents."""
+
+    bits: int
+    centred: bool
+
+    def grid(self) -> NDArray[np.float64]:
+        """Shares of the input's range that the indices stand for, (2 ** bits,).
+
+        Zero falls on the middle index of a centred axis, so the first index repeats the second.
+        """
+        n = 1 << self.bits
+        if self.centred:
+            return np.maximum(np.arange(-n // 2, n // 2) / (n // 2 - 1), -1.0)
+        return np.arange(n) / (n - 1)
+
+    def gain(self, full_range: float) -> int:
+        """Fixed-point index per unit of an input with this range."""
+        n = 1 << self.bits
+        return to_fixed((n // 2 - 1 if self.centred else n - 1) / full_range, FRACTION_BITS)
+
+
+def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1) -> int:
+    """Memory of a lookup table, eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits)."""
+    return outputs * output_bits * (1 << sum(input_bits)) // 8
+
+
+def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> NDArray[np.int8]:
+    """The inference on the axes' grid in 1/127ths of the output range, read-only.
+
+    axes: by input of the system, in its order. Returns (2 ** bits of each axis).
+    """
+    crisp = infer(system, {name: axis.grid() for name, axis in axes.items()})
+    table = np.rint(crisp * OUTPUT_SCALE).astype(np.int8)
+    table.flags.writeable = False
+    return table

@@ -1,0 +1,182 @@
+"""Laws of friction, gearlash, noise, and slopes in any direction."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from sim.controllers import CONTROLLERS
+from sim.kernel.native import native_kernel
+from sim.kernel.observation import walk_log
+from sim.kernel.parameters import pack_parameters
+from sim.kernel.physics_step import memory_size, physics_model
+from sim.kernel.walk import Coding
+from sim.noise import LinkNoise
+from sim.outcome import Status
+from sim.robot import RobotVariant, load_robot
+from sim.robot.description import ContactLaw
+from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import course_of, simulate
+
+PI = np.array([[0.45, 0.1]])
+BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
+KARNOPP = RobotVariant(contact_law="karnopp")
+STICK = RobotVariant(contact_law="stick")
+LASH = RobotVariant(gearlash=(2.5, 1.0, 1.0))
+VARIANTS = pytest.mark.parametrize("variant", [KARNOPP, STICK, LASH], ids=str)
+
+
+@VARIANTS
+def test_kernels_agree_on_every_variant(variant: RobotVariant) -> None:
+    fast, slow = (
+        simulate(BRIEF, "pi", ["P", "I"], PI, robot=variant, backend=backend, log=True)
+        for backend in ("native", "reference")
+    )
+    assert fast.outcome.statuses.tolist() == slow.outcome.statuses.tolist() == [Status.OK]
+    np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-7)
+    ours, theirs = (run.logs[0] for run in (fast, slow))
+    assert ours is not None
+    assert theirs is not None
+    np.testing.assert_allclose(ours.motor_angle, theirs.motor_angle, atol=1e-9)
+
+
+@VARIANTS
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
+def test_every_variant_walks_every_scenario(variant: RobotVariant, scenario: Scenario) -> None:
+    outcome = simulate(scenario, "pi", ["P", "I"], PI, robot=variant).outcome
+    plain = simulate(scenario, "pi", ["P", "I"], PI).outcome
+    assert outcome.statuses.tolist() == [Status.OK]
+    assert outcome.objectives[0, 4] == pytest.approx(plain.objectives[0, 4], rel=0.1)
+    assert (outcome.objectives != plain.objectives).all()
+
+
+def test_karnopp_is_full_friction_against_each_axis_beyond_its_threshold() -> None:
+    robot = load_robot(KARNOPP)
+    model, rng = physics_model(robot), np.random.default_rng(2)
+    p = pack_parameters(robot, model.body, SCENARIOS[0], 2e-4)
+    still, seen = np.zeros(18), set()
+    for _ in range(50):
+        q = np.concatenate([[0, 0, 0.138, 0, 0, 0, 1], np.tile([0.0, -0.2, -1.6], 6)])
+        v = np.concatenate([rng.choice([0.0, 0.004, 0.3, -0.3], 2), np.zeros(22)])
+        forces = np.array(model.observe(q, v, [], still, still, p)[3]).reshape(6, 3)
+        sign = np.where(np.abs(v[:2]) > 0.005, np.sign(v[:2]), 0.0)
+        np.testing.assert_allclose(forces[:, :2], -np.outer(forces[:, 2], sign), atol=1e-9)
+        assert (forces[:, 2] > 0).all()
+        seen.add(tuple(sign))
+    assert len(seen) > 4
+
+
+def resting_creep(law: ContactLaw) -> float:
+    """Distance [m] that a robot standing on a slope of 20 degrees slides in the second second."""
+    robot = load_robot(RobotVariant(contact_law=law))
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    steep = SCENARIOS[0].model_copy(update={"slope": 20.0})
+    course = course_of(robot, kernel, steep, 2e-4)
+    assert course is not None
+    setup = course(CONTROLLERS["pi"].compile({"P": 1.0, "I": 1.0}))
+    still = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], 1000, axis=0))
+    (result,) = kernel.walk([still], Coding.of(robot, 10), log=True)
+    assert result.status is Status.OK
+    assert result.states is not None
+    log = walk_log(robot, still, result.states)
+    limit = log.foot_force[..., 2] + 1e-9
+    assert (np.hypot(log.foot_force[..., 0], log.foot_force[..., 1]) <= limit).all()
+    return float(np.linalg.norm(log.base_position[-1, :2] - log.base_position[500, :2]))
+
+
+def test_stick_holds_where_the_linear_zone_creeps() -> None:
+    creep, hold = resting_creep("linear_zone"), resting_creep("stick")
+    assert creep > 0.01
+    assert hold < 1e-3
+
+
+def test_gravity_of_a_slope_points_down_it() -> None:
+    ahead = SCENARIOS[0].model_copy(update={"slope": 10.0, "cycles": 1.0})
+    left = ahead.model_copy(update={"slope_direction": 90.0})
+    runs = [simulate(s, "pi", ["P", "I"], PI, log=True) for s in (ahead, left)]
+    pulls = []
+    for run in runs:
+        (log,) = run.logs
+        assert log is not None
+        pulls.append(log.foot_force.sum(axis=1).mean(axis=0))
+    # The feet hold against m g sin(10 deg) = 11.5 N, uphill.
+    assert pulls[0][0] == pytest.approx(11.5, abs=1.5)
+    assert pulls[1][1] == pytest.approx(11.5, abs=1.5)
+
+
+def test_gearlash_lets_motor_and_link_part_by_no_more_than_the_play() -> None:
+    robot = load_robot(LASH)
+    assert memory_size(robot) == 36
+    (log,) = simulate(BRIEF, "pi", ["P", "I"], PI, robot=LASH, log=True).logs
+    assert log is not None
+    gap = np.abs(log.motor_angle - log.joint_angle)
+    for kind, degrees in enumerate((2.5, 1.0, 1.0)):
+        widest = gap[:, kind::3].max()
+        half = math.radians(degrees) / 2
+        # Beyond the play the shaft yields by torque over its 500 Nm/rad.
+        assert half < widest < half + 0.03
+    inside = gap[:, ::3] < 0.99 * math.radians(2.5) / 2
+    assert inside.any()
+    assert not log.load_torque[:, ::3][inside].any()
+
+
+def test_gearlash_shakes_the_body() -> None:
+    shaken = simulate(SCENARIOS[0], "pi", ["P", "I"], PI, robot=LASH).outcome.objectives[0]
+    firm = simulate(SCENARIOS[0], "pi", ["P", "I"], PI).outcome.objectives[0]
+    assert shaken[2] > 1.5 * firm[2]
+
+
+@pytest.mark.parametrize("link", [1, 2, 3])
+def test_noise_on_a_link_costs_torque(link: int) -> None:
+    calm_walk = SCENARIOS[0].model_copy(update={"cycles": 1.0})
+    noise = LinkNoise(link=link, deviation=10.0)  # type: ignore[arg-type]
+    noisy = simulate(calm_walk, "pi", ["P", "I"], PI, noise=noise).outcome.objectives[0]
+    calm = simulate(calm_walk, "pi", ["P", "I"], PI).outcome.objectives[0]
+    assert noisy[0] > 1.1 * calm[0]
+    again = simulate(calm_walk, "pi", ["P", "I"], PI, noise=noise).outcome.objectives[0]
+    np.testing.assert_array_equal(noisy, again)
+    torques = noise.torques(50, 18)
+    assert set(np.flatnonzero(torques.any(axis=0)) % 3) == {link - 1}
+
+
+def test_robots_that_differ_in_run_time_parameters_share_a_kernel() -> None:
+    robot = load_robot("szabadka2")
+    supply = robot.description.supply.model_copy(update={"voltage": 9.22})
+    weak = dataclasses.replace(
+        robot, description=robot.description.model_copy(update={"supply": supply})
+    )
+    assert native_kernel(weak) is native_kernel(robot)
+    slow, fast = (
+        simulate(BRIEF, "pi", ["P", "I"], PI, robot=r).outcome.objectives[0, 4]
+        for r in (weak, robot)
+    )
+    assert slow > fast
+
+
+def test_a_heavier_body_costs_energy() -> None:
+    robot = load_robot("szabadka2")
+    heavy = dataclasses.replace(
+        robot, description=robot.description.model_copy(update={"body_mass": 5.0})
+    )
+    costs = [simulate(BRIEF, "pi", ["P", "I"], PI, robot=r, log=True) for r in (heavy, robot)]
+    assert costs[0].outcome.objectives[0, 0] > costs[1].outcome.objectives[0, 0]
+    carried = costs[0].logs[0]
+    assert carried is not None
+    assert carried.foot_force[0, :, 2].sum() == pytest.approx((6.76 + 1.75) * 9.81, rel=0.02)
+
+
+def test_derivative_gain_damps_by_the_change_of_error() -> None:
+    drive = CONTROLLERS["pid"].compile({"P": 0.4, "I": 0.1, "D": 0.004})
+    # 0.004 counts s/count over a tick of 2 ms: two PWM counts per count of change.
+    assert drive.derivative_gain == 2 << 16
+    results = [
+        simulate(BRIEF, "pid", ["P", "I", "D"], np.array([[0.4, 0.1, 0.004]]), backend=backend)
+        for backend in ("native", "reference")
+    ]
+    np.testing.assert_allclose(
+        results[0].outcome.objectives, results[1].outcome.objectives, rtol=1e-9
+    )

@@ -17,11 +17,12 @@ import numpy as np
 import pinocchio as pin
 
 from sim.benchmark import measure
-from sim.kernel.parameters import pack_parameters
+from sim.controllers import CONTROLLERS
 from sim.kernel.physics_step import physics_model
-from sim.kernel.reference import Stepper
+from sim.kernel.reference import Stepper, reference_kernel
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
+from sim.simulate import PHYSICS_RATE, course_of
 
 
 def native() -> float:
@@ -32,13 +33,13 @@ def native() -> float:
 def interpreter() -> Callable[[], float]:
     """The same physics step in CasADi's virtual machine, without control; us a step."""
     robot = load_robot("szabadka2")
-    model = physics_model(robot)
-    parameters = pack_parameters(robot, model.body, SCENARIOS[0], 2e-4)
-    stepper = Stepper(model.step, 7 + robot.n_joints, robot.n_joints, parameters)
+    course = course_of(robot, reference_kernel(robot), SCENARIOS[0], 1.0 / PHYSICS_RATE)
+    assert course is not None
+    setup = course(CONTROLLERS["p"].compile({"P": 0.25}))
+    stepper = Stepper(physics_model(robot).step, setup)
 
     def run() -> float:
-        stepper.q[:] = 0.0
-        stepper.q[[2, 6]] = 0.15, 1.0
+        stepper.q[:] = setup.start
         stepper.v[:] = 0.0
         return per_call(stepper.advance, 5000)
 

@@ -1,0 +1,30 @@
+"""The benchmarks run; what they say is for people to judge."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.mark.slow
+def test_the_physics_benchmark_tells_ratios() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.physics", "--rounds", "1", "--json"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)
+    assert rows[0]["times_the_kernel"] == 1.0
+    assert all(row["us_per_step"] > 0.0 for row in rows)

@@ -19,6 +19,8 @@ from cli.commands import (
     plot,
     serve,
     simulate,
+    synthesize,
+    validate,
 )
 from cli.exit_codes import ExitCode, exit_code
 from cli.output import discard_stdout, note, warnings_as_notes
@@ -43,6 +45,8 @@ for _module in (
     bench,
     export,
     plot,
+    validate,
+    synthesize,
 ):
     _module.register(app)
 

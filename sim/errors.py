@@ -3,6 +3,7 @@
 SimulationError
 ├── SimulationInputError    a value that cannot be simulated; names the field (also a ValueError)
 │   ├── UnreachablePose     a foot target outside the leg's reach; names scenario, leg, miss in mm
+│   ├── MeasuredLogError    a log that cannot be read; names line and column (sim.validation)
 │   └── RobotFileError      a robot description that cannot be used; names file and field
 └── KernelBuildError        the compiler was found but did not compile the kernel
 

@@ -1,0 +1,261 @@
+"""Measured logs as text: CSV with the unit in every heading.
+
+    # gaitswarm measured log 1
+    # robot: szabadka2
+    time [s],q_D.right_front_coxa [rad],...,U_S.right_front [V],...,a_BODY.z [g]
+    0.0,0.3217,...
+
+Lines before the headings that begin with `#` are remarks; `# key: value` is kept as metadata.
+Columns may stand in any order. q_POT may be there for any joints, a_BODY for all axes or none; all
+else is needed for every joint and leg of the robot.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from array import array
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.robot import Robot
+from sim.validation.errors import MeasuredLogError
+from sim.validation.measured_log import AXES, MeasuredLog, Quantity
+
+Floats = NDArray[np.float64]
+
+TITLE: Final = "gaitswarm measured log 1"
+"""First line; 1 is the version of the format."""
+
+TIME: Final = "time [s]"
+
+SHORTEST: Final = 100
+"""Rows; no walking cycle is shorter than 0.2 s."""
+
+_JITTER: Final = 2e-5
+"""Deviation from 2 ms that a row may have [s]."""
+
+_HEADING: Final = re.compile(r"^(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?$")
+
+
+def parse_measured_log(text: str, robot: Robot) -> MeasuredLog:
+    """The log of a robot from the text of its file.
+
+    Raises MeasuredLogError that names line, column and unit for a heading that is missing, unknown,
+    double or of another unit, for a value that is not a finite number (or a negative absolute
+    current), for times that are not 2 ms apart, and for less than 0.2 s.
+    """
+    lines = enumerate(text.removeprefix("\ufeff").splitlines(), start=1)
+    metadata, head_line, headings = _head(lines)
+    expected = _expected(robot)
+    places = _places(headings, expected, head_line)
+    values, line_of = _values(lines, headings, head_line)
+    if len(values) < SHORTEST:
+        raise MeasuredLogError(
+            f"{len(values)} rows are too short a log: at least {SHORTEST} are needed, of"
+            f" {CONTROL_PERIOD:g} s each",
+            line=line_of[-1] if line_of else head_line,
+        )
+    time = values[:, headings.index(TIME)]
+    _check_time(time, line_of)
+    _check_currents(values, places, line_of)
+
+    def columns(quantity: Quantity) -> Floats:
+        return np.ascontiguousarray(values[:, list(places[quantity].values())])
+
+    return MeasuredLog(
+        joints=robot.joint_names,
+        legs=tuple(leg.name for leg in robot.legs),
+        time=time.copy(),
+        desired_angle=columns(Quantity.DESIRED_ANGLE),
+        control_voltage=columns(Quantity.CONTROL_VOLTAGE),
+        joint_angle=columns(Quantity.JOINT_ANGLE),
+        current=columns(Quantity.CURRENT),
+        supply=columns(Quantity.SUPPLY),
+        potentiometer_joints=tuple(places[Quantity.POTENTIOMETER]),
+        potentiometer=columns(Quantity.POTENTIOMETER) if places[Quantity.POTENTIOMETER] else None,
+        body_acceleration=(
+            columns(Quantity.BODY_ACCELERATION) if places[Quantity.BODY_ACCELERATION] else None
+        ),
+        metadata=metadata,
+    )
+
+
+def format_measured_log(log: MeasuredLog) -> str:
+    """The text of a log; parsing it gives the same numbers to the bit."""
+    for key, value in log.metadata.items():
+        if not _is_remark(key, value):
+            raise MeasuredLogError(f"metadata {key!r}: {value!r} does not fit on a line of its own")
+    headings = [TIME]
+    columns = [log.time[:, None]]
+    for quantity in Quantity:
+        headings += [heading(quantity, channel) for channel in log.channels(quantity)]
+        columns.append(log.values(quantity))
+    rows = np.concatenate(columns, axis=1).tolist()
+    return "\n".join(
+        [
+            f"# {TITLE}",
+            *(f"# {key}: {value}" for key, value in log.metadata.items()),
+            ",".join(headings),
+            *(",".join(map(repr, row)) for row in rows),
+            "",
+        ]
+    )
+
+
+def heading(quantity: Quantity, channel: str) -> str:
+    """As in the file: `I_M.left_rear_tibia [A]`."""
+    return f"{quantity}.{channel} [{quantity.unit}]"
+
+
+def _is_remark(key: str, value: str) -> bool:
+    line = f"{key}: {value}"
+    return (
+        len(line.splitlines()) == 1
+        and line.isprintable()
+        and ":" not in key
+        and key == key.strip() != ""
+        and value == value.strip() != ""
+    )
+
+
+def _head(lines: Iterator[tuple[int, str]]) -> tuple[dict[str, str], int, list[str]]:
+    """Metadata, and the line that holds the headings with its number."""
+    metadata: dict[str, str] = {}
+    for number, line in lines:
+        if line.startswith("#"):
+            key, colon, value = line[1:].partition(":")
+            if colon:
+                metadata[key.strip()] = value.strip()
+        elif line.strip():
+            return metadata, number, [cell.strip() for cell in next(csv.reader([line]))]
+    raise MeasuredLogError(f"no headings: a line like '{TIME},{Quantity.DESIRED_ANGLE}....' is due")
+
+
+def _expected(robot: Robot) -> dict[Quantity, tuple[str, ...]]:
+    """Channels that each quantity may have."""
+    channels = {
+        "joint": robot.joint_names,
+        "leg": tuple(leg.name for leg in robot.legs),
+        "axis": AXES,
+    }
+    return {quantity: channels[quantity.per] for quantity in Quantity}
+
+
+def _places(
+    headings: list[str], expected: dict[Quantity, tuple[str, ...]], line: int
+) -> dict[Quantity, dict[str, int]]:
+    """Column of every channel that is there, in the robot's order."""
+    units = {"time": "s"} | {
+        f"{quantity}.{channel}": quantity.unit
+        for quantity, channels in expected.items()
+        for channel in channels
+    }
+    found: dict[str, int] = {}
+    for index, text in enumerate(headings):
+        match = _HEADING.match(text)
+        name, unit = (match["name"], match["unit"]) if match else (text, None)
+        if name not in units:
+            example = heading(Quantity.JOINT_ANGLE, expected[Quantity.JOINT_ANGLE][0])
+            raise MeasuredLogError(
+                f"unknown; known are '{TIME}' and {', '.join(expected)} with a joint, leg or axis"
+                f" of this robot, such as '{example}'",
+                line=line,
+                column=text,
+            )
+        column = f"{name} [{units[name]}]"
+        if unit != units[name]:
+            has = "there is no unit" if unit is None else f"the unit is {unit!r}"
+            raise MeasuredLogError(f"{has}, but must be {units[name]!r}", line=line, column=column)
+        if name in found:
+            raise MeasuredLogError("is there twice", line=line, column=column)
+        found[name] = index
+        headings[index] = column
+    if "time" not in found:
+        raise MeasuredLogError("is missing", line=line, column=TIME)
+    places = {}
+    for quantity, channels in expected.items():
+        there = {c: found[f"{quantity}.{c}"] for c in channels if f"{quantity}.{c}" in found}
+        partly = quantity is Quantity.BODY_ACCELERATION and there
+        if partly or not quantity.optional:
+            for channel in channels:
+                if channel not in there:
+                    raise MeasuredLogError(
+                        "is missing", line=line, column=heading(quantity, channel)
+                    )
+        places[quantity] = there
+    return places
+
+
+def _values(
+    lines: Iterator[tuple[int, str]], headings: list[str], head_line: int
+) -> tuple[Floats, list[int]]:
+    """(T, columns), and the line of each row; blank lines are skipped."""
+    numbers = array("d")
+    line_of: list[int] = []
+    for number, line in lines:
+        if not line.strip():
+            continue
+        cells = line.split(",")
+        if len(cells) != len(headings):
+            raise MeasuredLogError(
+                f"{len(cells)} values for the {len(headings)} columns of line {head_line}",
+                line=number,
+            )
+        if "_" in line:  # Python reads 1_0 as ten
+            raise _not_a_number(cells, headings, number)
+        try:
+            numbers.extend(map(float, cells))
+        except ValueError:
+            raise _not_a_number(cells, headings, number) from None
+        line_of.append(number)
+    values = np.array(numbers, dtype=np.float64).reshape(-1, len(headings))
+    finite = np.isfinite(values)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise MeasuredLogError(
+            f"{values[row, column]} is not a finite number",
+            line=line_of[row],
+            column=headings[column],
+        )
+    return values, line_of
+
+
+def _not_a_number(cells: list[str], headings: list[str], line: int) -> MeasuredLogError:
+    for cell, column in zip(cells, headings, strict=True):
+        with suppress(ValueError):
+            float(cell)
+            if "_" not in cell:
+                continue
+        return MeasuredLogError(f"{cell.strip()!r} is not a number", line=line, column=column)
+    return MeasuredLogError("not numbers", line=line)
+
+
+def _check_time(time: Floats, line_of: list[int]) -> None:
+    steps = np.diff(time)
+    wrong = np.flatnonzero(np.abs(steps - CONTROL_PERIOD) > _JITTER)
+    if wrong.size:
+        row = int(wrong[0])
+        raise MeasuredLogError(
+            f"{steps[row]:g} s after the row before, but rows must be {CONTROL_PERIOD:g} s apart",
+            line=line_of[row + 1],
+            column=TIME,
+        )
+
+
+def _check_currents(
+    values: Floats, places: dict[Quantity, dict[str, int]], line_of: list[int]
+) -> None:
+    for channel, column in places[Quantity.CURRENT].items():
+        negative = np.flatnonzero(values[:, column] < 0.0)
+        if negative.size:
+            raise MeasuredLogError(
+                f"{values[negative[0], column]:g} A is negative, but currents are absolute values",
+                line=line_of[negative[0]],
+                column=heading(Quantity.CURRENT, channel),
+            )

@@ -1,0 +1,158 @@
+"""What is measured on a walking robot (thesis table 2.2), 500 rows a second."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import SimulationInputError
+from sim.robot.description import JOINTS_PER_LEG
+
+Floats = NDArray[np.float64]
+
+AXES: Final = ("x", "y", "z")
+"""Of the body: forward, left, up."""
+
+ORIGIN: Final = "origin"
+SYNTHETIC: Final = "synthetic"
+"""A log whose metadata has origin: synthetic was computed, not measured."""
+
+
+class Quantity(StrEnum):
+    """A row of table 2.2, by its symbol."""
+
+    DESIRED_ANGLE = "q_D"
+    CONTROL_VOLTAGE = "U_P"
+    JOINT_ANGLE = "q"
+    CURRENT = "I_M"
+    SUPPLY = "U_S"
+    POTENTIOMETER = "q_POT"
+    BODY_ACCELERATION = "a_BODY"
+
+    @property
+    def unit(self) -> str:
+        """The only one in which it is written."""
+        return _FACTS[self][0]
+
+    @property
+    def per(self) -> Literal["joint", "leg", "axis"]:
+        """What there is one channel of."""
+        return _FACTS[self][1]
+
+    @property
+    def meaning(self) -> str:
+        """For headings and documentation."""
+        return _FACTS[self][2]
+
+    @property
+    def optional(self) -> bool:
+        """Supplementary in table 2.2."""
+        return self in (Quantity.POTENTIOMETER, Quantity.BODY_ACCELERATION)
+
+
+_FACTS: Final[dict[Quantity, tuple[str, Literal["joint", "leg", "axis"], str]]] = {
+    Quantity.DESIRED_ANGLE: ("rad", "joint", "desired joint angle"),
+    Quantity.CONTROL_VOLTAGE: ("V", "joint", "control signal of the PWM amplifier"),
+    Quantity.JOINT_ANGLE: ("rad", "joint", "joint angle by the motor encoder"),
+    Quantity.CURRENT: ("A", "joint", "absolute motor current"),
+    Quantity.SUPPLY: ("V", "leg", "supply voltage at the leg's board"),
+    Quantity.POTENTIOMETER: ("rad", "joint", "joint angle behind the gearlash"),
+    Quantity.BODY_ACCELERATION: ("g", "axis", "acceleration of the body, without gravity"),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredLog:
+    """A log with the quantities of table 2.2, measured, simulated or synthetic; T rows.
+
+    joints (J), legs (L): names, in the robot's order, three joints a leg;
+    time (T,) [s], from any start, a row each 2 ms;
+    desired_angle, joint_angle (T, J) [rad]; control_voltage (T, J) [V]; current (T, J) [A], >= 0;
+    supply (T, L) [V];
+    potentiometer (T, K) [rad], of the K joints named in potentiometer_joints; none is (T, 0);
+    body_acceleration (T, 3) [g], in the body's frame, without gravity; none is None;
+    metadata: what the file says of itself, by name.
+
+    Raises SimulationInputError if shapes do not fit.
+    """
+
+    joints: tuple[str, ...]
+    legs: tuple[str, ...]
+    time: Floats
+    desired_angle: Floats
+    control_voltage: Floats
+    joint_angle: Floats
+    current: Floats
+    supply: Floats
+    potentiometer_joints: tuple[str, ...] = ()
+    potentiometer: Floats | None = None
+    body_acceleration: Floats | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for quantity in Quantity:
+            expected = (len(self.time), len(self.channels(quantity)))
+            if self.values(quantity).shape != expected:
+                raise SimulationInputError(
+                    f"{quantity}: shape {self.values(quantity).shape} is not {expected}"
+                )
+        if len(self.joints) != JOINTS_PER_LEG * len(self.legs):
+            raise SimulationInputError(
+                f"joints: {len(self.joints)} are not {JOINTS_PER_LEG} for each of"
+                f" {len(self.legs)} legs"
+            )
+        for joint in self.potentiometer_joints:
+            if joint not in self.joints:
+                raise SimulationInputError(f"q_POT: no joint {joint!r}")
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether the log says that it was computed: such a one validates nothing but tools."""
+        return self.metadata.get(ORIGIN) == SYNTHETIC
+
+    def channels(self, quantity: Quantity) -> tuple[str, ...]:
+        """Names of a quantity's columns; none for one that was not measured."""
+        if quantity is Quantity.POTENTIOMETER:
+            return self.potentiometer_joints
+        if quantity is Quantity.BODY_ACCELERATION and self.body_acceleration is None:
+            return ()
+        return {"joint": self.joints, "leg": self.legs, "axis": AXES}[quantity.per]
+
+    def values(self, quantity: Quantity) -> Floats:
+        """(T, channels), in the quantity's unit."""
+        columns = {
+            Quantity.DESIRED_ANGLE: self.desired_angle,
+            Quantity.CONTROL_VOLTAGE: self.control_voltage,
+            Quantity.JOINT_ANGLE: self.joint_angle,
+            Quantity.CURRENT: self.current,
+            Quantity.SUPPLY: self.supply,
+            Quantity.POTENTIOMETER: self.potentiometer,
+            Quantity.BODY_ACCELERATION: self.body_acceleration,
+        }[quantity]
+        return np.empty((len(self.time), 0)) if columns is None else columns
+
+    def link_of(self, joint: str) -> int:
+        """1, 2 or 3: coxa, femur or tibia."""
+        return self.joints.index(joint) % JOINTS_PER_LEG + 1
+
+    def rows(self, start: int, stop: int) -> MeasuredLog:
+        """A part of the log; arrays are views."""
+        part = slice(start, stop)
+        return replace(
+            self,
+            time=self.time[part],
+            desired_angle=self.desired_angle[part],
+            control_voltage=self.control_voltage[part],
+            joint_angle=self.joint_angle[part],
+            current=self.current[part],
+            supply=self.supply[part],
+            potentiometer=None if self.potentiometer is None else self.potentiometer[part],
+            body_acceleration=(
+                None if self.body_acceleration is None else self.body_acceleration[part]
+            ),
+        )

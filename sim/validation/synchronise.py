@@ -1,0 +1,121 @@
+"""Two logs of one walk on a common time axis, trimmed to whole walking cycles (thesis 2.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.validation.errors import MeasuredLogError
+from sim.validation.measured_log import MeasuredLog
+
+Floats = NDArray[np.float64]
+
+_TIE: Final = 1e-6
+"""Share by which correlations of equally good lags may differ."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Synchronised:
+    """The same whole cycles of a walk, measured and simulated; both logs have the same rows.
+
+    lag: rows by which the walk begins later in the measured log than in the simulated one;
+    cycles: whole walking cycles kept, the last of the common part, as a walk starts at rest;
+    cycle_time [s]; correlation: of the desired angles over the common part, 1 for the same gait.
+    """
+
+    measured: MeasuredLog
+    simulated: MeasuredLog
+    lag: int
+    cycles: int
+    cycle_time: float
+    correlation: float
+
+    @property
+    def lag_seconds(self) -> float:
+        """`lag` as time [s]."""
+        return self.lag * CONTROL_PERIOD
+
+
+def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float) -> Synchronised:
+    """Find the lag between two logs and trim both to the whole cycles that they share.
+
+    Raises MeasuredLogError if they are not of the same joints, if the desired angles stand still,
+    or if they share less than one cycle.
+    """
+    if measured.joints != simulated.joints:
+        raise MeasuredLogError("the two logs are not of the same joints")
+    cycle = round(cycle_time / CONTROL_PERIOD)
+    shortest = min(len(measured.time), len(simulated.time))
+    if shortest < cycle:
+        raise MeasuredLogError(
+            f"{shortest * CONTROL_PERIOD:g} s are too short: one walking cycle takes"
+            f" {cycle_time:g} s"
+        )
+    lag, correlation = find_lag(measured.desired_angle, simulated.desired_angle, cycle)
+    first, common = _common(lag, len(measured.time), len(simulated.time))
+    # Whole cycles that need not be a whole number of rows each.
+    cycles = int((common + 0.5) * CONTROL_PERIOD / cycle_time + 1e-9)
+    kept = min(common, round(cycles * cycle_time / CONTROL_PERIOD))
+    end = first + common
+    return Synchronised(
+        measured=measured.rows(end - kept, end),
+        simulated=simulated.rows(end - kept - lag, end - lag),
+        lag=lag,
+        cycles=cycles,
+        cycle_time=cycle_time,
+        correlation=correlation,
+    )
+
+
+def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, float]:
+    """Lag k [rows] at which measured[t + k] is simulated[t], and their correlation there.
+
+    measured (T1, J), simulated (T2, J): desired angles of the same joints; cycle: rows of a
+    walking cycle, which the two share at least.
+
+    The cross-correlation over all that overlaps tells which cycle is which; but it favours long
+    overlaps, and so is off by some rows. Within a quarter of a cycle of it the mean square
+    difference decides, to the row.
+    """
+    mean = simulated.mean(axis=0)
+    x, y = measured - mean, simulated - mean
+    if not (np.ptp(x, axis=0).any() and np.ptp(y, axis=0).any()):
+        raise MeasuredLogError("the desired angles stand still, so there is nothing to align")
+    lags = np.arange(-(len(y) - 1), len(x))
+    # Rows of x in the overlap are [start, stop), those of y [start - k, stop - k).
+    start, stop = np.maximum(lags, 0), np.minimum(len(x), len(y) + lags)
+    long_enough = stop - start >= cycle
+    lags, start, stop = lags[long_enough], start[long_enough], stop[long_enough]
+    product = _cross_correlation(x, y)[lags + len(y) - 1]
+    energy_x, energy_y = _cumulated_energy(x), _cumulated_energy(y)
+    of_x = energy_x[stop] - energy_x[start]
+    of_y = energy_y[stop - lags] - energy_y[start - lags]
+    best = np.flatnonzero(product >= product.max() - _TIE * abs(product.max()))
+    coarse = lags[best[np.argmin(np.abs(lags[best]))]]
+    near = np.flatnonzero(np.abs(lags - coarse) <= cycle // 4)
+    difference = (of_x + of_y - 2.0 * product)[near] / (stop - start)[near]
+    chosen = near[np.argmin(difference)]
+    scale = float(np.sqrt(of_x[chosen] * of_y[chosen]))
+    return int(lags[chosen]), float(product[chosen]) / scale if scale > 0.0 else 0.0
+
+
+def _cross_correlation(x: Floats, y: Floats) -> Floats:
+    """sum over rows and columns of x[t + k] y[t], for k from -(len(y) - 1) to len(x) - 1."""
+    length = 1 << (len(x) + len(y) - 2).bit_length()
+    spectrum = (np.fft.rfft(x, length, axis=0) * np.conj(np.fft.rfft(y, length, axis=0))).sum(1)
+    circular = np.fft.irfft(spectrum, length)
+    return np.concatenate([circular[length - (len(y) - 1) :], circular[: len(x)]])
+
+
+def _cumulated_energy(x: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))])
+
+
+def _common(lag: int, measured: int, simulated: int) -> tuple[int, int]:
+    """First row of the overlap in the measured log, and its length."""
+    first = max(lag, 0)
+    return first, min(measured, simulated + lag) - first

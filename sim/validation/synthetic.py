@@ -1,0 +1,225 @@
+"""SYNTHETIC logs: what a perturbed twin of a robot would have measured. Not measurements.
+
+No log of a real robot is public. These stand in for one to test the toolkit and the identification
+of parameters, whose true values are known here; they say nothing about how true the model is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.errors import SimulationInputError
+from sim.outcome import Status
+from sim.robot import Robot
+from sim.robot.description import Contact
+from sim.scenario import Scenario
+from sim.simulate import simulate
+from sim.validation.measured_log import ORIGIN, SYNTHETIC, MeasuredLog, Quantity
+from sim.validation.simulated_log import simulated_log
+
+Floats = NDArray[np.float64]
+
+ADC_BITS: Final = 12
+"""Of the converter of the motor currents (thesis 5.2)."""
+
+WARNING: Final = "computed by a perturbed simulation, NOT measured on a robot"
+"""Said in the metadata of every synthetic log."""
+
+_STREAMS: Final = {quantity: index for index, quantity in enumerate(Quantity)}
+
+
+class Perturbation(BaseModel):
+    """How the twin differs from the robot as described. Factors multiply the described value."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    supply_voltage: float = Field(default=0.95, gt=0.0, description="factor, battery")
+    supply_resistance: float = Field(default=1.3, ge=0.0, description="factor, battery")
+    efficiency: float = Field(default=0.85, gt=0.0, description="factor, all gearheads; at most 1")
+    motor_friction: float = Field(default=1.2, ge=0.0, description="factor, all motors")
+    ground_friction: float = Field(default=0.8, ge=0.0, description="factor, all feet")
+    stiffness: float = Field(default=0.8, gt=0.0, description="factor, all soles")
+    damping: float = Field(default=1.2, ge=0.0, description="factor, all soles")
+    gearlash: float = Field(default=0.02, ge=0.0, le=0.5, description="of every joint [rad]")
+    body_mass: float | None = Field(
+        default=None, gt=0.0, description="in place of the described one [kg]"
+    )
+
+
+class Instruments(BaseModel):
+    """Errors of the instruments. Noise is Gaussian and given by its standard deviation."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    current_noise: float = Field(default=0.02, ge=0.0, description="[A], before the converter")
+    supply_noise: float = Field(default=0.03, ge=0.0, description="[V]")
+    potentiometer_noise: float = Field(default=0.005, ge=0.0, description="[rad]")
+    acceleration_noise: float = Field(default=0.005, ge=0.0, description="[g]")
+    lead: float = Field(
+        default=0.124, ge=0.0, le=10.0, description="standing logged before the walk begins [s]"
+    )
+    clock_offset: float = Field(default=0.37, description="time of the first row [s]")
+    potentiometer_legs: tuple[int, ...] = Field(
+        default=(0, 2), description="indices of the legs with potentiometers: legs 1 and 3"
+    )
+
+
+def synthetic_log(
+    robot: Robot,
+    scenario: Scenario,
+    controller: str,
+    design: Mapping[str, float],
+    *,
+    seed: int,
+    perturbation: Perturbation | None = None,
+    instruments: Instruments | None = None,
+) -> MeasuredLog:
+    """A log of the perturbed twin of a robot, marked as synthetic in its metadata.
+
+    design: the controller's variables and any gait variables. The same arguments give the same
+    bits; each quantity has a random stream of its own, by seed.
+    Raises SimulationInputError for a twin that does not walk to the end.
+    """
+    if not 0 <= seed < 1 << 64:
+        raise SimulationInputError(f"seed: {seed} is not a whole number from 0 of 64 bits")
+    errors = instruments or Instruments()
+    change = perturbation or Perturbation()
+    twin = perturbed(robot, change)
+    values = np.array([list(design.values())], dtype=np.float64)
+    walk = simulate(scenario, controller, list(design), values, robot=twin, log=True)
+    status, log = Status(int(walk.outcome.statuses[0])), walk.logs[0]
+    if status not in (Status.OK, Status.STALLED) or log is None:
+        raise SimulationInputError(f"the perturbed twin did not walk to the end: {status.phrase}")
+    standing = round(errors.lead / CONTROL_PERIOD)
+    return replace(
+        _measured(robot, _after_standing(simulated_log(twin, log), standing), errors, seed),
+        metadata={
+            ORIGIN: SYNTHETIC,
+            "warning": WARNING,
+            "robot": robot.description.name,
+            "scenario": scenario.name,
+            "controller": controller,
+            "seed": str(seed),
+            "perturbation": _listed(change),
+            "instruments": _listed(errors),
+        },
+    )
+
+
+def perturbed(robot: Robot, change: Perturbation) -> Robot:
+    """The twin: the same robot with other friction, losses, gearlash, battery and soles."""
+    d = robot.description
+
+    def contact(own: Contact) -> Contact:
+        return own.model_copy(
+            update={
+                "friction": own.friction * change.ground_friction,
+                "stiffness": own.stiffness * change.stiffness,
+                "damping": own.damping * change.damping,
+            }
+        )
+
+    description = d.model_copy(
+        update={
+            "body_mass": d.body_mass if change.body_mass is None else change.body_mass,
+            "supply": d.supply.model_copy(
+                update={
+                    "voltage": d.supply.voltage * change.supply_voltage,
+                    "resistance": d.supply.resistance * change.supply_resistance,
+                }
+            ),
+            "gearheads": {
+                name: gear.model_copy(
+                    update={"efficiency": min(1.0, gear.efficiency * change.efficiency)}
+                )
+                for name, gear in d.gearheads.items()
+            },
+            "motors": {
+                name: motor.model_copy(
+                    update={"viscous_friction": motor.viscous_friction * change.motor_friction}
+                )
+                for name, motor in d.motors.items()
+            },
+            "drives": {
+                name: drive.model_copy(update={"gearlash": change.gearlash})
+                for name, drive in d.drives.items()
+            },
+            "contact": contact(d.contact),
+            "legs": tuple(
+                leg.model_copy(update={"contact": contact(leg.contact)}) if leg.contact else leg
+                for leg in d.legs
+            ),
+        }
+    )
+    return replace(robot, description=description)
+
+
+def _listed(values: BaseModel) -> str:
+    return ", ".join(f"{name}={value}" for name, value in values.model_dump().items())
+
+
+def _after_standing(log: MeasuredLog, rows: int) -> MeasuredLog:
+    """The log preceded by rows like its first: the walk starts at rest."""
+
+    def held(values: Floats) -> Floats:
+        return np.concatenate([np.repeat(values[:1], rows, axis=0), values])
+
+    if log.potentiometer is None or log.body_acceleration is None:
+        raise TypeError("a simulated log has all quantities")
+    return replace(
+        log,
+        time=np.arange(rows + len(log.time), dtype=np.float64) * CONTROL_PERIOD,
+        desired_angle=held(log.desired_angle),
+        control_voltage=held(log.control_voltage),
+        joint_angle=held(log.joint_angle),
+        current=held(log.current),
+        supply=held(log.supply),
+        potentiometer=held(log.potentiometer),
+        body_acceleration=held(log.body_acceleration),
+    )
+
+
+def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) -> MeasuredLog:
+    """The log through instruments: noise, then the converters' steps. Digital signals are exact."""
+    sensors = robot.description.sensors
+
+    def noisy(quantity: Quantity, deviation: float) -> Floats:
+        # Keyed by quantity: another noise of one leaves the others' bits as they are.
+        key = np.array([seed, _STREAMS[quantity]], dtype=np.uint64)
+        stream = np.random.Generator(np.random.Philox(key=key))
+        exact = log.values(quantity)
+        return exact + deviation * stream.standard_normal(exact.shape)
+
+    with_potentiometer = [
+        joint
+        for k, leg in enumerate(robot.description.legs)
+        if k in errors.potentiometer_legs
+        for joint in leg.joints
+    ]
+    columns = [log.potentiometer_joints.index(joint) for joint in with_potentiometer]
+    angle_step = sensors.angle_step / sensors.angle_counts
+    return replace(
+        log,
+        time=log.time + errors.clock_offset,
+        joint_angle=np.rint(log.joint_angle / angle_step) * angle_step,
+        current=converted(
+            noisy(Quantity.CURRENT, errors.current_noise),
+            sensors.current_step / sensors.current_counts,
+        ),
+        supply=noisy(Quantity.SUPPLY, errors.supply_noise),
+        potentiometer_joints=tuple(with_potentiometer),
+        potentiometer=noisy(Quantity.POTENTIOMETER, errors.potentiometer_noise)[:, columns],
+        body_acceleration=noisy(Quantity.BODY_ACCELERATION, errors.acceleration_noise),
+    )
+
+
+def converted(amperes: Floats, step: float) -> Floats:
+    """What a 12-bit converter makes of absolute currents [A]: whole steps from 0 to 4095."""
+    return np.clip(np.rint(amperes / step), 0, (1 << ADC_BITS) - 1) * step

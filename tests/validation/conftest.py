@@ -1,0 +1,47 @@
+"""One synthetic walk, its robot and its simulated counterpart: they take a second to compute."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from sim.controllers import CONTROLLERS
+from sim.kernel.observation import WalkLog
+from sim.robot import Robot, load_robot
+from sim.scenario import Scenario, find_scenario
+from sim.simulate import simulate
+from sim.validation.measured_csv import format_measured_log
+from sim.validation.measured_log import MeasuredLog
+from sim.validation.simulated_log import simulated_log
+from sim.validation.synthetic import synthetic_log
+
+DESIGN = CONTROLLERS["fuzzy-pi"].published["A"]
+
+
+@dataclass(frozen=True, slots=True)
+class TwoWalks:
+    robot: Robot
+    scenario: Scenario
+    walk: WalkLog
+    simulated: MeasuredLog
+    synthetic: MeasuredLog
+    text: str
+
+
+@pytest.fixture(scope="session")
+def walks() -> TwoWalks:
+    robot, scenario = load_robot("szabadka2"), find_scenario("normal-fast")
+    values = np.array([list(DESIGN.values())])
+    (walk,) = simulate(scenario, "fuzzy-pi", list(DESIGN), values, log=True).logs
+    assert walk is not None
+    synthetic = synthetic_log(robot, scenario, "fuzzy-pi", DESIGN, seed=7)
+    return TwoWalks(
+        robot,
+        scenario,
+        walk,
+        simulated_log(robot, walk),
+        synthetic,
+        format_measured_log(synthetic),
+    )

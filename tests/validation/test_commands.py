@@ -1,0 +1,123 @@
+"""`gaitswarm synthesize` and `gaitswarm validate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sim.validation.comparison import compare
+from sim.validation.measured_csv import format_measured_log
+from sim.validation.tolerance import Tolerance
+from tests.cli.conftest import Result, run_command
+from tests.validation.conftest import TwoWalks
+
+WALK = ("--design", "published:A", "--scenario", "1")
+
+
+@pytest.fixture
+def measured(walks: TwoWalks, tmp_path: Path) -> Path:
+    path = tmp_path / "walk.csv"
+    path.write_text(walks.text, encoding="utf-8")
+    return path
+
+
+def validate(path: Path, *options: object) -> Result:
+    return run_command("validate", path, *WALK, *options)
+
+
+def test_synthesize_writes_the_log_of_the_seed(walks: TwoWalks, tmp_path: Path) -> None:
+    path = tmp_path / "made.csv"
+    done = run_command("synthesize", *WALK, "--seed", 7, "-o", path)
+    assert done.code == 0, done.err
+    assert path.read_text(encoding="utf-8") == walks.text
+    assert "SYNTHETIC" in done.err
+
+
+def test_the_table_shows_links_units_and_classes(measured: Path) -> None:
+    shown = validate(measured)
+    assert shown.code == 0, shown.err
+    for text in ("q_D [rad]", "I_M [A]", "U_S [V]", "a_BODY [g]", "link 3", "RMAE", "green"):
+        assert text in shown.out
+    assert "0.124 s later" in shown.out
+    assert "SYNTHETIC" in shown.err
+
+
+def test_json_is_the_whole_comparison(walks: TwoWalks, measured: Path) -> None:
+    shown = validate(measured, "--json")
+    assert shown.code == 0, shown.err
+    expected = compare(walks.synthetic, walks.simulated, walks.scenario.cycle_time)
+    assert shown.json == expected.model_dump(mode="json")
+
+
+def test_repeats_give_confidence_intervals(walks: TwoWalks, measured: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.csv"
+    other.write_text(format_measured_log(walks.simulated), encoding="utf-8")
+    shown = validate(measured, "--repeat", other)
+    assert shown.code == 0, shown.err
+    assert "CONF" in shown.out
+    # One of the two measurements is the simulated walk itself.
+    assert "inside" in shown.out
+    assert "outside" not in shown.out
+
+
+@pytest.mark.slow
+def test_the_report_has_tables_and_pictures(measured: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "report"
+    done = validate(measured, "--report", folder)
+    assert done.code == 0, done.err
+    text = (folder / "report.md").read_text(encoding="utf-8")
+    pictures = {"rmae.png", "angles.png", "currents.png", "spectra.png"}
+    assert {path.name for path in folder.iterdir()} == pictures | {"report.md"}
+    for name in pictures:
+        assert f"]({name})" in text
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    assert "SYNTHETIC" in text
+    assert "| U_P [V] | left_rear_tibia |" in text
+    for tolerance in Tolerance:
+        assert tolerance.phrase in text
+
+
+def test_another_scenario_than_the_measured_one_is_noticed(measured: Path) -> None:
+    shown = run_command("validate", measured, "--design", "published:A", "--scenario", "2")
+    assert shown.code == 0
+    assert "desired angles differ" in shown.err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("q.right_front_femur [rad]", "q.right_front_femur [deg]", "'deg', but must be 'rad'"),
+        ("I_M.left_rear_tibia [A],", "", "line 10, column 'I_M.left_rear_tibia [A]': is missing"),
+        ("time [s]", "time", "there is no unit"),
+    ],
+)
+def test_a_bad_log_is_exit_code_2_and_names_line_column_and_unit(
+    measured: Path, old: str, new: str, problem: str
+) -> None:
+    measured.write_text(measured.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    refused = validate(measured)
+    assert refused.code == 2
+    assert str(measured) in refused.err
+    assert "line 10, column" in refused.err
+    assert problem in refused.err
+    assert refused.out == ""
+
+
+def test_other_bad_input_is_exit_code_2_too(measured: Path, tmp_path: Path) -> None:
+    short = tmp_path / "short.csv"
+    lines = measured.read_text(encoding="utf-8").splitlines()
+    short.write_text("\n".join(lines[:300]), encoding="utf-8")
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"# fine\n\xff\xfe")
+    for path, problem in (
+        (short, "too short: one walking cycle takes 1.5 s"),
+        (binary, "line 2: not UTF-8"),
+        (tmp_path / "absent.csv", "cannot read"),
+    ):
+        refused = validate(path)
+        assert (refused.code, problem in refused.err) == (2, True), refused.err
+    assert run_command("validate", measured, "--design", "published:A", "--scenario", "9").code == 2
+    assert run_command("synthesize", *WALK, "-o", tmp_path / "log.txt").code == 2
+    (tmp_path / "file").write_text("")
+    assert validate(measured, "--report", tmp_path / "file").code == 2

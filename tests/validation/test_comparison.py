@@ -1,0 +1,95 @@
+"""A measured and a simulated walk, judged by quantity, link and joint."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim.validation import measures
+from sim.validation.comparison import N_HARMONICS, compare
+from sim.validation.measured_log import Quantity
+from sim.validation.tolerance import Tolerance
+from tests.validation.walks import CYCLE_TIME, szabadka, walking_log, without_supplements
+
+LOG = walking_log(szabadka())
+
+
+def test_a_log_agrees_with_itself() -> None:
+    comparison = compare(LOG, LOG, CYCLE_TIME)
+    assert [judged.quantity for judged in comparison.quantities] == list(Quantity)
+    assert (comparison.lag, comparison.cycles, comparison.samples) == (0.0, 3, 750)
+    for judged in comparison.quantities:
+        for agreement in (judged.whole, *judged.links, *judged.channels):
+            assert agreement.mse == agreement.rmae == agreement.ram == 0.0
+            assert agreement.tolerance is Tolerance.GREEN
+            assert agreement.intensity_measured == agreement.intensity_simulated > 0.0
+
+
+def test_an_error_of_one_joint_shows_at_that_joint_and_its_link_only() -> None:
+    wrong = LOG.current.copy()
+    wrong[:, 4] *= 1.4
+    currents = compare(LOG, replace(LOG, current=wrong), CYCLE_TIME).quantity(Quantity.CURRENT)
+    by_joint = {a.name: a for a in currents.channels}
+    assert by_joint["left_front_femur"].rmae == pytest.approx(0.4)
+    assert by_joint["left_front_femur"].tolerance is Tolerance.RED
+    assert sum(a.rmae > 0.0 for a in currents.channels) == 1
+    assert [a.rmae > 0.0 for a in currents.links] == [False, True, False]
+    femurs = LOG.current[:, 1::3]
+    assert currents.links[1].rmae == pytest.approx(
+        measures.relative_mean_absolute_error(femurs, wrong[:, 1::3])
+    )
+    assert currents.links[1].ram == pytest.approx(currents.links[1].rmae)
+
+
+def test_spectra_are_of_currents_at_multiples_of_the_walking_frequency() -> None:
+    simulated = replace(LOG, current=0.5 * LOG.current)
+    comparison = compare(LOG, simulated, CYCLE_TIME)
+    for judged in comparison.quantities:
+        assert len(judged.spectra) == (3 if judged.quantity is Quantity.CURRENT else 0)
+    for link in comparison.quantity(Quantity.CURRENT).spectra:
+        assert link.frequency == pytest.approx([k / CYCLE_TIME for k in range(N_HARMONICS + 1)])
+        assert link.simulated == pytest.approx([0.5 * a for a in link.measured])
+        assert link.measured[1] > link.measured[N_HARMONICS]
+        assert link.spectral_error == pytest.approx(0.5)
+
+
+def test_repeated_measurements_give_a_confidence_interval() -> None:
+    weak, strong = (replace(LOG, current=f * LOG.current) for f in (0.9, 1.1))
+    inside = compare(weak, LOG, CYCLE_TIME, repeats=[strong]).quantity(Quantity.CURRENT).whole
+    mean = measures.mean_absolute(LOG.current)
+    assert inside.confidence == pytest.approx((0.9 * mean, 1.1 * mean))
+    assert inside.within_confidence is True
+    outside = compare(weak, strong, CYCLE_TIME, repeats=[LOG]).quantity(Quantity.CURRENT).whole
+    assert outside.within_confidence is False
+    assert compare(weak, LOG, CYCLE_TIME).quantity(Quantity.CURRENT).whole.confidence is None
+
+
+def test_what_was_not_measured_is_not_judged() -> None:
+    comparison = compare(without_supplements(LOG), LOG, CYCLE_TIME, repeats=[LOG])
+    assert [judged.quantity for judged in comparison.quantities] == [
+        quantity for quantity in Quantity if not quantity.optional
+    ]
+    with pytest.raises(KeyError):
+        comparison.quantity(Quantity.BODY_ACCELERATION)
+    partly = compare(LOG, LOG, CYCLE_TIME, repeats=[without_supplements(LOG)])
+    assert partly.quantity(Quantity.POTENTIOMETER).whole.confidence is None
+    assert partly.quantity(Quantity.CURRENT).whole.confidence is not None
+
+
+def test_potentiometers_are_compared_by_joint_whatever_joints_have_one() -> None:
+    joints = LOG.joints
+    every = replace(LOG, potentiometer_joints=joints, potentiometer=LOG.desired_angle)
+    judged = compare(LOG, every, CYCLE_TIME).quantity(Quantity.POTENTIOMETER)
+    assert [a.name for a in judged.channels] == list(LOG.potentiometer_joints)
+    assert judged.whole.rmae == 0.0
+
+
+def test_infinite_errors_are_null_in_json() -> None:
+    silent = replace(LOG, supply=np.zeros_like(LOG.supply))
+    text = compare(silent, LOG, CYCLE_TIME).model_dump_json()
+    supply = next(q for q in json.loads(text)["quantities"] if q["quantity"] == "U_S")
+    assert supply["whole"]["rmae"] is None
+    assert supply["whole"]["tolerance"] == "purple"

@@ -12,6 +12,7 @@ import typer
 
 from cli.commands import (
     bench,
+    compare,
     export,
     history,
     jobs,
@@ -19,6 +20,7 @@ from cli.commands import (
     plot,
     serve,
     simulate,
+    study,
     synthesize,
     validate,
 )
@@ -42,6 +44,8 @@ for _module in (
     jobs,
     history,
     simulate,
+    compare,
+    study,
     bench,
     export,
     plot,

@@ -30,7 +30,19 @@ PreferenceOption = Annotated[
 
 Scenarios = Annotated[str | None, typer.Option(help="Names or numbers, separated by commas.")]
 
-ControllerOption = Annotated[str | None, typer.Option("--controller", help="fuzzy-pi or pi.")]
+ControllerOption = Annotated[
+    str | None, typer.Option("--controller", help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")
+]
+
+RobotOption = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME|JSON",
+        help="Robot by name, or a variant as JSON, such as"
+        ' {"contact_law": "stick", "gearlash": [2.5, 1, 1]}.',
+    ),
+]
 
 JobName = Annotated[str | None, typer.Option("--name", help="Name of the job, for people.")]
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from api.views import IterationView
     from sim.controllers import Drive
+    from sim.studies.drives import WalkFigures
 
 _FORMATS: Final = ("png", "svg", "pdf")
 _INK: Final = "#1f3a5f"
@@ -66,8 +67,10 @@ def draw_surface(drive: Drive, *, title: str) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
+    from sim.controllers import LookupTable
+
     table = drive.direct
-    if table is None:
+    if not isinstance(table, LookupTable):
         raise InvalidRequest("this controller has no table, so there is no surface to draw")
     rows, columns, _ = table.values.shape
     error = (np.arange(rows) - rows // 2) * _FRACTION / table.error_gain
@@ -88,7 +91,7 @@ def draw_surface(drive: Drive, *, title: str) -> Figure:
         antialiased=False,
     )
     axes.set_xlabel("angle error  [1000 counts]", labelpad=10.0)
-    axes.set_ylabel("absolute motor current  [1000 counts]", labelpad=10.0)
+    axes.set_ylabel("motor current  [1000 counts]", labelpad=10.0)
     axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.view_init(elev=26.0, azim=-124.0)
     axes.set_box_aspect((1.3, 1.1, 0.8), zoom=0.92)
@@ -96,6 +99,36 @@ def draw_surface(drive: Drive, *, title: str) -> Figure:
         axis.set_pane_color((0.97, 0.97, 0.98))
     figure.suptitle(title, x=0.04, ha="left", weight="bold")
     figure.colorbar(drawn, ax=axes, shrink=0.6, pad=0.06, label="output  [PWM counts]")
+    return figure
+
+
+def draw_comparison(figures: Sequence[WalkFigures]) -> Figure:
+    """Speed, power and effectivity of every drive, in groups by scenario."""
+    from matplotlib.figure import Figure
+
+    scenarios = list(dict.fromkeys(f.scenario for f in figures))
+    drives = list(dict.fromkeys(f.drive for f in figures))
+    by_walk = {(f.scenario, f.drive): f for f in figures}
+    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
+    panels = figure.subplots(3, 1, sharex=True)
+    quantities = (("speed", "m/s"), ("power", "W"), ("effectivity", "m/J"))
+    width = 0.8 / len(drives)
+    for axes, (name, unit) in zip(panels, quantities, strict=True):
+        for k, drive in enumerate(drives):
+            heights = [getattr(by_walk[scenario, drive], name) for scenario in scenarios]
+            # A drive that failed has no bar.
+            axes.bar(
+                [n + (k - (len(drives) - 1) / 2) * width for n in range(len(scenarios))],
+                [math.nan if height is None else height for height in heights],
+                width,
+                label=drive,
+            )
+        axes.set_ylabel(f"{name}  [{unit}]")
+        axes.grid(visible=True, axis="y", color="0.9", lw=0.6)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[-1].set_xticks(range(len(scenarios)), scenarios, rotation=20, ha="right")
+    panels[0].legend(frameon=False, ncols=len(drives), loc="lower left", bbox_to_anchor=(0, 1))
     return figure
 
 

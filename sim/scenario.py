@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -92,6 +92,9 @@ class Scenario(BaseModel):
         ge=1.0,
         le=500.0,
         description="Rate at which the desired angles are updated [Hz].",
+    )
+    curve: Literal["half_ellipse", "quadratic_spline"] = Field(
+        default="half_ellipse", description="Shape of the swing; the spline is that of 2011."
     )
     cycles: float = Field(
         default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."

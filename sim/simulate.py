@@ -101,7 +101,7 @@ def simulate(
     results = kernel.walk(list(setups.values()), Coding.of(machine, substeps), log=log)
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
-        statuses[index], objectives[index] = _judge(setup, result, substeps, 1.0 / physics_rate)
+        statuses[index], objectives[index] = judge(setup, result, substeps, 1.0 / physics_rate)
         if result.states is not None:
             logs[index] = walk_log(machine, setup, result.states)
     return Simulation(Outcome(objectives, statuses), tuple(logs) if log else ())
@@ -237,7 +237,7 @@ def course_of(
     )
 
 
-def _judge(
+def judge(
     setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
 ) -> tuple[Status, NDArray[np.float64]]:
     """Status and objectives f1..f6 (table 4.1) from the sums over physics steps."""

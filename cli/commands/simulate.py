@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Json
+from cli.options import Json, RobotOption
 
 if TYPE_CHECKING:
     from api.views import SimulationView
@@ -27,7 +27,9 @@ def simulate(
             " parameters, or with one under `design`; or a published design, as published:A.",
         ),
     ],
-    controller: Annotated[str, typer.Option(help="fuzzy-pi or pi.")] = "fuzzy-pi",
+    controller: Annotated[
+        str, typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")
+    ] = "fuzzy-pi",
     scenario: Annotated[
         str, typer.Option(help="Name or number, several separated by commas, or all.")
     ] = "all",
@@ -40,6 +42,7 @@ def simulate(
         Path | None,
         typer.Option(metavar="FILE.npz", help="Write the walks' 500 Hz logs as NumPy arrays."),
     ] = None,
+    robot: RobotOption = None,
     as_json: Json = False,
 ) -> None:
     """Let one design walk and say what it is worth; a fall is a result, not an error."""
@@ -48,11 +51,13 @@ def simulate(
     from api.simulation import SimulationRequest, run_simulation
     from cli.design_file import read_design
     from cli.output import note
+    from cli.robots import chosen_robot
     from cli.spec_file import invalid_request
     from sim.scenario import SCENARIOS
 
     chosen = [s.name for s in SCENARIOS] if scenario == "all" else scenario.split(",")
     data = {
+        "robot": chosen_robot(robot),
         "controller": controller,
         "design": read_design(design, controller, trajectory),
         "scenarios": [name.strip() for name in chosen],

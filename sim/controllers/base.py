@@ -9,7 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.controllers.fixed_point import FRACTION_BITS, descale
 from sim.variables import Variable
+
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +32,23 @@ class LookupTable:
     current_gain: int
     velocity_gain: int = 0
 
+    def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
+        """Output (J,) with the fraction bits of `output_gain`; inputs (J,) in coded counts."""
+        rows, columns, layers = self.values.shape
+        row = np.clip(descale(error * self.error_gain, FRACTION_BITS) + rows // 2, 0, rows - 1)
+        column = np.clip(descale(current * self.current_gain, FRACTION_BITS), 0, columns - 1)
+        layer = descale(change * self.velocity_gain, FRACTION_BITS) + layers // 2
+        entry = self.values[row, column, np.clip(layer, 0, layers - 1)]
+        output: Ints = entry.astype(np.int64) * self.output_gain
+        return output
+
+
+class Response(Protocol):
+    """What a drive looks up: a table, or for comparison the inference that it came from."""
+
+    def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
+        """See `LookupTable.respond`."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
@@ -42,8 +62,8 @@ class Drive:
     proportional_gain: int = 0
     integral_gain: int = 0
     derivative_gain: int = 0
-    direct: LookupTable | None = None
-    integrated: LookupTable | None = None
+    direct: Response | None = None
+    integrated: Response | None = None
 
 
 class Controller(Protocol):

@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sim.errors import SimulationInputError
 
 FRACTION_BITS: Final = 16
@@ -48,6 +51,12 @@ def required_integer(design: Mapping[str, float], name: str, *, low: int, high: 
 def to_fixed(value: float, fraction_bits: int) -> int:
     """Nearest fixed-point number, as its integer."""
     return math.floor(value * (1 << fraction_bits) + 0.5)
+
+
+def descale(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
+    """Fixed point to integer, halves up."""
+    integer: NDArray[np.int64] = (value + (1 << (bits - 1))) >> bits
+    return integer
 
 
 def integral_gain(gain: float) -> int:

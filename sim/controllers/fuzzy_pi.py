@@ -8,6 +8,7 @@ is shipped: a 10 bit x 6 bit table of 8-bit outputs (section 5.3).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
@@ -24,7 +25,7 @@ from sim.controllers.fixed_point import (
     to_fixed,
 )
 from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
-from sim.controllers.quantisation import OUTPUT_SCALE, Axis, quantised
+from sim.controllers.quantisation import OUTPUT_SCALE, Axis, ExactInference, quantised
 from sim.variables import Variable
 
 ERROR: Final = Axis(bits=10, centred=True)
@@ -61,11 +62,17 @@ def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Sh
 
 @lru_cache(maxsize=256)
 def quantised_table(
-    fw1: float, fw23: float, fw4: float, fw56: float, shape: Shape
+    fw1: float,
+    fw23: float,
+    fw4: float,
+    fw56: float,
+    shape: Shape,
+    error: Axis = ERROR,
+    current: Axis = CURRENT,
 ) -> NDArray[np.int8]:
-    """The inference on the axes' grid in 1/127ths of the output range, (1024, 64), read-only."""
+    """The inference on the axes' grid in 1/127ths of the output range, read-only."""
     system = inference_system(fw1, fw23, fw4, fw56, shape)
-    return quantised(system, {"error": ERROR, "current": CURRENT})
+    return quantised(system, {"error": error, "current": current})
 
 
 class FuzzyPi:
@@ -153,18 +160,48 @@ class FuzzyPi:
 
     def compile(self, design: Mapping[str, float]) -> Drive:
         """See `Controller.compile`."""
-        error_range = required(design, "FI1R", low=64.0, high=65535.0)
-        current_range = required(design, "FI2R", low=64.0, high=65535.0)
-        output_range = required(design, "FOR", low=1.0, high=32767.0)
-        weights = [required(design, w, low=0.0, high=1.0) for w in ("FW1", "FW23", "FW4", "FW56")]
-        shape = Shape(required_integer(design, "FOMF", low=1, high=3))
-        fw1, fw23, fw4, fw56 = weights
-        return Drive(
-            integral_gain=integral_gain(required(design, "I", low=0.0, high=100.0)),
-            direct=LookupTable(
-                values=quantised_table(fw1, fw23, fw4, fw56, shape)[:, :, np.newaxis],
-                output_gain=to_fixed(output_range / OUTPUT_SCALE, FRACTION_BITS),
-                error_gain=ERROR.gain(error_range),
-                current_gain=CURRENT.gain(current_range),
-            ),
+        return self.compile_with(design, ERROR, CURRENT)
+
+    def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> Drive:
+        """The same controller with a table of other resolution."""
+        p = _Parameters.of(design)
+        table = LookupTable(
+            values=quantised_table(*p.weights, p.shape, error, current)[:, :, np.newaxis],
+            output_gain=to_fixed(p.output_range / OUTPUT_SCALE, FRACTION_BITS),
+            error_gain=error.gain(p.error_range),
+            current_gain=current.gain(p.current_range),
+        )
+        return Drive(integral_gain=p.integral, direct=table)
+
+    def without_table(self, design: Mapping[str, float]) -> Drive:
+        """The same controller by full inference, for comparison (reference kernel only)."""
+        p = _Parameters.of(design)
+        system = inference_system(*p.weights, p.shape)
+        exact = ExactInference(system, p.error_range, p.current_range, p.output_range)
+        return Drive(integral_gain=p.integral, direct=exact)
+
+
+@dataclass(frozen=True, slots=True)
+class _Parameters:
+    """A design's values, checked. weights: FW1, FW23, FW4, FW56."""
+
+    integral: int
+    error_range: float
+    current_range: float
+    output_range: float
+    weights: tuple[float, float, float, float]
+    shape: Shape
+
+    @classmethod
+    def of(cls, design: Mapping[str, float]) -> _Parameters:
+        fw1, fw23, fw4, fw56 = (
+            required(design, name, low=0.0, high=1.0) for name in ("FW1", "FW23", "FW4", "FW56")
+        )
+        return cls(
+            integral=integral_gain(required(design, "I", low=0.0, high=100.0)),
+            error_range=required(design, "FI1R", low=64.0, high=65535.0),
+            current_range=required(design, "FI2R", low=64.0, high=65535.0),
+            output_range=required(design, "FOR", low=1.0, high=32767.0),
+            weights=(fw1, fw23, fw4, fw56),
+            shape=Shape(required_integer(design, "FOMF", low=1, high=3)),
         )

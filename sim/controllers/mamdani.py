@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import reduce
 from typing import Final
 
 import numpy as np
@@ -102,13 +103,22 @@ class Mamdani:
         Returns (n_1, n_2, ...).
         """
         degrees = self.degrees(grid)
-        shape = tuple(d.shape[1] for d in degrees)
+        along = [
+            degree.reshape([len(degree), *(-1 if i == axis else 1 for i in range(len(degrees)))])
+            for axis, degree in enumerate(degrees)
+        ]
+        return self._crisp(along, tuple(degree.shape[1] for degree in degrees))
+
+    def infer_at(self, points: Mapping[str, Floats]) -> Floats:
+        """Crisp output at points: by input, in the order of `inputs`, coordinates (n,) -> (n,)."""
+        degrees = self.degrees(points)
+        return self._crisp(degrees, degrees[0].shape[1:])
+
+    def _crisp(self, degrees: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
+        """degrees: by input (rules, ...), of shapes that broadcast to (rules, *shape)."""
         levels = np.zeros((len(self.outputs), *shape))
         for k, (rule, target) in enumerate(zip(self.rules, self.consequents(), strict=True)):
-            strength: Floats = np.ones((1,) * len(shape))
-            for axis, degree in enumerate(degrees):
-                along = [-1 if i == axis else 1 for i in range(len(shape))]
-                strength = np.minimum(strength, degree[k].reshape(along))
+            strength = reduce(np.minimum, [degree[k] for degree in degrees])
             np.maximum(levels[target], strength * rule.weight, out=levels[target])
         return centroid(levels, self.output_memberships())
 

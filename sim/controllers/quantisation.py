@@ -41,6 +41,32 @@ class Axis:
         return to_fixed((n // 2 - 1 if self.centred else n - 1) / full_range, FRACTION_BITS)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ExactInference:
+    """`Response` by the inference itself in 64-bit numbers, which no table stands between.
+
+    Ranges in coded counts. For the reference kernel only.
+    """
+
+    system: Mamdani
+    error_range: float
+    current_range: float
+    output_range: float
+
+    def respond(
+        self, error: NDArray[np.int64], current: NDArray[np.int64], change: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """See `LookupTable.respond`; of two inputs."""
+        del change
+        crisp = self.system.infer_at(
+            {
+                "error": np.clip(error / self.error_range, -1.0, 1.0),
+                "current": np.clip(current / self.current_range, 0.0, 1.0),
+            }
+        )
+        return np.rint(crisp * self.output_range * (1 << FRACTION_BITS)).astype(np.int64)
+
+
 def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1) -> int:
     """Memory of a lookup table, eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits)."""
     return outputs * output_bits * (1 << sum(input_bits)) // 8

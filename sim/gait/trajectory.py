@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,13 @@ from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import UnreachablePose
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import leg_angles
+from sim.gait.quadratic_spline import quadratic_spline
 from sim.robot import Robot
 from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
+
+_CURVES: Final = {"half_ellipse": half_ellipse, "quadratic_spline": quadratic_spline}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +56,7 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
     for leg, data in zip(robot.legs, robot.description.legs, strict=True):
         # A right turn shortens the right legs' stride; a negative turn the left legs'.
         inner = max(0.0, -leg.side * scenario.turn)
-        forward, lift = half_ellipse(
+        forward, lift = _CURVES[scenario.curve](
             np.mod(time / scenario.cycle_time + data.phase, 1.0),
             stride=scenario.stride * (1.0 - inner),
             height=scenario.height,

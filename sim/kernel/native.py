@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import LookupTable
+from sim.controllers.base import LookupTable, Response
+from sim.errors import SimulationInputError
 from sim.kernel.parameters import BodyInertia, Layout
 from sim.kernel.walk import Coding, WalkResult, WalkSetup
 from sim.native.compilation import load_library, vector_header
@@ -101,9 +102,13 @@ class _Addresses:
         self._kept.append(contiguous)
         return int(contiguous.ctypes.data)
 
-    def table(self, table: LookupTable | None) -> _Table:
+    def table(self, table: Response | None) -> _Table:
         if table is None:
             return _Table()
+        if not isinstance(table, LookupTable):
+            raise SimulationInputError(
+                "the native kernel runs tables only; an inference needs backend='reference'"
+            )
         return _Table(
             self.of(table.values, np.int8),
             *table.values.shape,

@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive, LookupTable
-from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS
+from sim.controllers.base import Drive
+from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
 from sim.kernel.physics_step import TERMS, PhysicsModel, physics_model
 from sim.kernel.walk import CODE_LIMIT, Coding, WalkResult, WalkSetup
 from sim.outcome import Status
@@ -124,29 +124,15 @@ def _control(drive: Drive, coding: Coding, error: Ints, load: Ints, past: _Past)
     direct = error * drive.proportional_gain + change * drive.derivative_gain
     grown = past.integral + error * drive.integral_gain
     if drive.direct is not None:
-        direct = direct + _look_up(drive.direct, error, load, change)
+        direct = direct + drive.direct.respond(error, load, change)
     if drive.integrated is not None:
-        grown = grown + _look_up(drive.integrated, error, load, change)
+        grown = grown + drive.integrated.respond(error, load, change)
     full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
     past.error, past.integral = error, np.clip(grown, -full, full)
-    output = _descale(direct, FRACTION_BITS) + _descale(past.integral, INTEGRAL_BITS)
+    output = descale(direct, FRACTION_BITS) + descale(past.integral, INTEGRAL_BITS)
     coarse = _coarsen(np.clip(output, -limit, limit), coding.pwm_step)
     pwm: Ints = np.clip(coarse, -limit, limit)
     return pwm
-
-
-def _look_up(table: LookupTable, error: Ints, load: Ints, change: Ints) -> Ints:
-    rows, columns, layers = table.values.shape
-    row = _descale(error * table.error_gain, FRACTION_BITS) + rows // 2
-    column = _descale(load * table.current_gain, FRACTION_BITS)
-    layer = _descale(change * table.velocity_gain, FRACTION_BITS) + layers // 2
-    entry = table.values[
-        np.clip(row, 0, rows - 1),
-        np.clip(column, 0, columns - 1),
-        np.clip(layer, 0, layers - 1),
-    ]
-    output: Ints = entry.astype(np.int64) * table.output_gain
-    return output
 
 
 def _status_of(q: Floats, v: Floats, setup: WalkSetup) -> Status:
@@ -168,12 +154,6 @@ def _coarsen(code: Ints, step: int) -> Ints:
     """Nearest multiple of step."""
     coarse: Ints = (code + step // 2) // step * step
     return coarse
-
-
-def _descale(value: Ints, bits: int) -> Ints:
-    """Fixed point to integer, halves up."""
-    integer: Ints = (value + (1 << (bits - 1))) >> bits
-    return integer
 
 
 def _padded(rows: list[Floats], ticks: int) -> Floats:

@@ -1,0 +1,132 @@
+"""`gaitswarm study`: what the model's simplifications cost."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Json, RobotOption
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sim.studies.accuracy import Deviation
+
+Design = Annotated[
+    str, typer.Option(metavar="FILE|published:NAME", help="Design as for `simulate`.")
+]
+Controller = Annotated[str, typer.Option(help="Controller of the design.")]
+Scenario = Annotated[str, typer.Option(help="Name or number, several separated by commas, or all.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the group of commands."""
+    studies = typer.Typer(help="Measure what tables, steps and noise do to the objectives.")
+    studies.command()(tables)
+    studies.command()(steps)
+    studies.command()(noise)
+    app.add_typer(studies, name="study")
+
+
+def tables(
+    design: Design = "published:A",
+    scenario: Scenario = "all",
+    robot: RobotOption = None,
+    as_json: Json = False,
+) -> None:
+    """Compare a Fuzzy-PI's tables of 6 x 6, 8 x 8 and 10 x 6 bits with full inference."""
+    from cli.design_file import read_design
+    from cli.robots import chosen_robot, chosen_scenarios
+    from sim.studies.accuracy import tables_against_inference
+
+    values = read_design(design, "fuzzy-pi")
+    _show(
+        tables_against_inference(values, chosen_scenarios(scenario), robot=chosen_robot(robot)),
+        as_json=as_json,
+    )
+
+
+def steps(
+    design: Design = "published:A",
+    controller: Controller = "fuzzy-pi",
+    scenario: Scenario = "all",
+    robot: RobotOption = None,
+    as_json: Json = False,
+) -> None:
+    """Compare physics at 5, 10 and 20 kHz with 40 kHz."""
+    from cli.design_file import read_design
+    from cli.robots import chosen_robot, chosen_scenarios
+    from sim.studies.accuracy import step_halving
+
+    values = read_design(design, controller)
+    chosen = chosen_scenarios(scenario)
+    _show(step_halving(controller, values, chosen, robot=chosen_robot(robot)), as_json=as_json)
+
+
+def noise(
+    design: Design = "published:A",
+    controller: Controller = "fuzzy-pi",
+    scenario: Scenario = "1",
+    deviation: Annotated[float, typer.Option(help="Standard deviation of the noise [N m].")] = 10.0,
+    robot: RobotOption = None,
+    as_json: Json = False,
+) -> None:
+    """Put torque noise on one kind of link after the other; ratios to the noiseless walk."""
+    from cli.design_file import read_design
+    from cli.robots import chosen_robot, chosen_scenarios
+    from sim.studies.accuracy import noise_on_links
+
+    values = read_design(design, controller)
+    chosen = chosen_scenarios(scenario)
+    found = noise_on_links(
+        controller, values, chosen, robot=chosen_robot(robot), deviation=deviation
+    )
+    _show(found, as_json=as_json, ratios=True)
+
+
+_HEADS = {
+    "torque": "torque",
+    "acceleration": "accel.",
+    "angular_acceleration": "ang.acc.",
+    "energy": "energy",
+    "reciprocal_speed": "1/speed",
+}
+
+
+def _show(deviations: Iterable[Deviation], *, as_json: bool, ratios: bool = False) -> None:
+    import json
+    import math
+
+    from rich.table import Table
+
+    from cli.output import print_text, stdout_console
+    from sim.outcome import OBJECTIVE_NAMES
+
+    rows = list(deviations)
+    if as_json:
+        items = [
+            {
+                "variant": row.variant,
+                "scenario": row.scenario,
+                "ratio": {
+                    name: value if math.isfinite(value) else None
+                    for name, value in zip(OBJECTIVE_NAMES, row.ratio.tolist(), strict=True)
+                },
+            }
+            for row in rows
+        ]
+        print_text(json.dumps(items, indent=2))
+        return
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("scenario", no_wrap=True)
+    table.add_column("variant", no_wrap=True)
+    # f6 is a difference of millimetres, and its ratio says little.
+    for name in OBJECTIVE_NAMES[:5]:
+        table.add_column(_HEADS[name], justify="right")
+    for row in rows:
+        values = row.ratio if ratios else 100.0 * row.relative
+        unit = "" if ratios else " %"
+        cells = [f"{v:.2f}{unit}" if math.isfinite(v) else "-" for v in values.tolist()[:5]]
+        table.add_row(row.scenario, row.variant, *cells)
+    stdout_console().print(table)

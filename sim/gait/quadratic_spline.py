@@ -1,0 +1,35 @@
+"""The foot's curve of 2011: a straight support and a swing by a quadratic spline.
+
+Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. The driving of 2011 sent 40 points a
+step and took 25.2 / w_S seconds for one (`STEP_TIME`).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+POINTS_A_STEP: Final = 40
+
+STEP_TIME: Final = 25.2
+"""Seconds for one step at walking speed w_S = 1; the robot knew 7.5, 10, 12, 15 and 20."""
+
+
+def quadratic_spline(
+    phase: Floats, *, stride: float, height: float, duty_factor: float
+) -> tuple[Floats, Floats]:
+    """Foot position in its leg's frame; arguments and results as of `half_ellipse`.
+
+    The spline's middle point lies at twice the height, so that the foot reaches the height.
+    """
+    supporting = phase < duty_factor
+    support = phase / duty_factor
+    a = np.clip((phase - duty_factor) / (1.0 - duty_factor), 0.0, 1.0)
+    rear, front = (1.0 - a) ** 2, a**2
+    forward = np.where(supporting, 0.5 - support, 0.5 * (front - rear)) * stride
+    lift = np.where(supporting, 0.0, 2.0 * a * (1.0 - a) * 2.0 * height)
+    return forward, lift

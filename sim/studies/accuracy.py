@@ -1,0 +1,153 @@
+"""What the model's simplifications cost: tables for inference, steps for time, noise on links."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.base import Drive
+from sim.controllers.fuzzy_pi import FuzzyPi
+from sim.controllers.quantisation import Axis
+from sim.errors import SimulationInputError
+from sim.kernel.reference import reference_kernel
+from sim.kernel.walk import Coding
+from sim.noise import LinkNoise
+from sim.outcome import Status
+from sim.robot import load_robot
+from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import PHYSICS_RATE, RobotChoice, course_of, judge, simulate
+
+RESOLUTIONS: Final = ((6, 6), (8, 8), (10, 6))
+"""Bits of error and current in the tables that are compared."""
+
+RATES: Final = (5_000, 10_000, 20_000)
+
+NOISE: Final = 10.0
+"""Standard deviation [N m] of the study's noise; the thesis does not give its own."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """Objectives of one variant of a walk against its reference, (6,) each, NaN where undefined.
+
+    ratio: variant over reference; `relative` is its distance from one.
+    """
+
+    variant: str
+    scenario: str
+    reference: Floats
+    ratio: Floats
+
+    @property
+    def relative(self) -> Floats:
+        """(6,) relative difference."""
+        return np.abs(self.ratio - 1.0)
+
+
+def tables_against_inference(
+    design: Mapping[str, float],
+    scenarios: Sequence[Scenario] = SCENARIOS,
+    *,
+    robot: RobotChoice = "szabadka2",
+) -> tuple[Deviation, ...]:
+    """A Fuzzy-PI's tables of several resolutions against 64-bit inference (section 5.3).
+
+    All walk in the reference kernel, so that nothing but the table differs.
+    """
+    controller = FuzzyPi()
+    deviations = []
+    for scenario in scenarios:
+        exact = _reference_walk(scenario, controller.without_table(design), robot)
+        for error, current in RESOLUTIONS:
+            drive = controller.compile_with(design, Axis(error, True), Axis(current, False))
+            deviations.append(
+                Deviation(
+                    f"{error}x{current} bit",
+                    scenario.name,
+                    exact,
+                    _reference_walk(scenario, drive, robot) / exact,
+                )
+            )
+    return tuple(deviations)
+
+
+def step_halving(
+    controller: str,
+    design: Mapping[str, float],
+    scenarios: Sequence[Scenario] = SCENARIOS,
+    *,
+    robot: RobotChoice = "szabadka2",
+) -> tuple[Deviation, ...]:
+    """Physics at 5, 10 and 20 kHz against 40 kHz."""
+    deviations = []
+    for scenario in scenarios:
+        finest = _walk(scenario, controller, design, robot, physics_rate=2 * RATES[-1])
+        for rate in RATES:
+            walked = _walk(scenario, controller, design, robot, physics_rate=rate)
+            deviations.append(
+                Deviation(f"{rate // 1000} kHz", scenario.name, finest, walked / finest)
+            )
+    return tuple(deviations)
+
+
+def noise_on_links(
+    controller: str,
+    design: Mapping[str, float],
+    scenarios: Sequence[Scenario] = SCENARIOS[:1],
+    *,
+    robot: RobotChoice = "szabadka2",
+    deviation: float = NOISE,
+    seed: int = 1,
+) -> tuple[Deviation, ...]:
+    """Torque noise on link 1, 2 or 3 relative to the noiseless run (table 2.9)."""
+    deviations = []
+    for scenario in scenarios:
+        calm = _walk(scenario, controller, design, robot)
+        for link in (1, 2, 3):
+            noise = LinkNoise(link=link, deviation=deviation, seed=seed)
+            noisy = _walk(scenario, controller, design, robot, noise=noise)
+            deviations.append(Deviation(f"link {link}", scenario.name, calm, noisy / calm))
+    return tuple(deviations)
+
+
+def _walk(
+    scenario: Scenario,
+    controller: str,
+    design: Mapping[str, float],
+    robot: RobotChoice,
+    *,
+    physics_rate: int = PHYSICS_RATE,
+    noise: LinkNoise | None = None,
+) -> Floats:
+    values = np.array([list(design.values())])
+    outcome = simulate(
+        scenario,
+        controller,
+        list(design),
+        values,
+        robot=robot,
+        physics_rate=physics_rate,
+        noise=noise,
+    ).outcome
+    objectives: Floats = outcome.objectives[0]
+    return objectives
+
+
+def _reference_walk(scenario: Scenario, drive: Drive, robot: RobotChoice) -> Floats:
+    machine = load_robot(robot)
+    kernel = reference_kernel(machine)
+    timestep = 1.0 / PHYSICS_RATE
+    course = course_of(machine, kernel, scenario, timestep)
+    if course is None:
+        raise SimulationInputError(f"scenario {scenario.name!r}: out of the legs' reach")
+    setup = course(drive)
+    coding = Coding.of(machine, 10)
+    (result,) = kernel.walk([setup], coding, log=False)
+    status, objectives = judge(setup, result, coding.substeps, timestep)
+    return objectives if status is Status.OK else np.full_like(objectives, np.nan)

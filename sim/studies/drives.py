@@ -1,0 +1,139 @@
+"""Named drives side by side on the same walks (the form of thesis table 5.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.errors import SimulationInputError
+from sim.outcome import Status
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
+from sim.simulate import RobotChoice, simulate
+
+
+@dataclass(frozen=True, slots=True)
+class NamedDrive:
+    """A controller with its design, and what it changes of a scenario's trajectory.
+
+    design: by variable, controller and gait alike; trajectory: fields of `Scenario`.
+    """
+
+    name: str
+    description: str
+    controller: ControllerName
+    design: Mapping[str, float]
+    trajectory: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class WalkFigures:
+    """One drive in one scenario. speed [m/s], power [W], effectivity [m/J]; None if it failed.
+
+    objectives: f1..f6 by name, None where there is none.
+    """
+
+    drive: str
+    scenario: str
+    status: Status
+    speed: float | None
+    power: float | None
+    effectivity: float | None
+    objectives: Mapping[str, float | None]
+
+
+def _published(controller: ControllerName, study: str) -> Mapping[str, float]:
+    return CONTROLLERS[controller].published[study]
+
+
+DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
+    {
+        drive.name: drive
+        for drive in (
+            NamedDrive(
+                "2011",
+                "P = 0.25, spline trajectory in steps at 20 Hz, no filter (section 5.4)",
+                "p",
+                _published("p", "2011"),
+                {"curve": "quadratic_spline", "trajectory_rate": 20.0, "fir_ms": 0},
+            ),
+            NamedDrive(
+                "2016",
+                "published Fuzzy-PI A, half-ellipse at 500 Hz (section 5.4)",
+                "fuzzy-pi",
+                _published("fuzzy-pi", "A"),
+            ),
+            NamedDrive("pi", "PI in the thesis's optimized range", "pi", {"P": 0.45, "I": 0.1}),
+            NamedDrive(
+                "fuzzy-pi-3",
+                "published Fuzzy-PI of chapter 3, in the scenario's own gait",
+                "fuzzy-pi-3",
+                _published("fuzzy-pi-3", "PSO-PS"),
+            ),
+        )
+    }
+)
+"""Drives that the thesis compares."""
+
+
+def find_drive(name: str) -> NamedDrive:
+    """Raises SimulationInputError that names those that exist."""
+    if name not in DRIVES:
+        raise SimulationInputError(f"drive: unknown {name!r}; known are {', '.join(DRIVES)}")
+    return DRIVES[name]
+
+
+def compare(
+    drives: Sequence[NamedDrive],
+    scenarios: Sequence[Scenario],
+    *,
+    robot: RobotChoice = "szabadka2",
+) -> tuple[WalkFigures, ...]:
+    """Every drive in every scenario, scenario by scenario."""
+    return tuple(
+        walk_figures(drive, scenario, robot=robot) for scenario in scenarios for drive in drives
+    )
+
+
+def walk_figures(
+    drive: NamedDrive, scenario: Scenario, *, robot: RobotChoice = "szabadka2"
+) -> WalkFigures:
+    """Let one drive walk. Power is energy per metre times speed."""
+    gait = {k: v for k, v in drive.trajectory.items() if k not in drive.design}
+    walked = Scenario.model_validate(scenario.model_dump() | gait)
+    names = list(drive.design)
+    outcome = simulate(
+        walked, drive.controller, names, np.array([list(drive.design.values())]), robot=robot
+    ).outcome
+    f1, f2, f3, f4, f5, f6 = (
+        float(value) if np.isfinite(value) else None for value in outcome.objectives[0]
+    )
+    return WalkFigures(
+        drive=drive.name,
+        scenario=scenario.name,
+        status=Status(int(outcome.statuses[0])),
+        speed=None if f5 is None else 1.0 / f5,
+        power=None if f4 is None or f5 is None else f4 / f5,
+        effectivity=None if f4 is None else 1.0 / f4,
+        objectives={
+            "torque": f1,
+            "acceleration": f2,
+            "angular_acceleration": f3,
+            "energy": f4,
+            "reciprocal_speed": f5,
+            "height_loss": f6,
+        },
+    )
+
+
+def drive_of_design(
+    name: str, controller: ControllerName, design: Mapping[str, float]
+) -> NamedDrive:
+    """A drive from a design file or a job's best. Raises SimulationInputError."""
+    own = {k: v for k, v in design.items() if k not in GAIT_VARIABLE_NAMES}
+    CONTROLLERS[controller].compile(own)
+    return NamedDrive(name, f"{controller} as designed", controller, design)

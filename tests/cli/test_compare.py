@@ -1,0 +1,64 @@
+"""`compare` and `study` as a person meets them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.main import run
+
+
+def test_drives_are_compared_side_by_side(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    picture = tmp_path / "drives.png"
+    arguments = ["compare", "2011", "pi", "--scenario", "1,2", "--json", "--plot", str(picture)]
+    assert run(arguments) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [(r["drive"], r["scenario"]) for r in rows] == [
+        ("2011", "normal-fast"),
+        ("pi", "normal-fast"),
+        ("2011", "normal-slow"),
+        ("pi", "normal-slow"),
+    ]
+    assert all(r["status"] == "ok" and r["speed"] > 0.1 for r in rows)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_design_file_is_compared_on_a_variant_of_the_robot(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    design = tmp_path / "pid.json"
+    design.write_text('{"P": 0.4, "I": 0.1, "D": 0.002}')
+    variant = '{"contact_law": "stick"}'
+    arguments = ["compare", "pi", f"pid:{design}", "--scenario", "1", "--robot", variant]
+    assert run(arguments) == 0
+    assert f"pid:{design}"[:20] in capsys.readouterr().out.replace("\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["compare", "2012"], "2012"),
+        (["compare", "mpc:design.json"], "mpc"),
+        (["compare", "--scenario", "moon"], "moon"),
+        (["compare", "--robot", '{"gearlash": 3}'], "robot.gearlash"),
+        (["compare", "--robot", "{"], "robot"),
+        (["study", "steps", "--scenario", "moon"], "moon"),
+    ],
+)
+def test_what_makes_no_sense_is_exit_code_2(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_study_is_told_as_ratios(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["study", "noise", "--json", "--deviation", "5"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["variant"] for row in rows] == ["link 1", "link 2", "link 3"]
+    assert run(["study", "steps", "--scenario", "1"]) == 0
+    assert "5 kHz" in capsys.readouterr().out

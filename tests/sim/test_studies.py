@@ -1,0 +1,84 @@
+"""Drives side by side, and what the model's simplifications cost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.controllers import CONTROLLERS
+from sim.controllers.fuzzy_pi import FuzzyPi
+from sim.errors import SimulationInputError
+from sim.kernel.native import native_kernel
+from sim.kernel.walk import Coding
+from sim.outcome import Status
+from sim.robot import load_robot
+from sim.scenario import SCENARIOS
+from sim.simulate import PHYSICS_RATE, course_of
+from sim.studies.accuracy import noise_on_links, step_halving, tables_against_inference
+from sim.studies.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
+
+OPTIMUM = CONTROLLERS["fuzzy-pi"].published["A"]
+BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
+
+
+def test_figures_of_a_drive_are_those_of_its_objectives() -> None:
+    figures = walk_figures(find_drive("pi"), SCENARIOS[0])
+    assert figures.status is Status.OK
+    energy, pace = figures.objectives["energy"], figures.objectives["reciprocal_speed"]
+    assert energy is not None
+    assert pace is not None
+    assert figures.speed == pytest.approx(1.0 / pace)
+    assert figures.power == pytest.approx(energy / pace)
+    assert figures.effectivity == pytest.approx(1.0 / energy)
+
+
+def test_the_drive_of_2011_shakes_more_than_the_one_of_2016_and_steps_at_20_hz() -> None:
+    old = find_drive("2011")
+    assert old.trajectory["trajectory_rate"] == 20.0
+    assert old.trajectory["curve"] == "quadratic_spline"
+    smooth = drive_of_design("smooth", "p", {**old.design, "trajectory_rate": 500.0})
+    rough, calm = (walk_figures(drive, SCENARIOS[0]) for drive in (old, smooth))
+    assert rough.objectives["angular_acceleration"] > 2.0 * calm.objectives["angular_acceleration"]  # type: ignore[operator]
+
+
+def test_every_named_drive_is_compared_in_every_scenario() -> None:
+    figures = compare(list(DRIVES.values()), [BRIEF, SCENARIOS[0]])
+    assert [(f.scenario, f.drive) for f in figures] == [
+        (scenario, drive) for scenario in ("normal-fast", "normal-fast") for drive in DRIVES
+    ]
+
+
+def test_an_unknown_drive_is_answered_with_those_that_exist() -> None:
+    with pytest.raises(SimulationInputError, match="unknown '2012'; known are 2011, 2016"):
+        find_drive("2012")
+
+
+def test_finer_tables_are_closer_to_the_inference() -> None:
+    coarse, _, fine = tables_against_inference(OPTIMUM, [BRIEF])
+    assert (coarse.variant, fine.variant) == ("6x6 bit", "10x6 bit")
+    assert fine.relative[:5].max() < 0.02
+    assert 0.0 < fine.relative[:5].mean() < coarse.relative[:5].mean() < 0.05
+
+
+def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
+    robot = load_robot("szabadka2")
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    course = course_of(robot, kernel, BRIEF, 1.0 / PHYSICS_RATE)
+    assert course is not None
+    with pytest.raises(SimulationInputError, match="backend='reference'"):
+        kernel.walk([course(FuzzyPi().without_table(OPTIMUM))], Coding.of(robot, 10), log=False)
+
+
+def test_five_kilohertz_keep_every_objective_within_one_percent() -> None:
+    for deviation in step_halving("fuzzy-pi", OPTIMUM):
+        assert np.nanmax(deviation.relative[:5]) < 0.01
+
+
+def test_noise_is_reported_for_each_link_against_the_noiseless_walk() -> None:
+    found = noise_on_links("pi", {"P": 0.45, "I": 0.1})
+    assert [d.variant for d in found] == ["link 1", "link 2", "link 3"]
+    # Torque and accelerations grow on every link, as in table 2.9; speed hardly changes.
+    for deviation in found:
+        assert (deviation.ratio[:3] > 1.0).all()
+        assert deviation.ratio[4] == pytest.approx(1.0, abs=0.15)

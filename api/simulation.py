@@ -12,7 +12,7 @@ from services.optimizer.errors import InvalidRequest
 from services.optimizer.preference import PREFERENCES, Preference, PreferenceName
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
-from sim.robot import RobotName, RobotVariant
+from sim.robot import RobotSource
 from sim.scenario import (
     GAIT_VARIABLE_NAMES,
     SCENARIOS,
@@ -29,10 +29,10 @@ class SimulationRequest(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    robot: RobotName | RobotVariant = Field(
+    robot: RobotSource = Field(
         default="szabadka2",
         description="Robot to simulate, by name, or a variant with another law of friction or with"
-        " gearlash.",
+        " gearlash, or the text of the files of your own.",
     )
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller that drives it; see /v1/controllers."

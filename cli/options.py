@@ -28,7 +28,9 @@ PreferenceOption = Annotated[
     str | None, typer.Option("--preference", help="How objectives are weighed: A, B or C.")
 ]
 
-Scenarios = Annotated[str | None, typer.Option(help="Names or numbers, separated by commas.")]
+Scenarios = Annotated[
+    str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
+]
 
 ControllerOption = Annotated[
     str | None, typer.Option("--controller", help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")
@@ -38,9 +40,9 @@ RobotOption = Annotated[
     str | None,
     typer.Option(
         "--robot",
-        metavar="NAME|JSON",
-        help="Robot by name, or a variant as JSON, such as"
-        ' {"contact_law": "stick", "gearlash": [2.5, 1, 1]}.',
+        metavar="NAME|JSON|FOLDER",
+        help="Robot by name, a variant as JSON, such as"
+        ' {"contact_law": "stick", "gearlash": [2.5, 1, 1]}, or the folder of your own.',
     ),
 ]
 

@@ -3,37 +3,104 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from sim.robot import RobotVariant
+    from sim.robot import RobotFiles, RobotVariant
     from sim.scenario import Scenario
 
 
-def chosen_robot(text: str | None) -> str | RobotVariant:
-    """A robot's name, or a variant as JSON. Raises InvalidRequest that names the field."""
-    from pydantic import ValidationError
+def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
+    """A robot's name, a variant as JSON, or a folder. Raises InvalidRequest."""
+    from pydantic import TypeAdapter, ValidationError
 
-    from sim.robot import RobotVariant
+    from sim.robot import RobotSource
+    from sim.robot.robot import SHIPPED
 
-    if text is None or not text.lstrip().startswith("{"):
-        return text or "szabadka2"
+    data = robot_data(text)
+    if isinstance(data, str) and data not in SHIPPED:
+        raise InvalidRequest(
+            f"unknown robot {data!r}; known are {', '.join(SHIPPED)}, or name a folder that holds"
+            " robot.toml and robot.urdf",
+            field="robot",
+        )
     try:
-        return RobotVariant.model_validate(json.loads(text))
-    except json.JSONDecodeError as error:
-        raise InvalidRequest(f"not JSON: {error}", field="robot") from error
+        robot: str | RobotVariant | RobotFiles = TypeAdapter(RobotSource).validate_python(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in ("robot", *first["loc"]))
-        raise InvalidRequest(first["msg"], field=where) from error
+        # A union tells what is wrong with each of its members: only the one meant is of interest.
+        kind = "RobotFiles" if _is_files(data) else "RobotVariant"
+        chosen = [e for e in error.errors(include_url=False) if kind in str(e["loc"][0])]
+        first = (chosen or error.errors(include_url=False))[0]
+        within = first["loc"][1:] if chosen and not isinstance(data, str) else ()
+        where = ".".join(str(part) for part in ("robot", *within))
+        raise InvalidRequest(first["msg"].removeprefix("Value error, "), field=where) from error
+    return robot
+
+
+def robot_data(text: str | None) -> str | dict[str, Any]:
+    """What a spec would hold under `robot`, unchecked. Raises InvalidRequest."""
+    if text is None:
+        return "szabadka2"
+    if text.lstrip().startswith("{"):
+        try:
+            data: dict[str, Any] = json.loads(text)
+        except ValueError as error:
+            raise InvalidRequest(f"not JSON: {error}", field="robot") from error
+        return data
+    folder = Path(text)
+    if not folder.is_dir():
+        return text
+    try:
+        return {
+            kind: (folder / f"robot.{kind}").read_text(encoding="utf-8")
+            for kind in ("toml", "urdf")
+        }
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidRequest(f"{folder} is not a robot's folder: {error}", field="robot") from error
+
+
+def _is_files(data: str | dict[str, Any]) -> bool:
+    return isinstance(data, dict) and ("toml" in data or "urdf" in data)
+
+
+def scenario_data(text: str) -> list[str | dict[str, Any]]:
+    """What a spec would hold under `scenarios`: names and numbers, and the contents of files.
+
+    text: `all`, or entries separated by commas, FILE.json for a scenario of one's own. Raises
+    InvalidRequest for a file that is not JSON.
+    """
+    from sim.scenario import SCENARIOS
+
+    if text == "all":
+        return [scenario.name for scenario in SCENARIOS]
+    return [_scenario_entry(entry.strip()) for entry in text.split(",")]
 
 
 def chosen_scenarios(text: str) -> tuple[Scenario, ...]:
-    """`all`, or names and numbers separated by commas. Raises SimulationInputError."""
-    from sim.scenario import SCENARIOS, find_scenario
+    """The scenarios of `scenario_data`. Raises SimulationInputError, InvalidRequest."""
+    from pydantic import ValidationError
 
-    if text == "all":
-        return SCENARIOS
-    return tuple(find_scenario(name.strip()) for name in text.split(","))
+    from sim.scenario import Scenario, find_scenario
+
+    try:
+        return tuple(
+            find_scenario(entry) if isinstance(entry, str) else Scenario.model_validate(entry)
+            for entry in scenario_data(text)
+        )
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in ("scenario", *first["loc"]))
+        raise InvalidRequest(first["msg"], field=where) from error
+
+
+def _scenario_entry(entry: str) -> str | dict[str, Any]:
+    if not entry.endswith(".json"):
+        return entry
+    try:
+        data: dict[str, Any] = json.loads(Path(entry).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidRequest(f"cannot read {entry}: {error}", field="scenario") from error
+    return data

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from cli.robots import chosen_robot, scenario_data
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ class Overrides:
     scenarios: str | None = None
     controller: str | None = None
     name: str | None = None
+    robot: str | None = None
 
     @property
     def any(self) -> bool:
@@ -75,7 +77,9 @@ def build_spec(path: Path | None, overrides: Overrides) -> JobSpec:
     data = read_json_object(path, "spec") if path is not None else {}
     chosen = {name: value for name, value in asdict(overrides).items() if value is not None}
     if overrides.scenarios is not None:
-        chosen["scenarios"] = [name.strip() for name in overrides.scenarios.split(",")]
+        chosen["scenarios"] = scenario_data(overrides.scenarios)
+    if overrides.robot is not None:
+        chosen["robot"] = chosen_robot(overrides.robot)
     particles = chosen.pop("particles", None)
     if particles is not None:
         optimizer = data.get("optimizer", {})

@@ -23,7 +23,7 @@ from sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup
 from sim.native.compilation import target
 from sim.noise import LinkNoise
 from sim.outcome import N_OBJECTIVES, Outcome, Status
-from sim.robot import Robot, RobotVariant, load_robot
+from sim.robot import Robot, RobotFiles, RobotVariant, load_robot
 from sim.robot.posture import resting_height
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
 
@@ -36,7 +36,7 @@ GEARLASH_PHYSICS_RATE: Final = 20_000
 """Rate [Hz] for robots with gearlash: without their rotors, tibias answer the ground too fast for
 5 kHz."""
 
-RobotChoice = str | RobotVariant | Robot
+RobotChoice = str | RobotVariant | RobotFiles | Robot
 """How a robot is named to the simulator."""
 
 SHORTEST_WALK: Final = 1e-3

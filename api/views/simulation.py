@@ -14,7 +14,7 @@ from api.views.evaluation import ScenarioResultView, scenario_results
 from services.optimizer.preference import Preference, geometric_mean, log_utilities
 from sim.kernel.observation import WalkLog
 from sim.outcome import Status
-from sim.robot import RobotVariant
+from sim.robot import RobotSource
 
 LOG_RATE: Final = 500
 """Rows of a log per second of simulated time [Hz]."""
@@ -87,7 +87,7 @@ class SimulatedScenarioView(ScenarioResultView):
 class SimulationView(View):
     """What one design is worth."""
 
-    robot: str | RobotVariant = Field(
+    robot: RobotSource = Field(
         description="Robot that walked, as it was asked for.", examples=["szabadka2"]
     )
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
@@ -108,7 +108,7 @@ class SimulationView(View):
     def from_walks(
         cls,
         *,
-        robot: str | RobotVariant,
+        robot: RobotSource,
         controller: str,
         design: Mapping[str, float],
         preference: Preference,

@@ -15,6 +15,7 @@ from cli.options import (
     Json,
     Particles,
     PreferenceOption,
+    RobotOption,
     Scenarios,
     Seed,
     Server,
@@ -41,6 +42,7 @@ def submit(
     preference: PreferenceOption = None,
     scenarios: Scenarios = None,
     controller: ControllerOption = None,
+    robot: RobotOption = None,
     name: JobName = None,
     idempotency_key: Annotated[
         str | None, typer.Option(help="The same key and spec again make no second job.")
@@ -54,7 +56,9 @@ def submit(
     from cli.output import note, print_json, stdout_console
     from cli.spec_file import Overrides, build_spec
 
-    overrides = Overrides(iterations, particles, seed, preference, scenarios, controller, name)
+    overrides = Overrides(
+        iterations, particles, seed, preference, scenarios, controller, name, robot
+    )
     asked = build_spec(spec, overrides)
     with open_jobs(server, db, create=True) as jobs:
         job = jobs.submit(asked, idempotency_key=idempotency_key)

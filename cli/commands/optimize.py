@@ -17,6 +17,7 @@ from cli.options import (
     Particles,
     PreferenceOption,
     RayAddress,
+    RobotOption,
     Scenarios,
     Seed,
     SpecFile,
@@ -36,6 +37,7 @@ def optimize(
     preference: PreferenceOption = None,
     scenarios: Scenarios = None,
     controller: ControllerOption = None,
+    robot: RobotOption = None,
     name: JobName = None,
     resume: Annotated[
         str | None,
@@ -72,7 +74,9 @@ def optimize(
     if as_json and compare_published:
         raise InvalidRequest("is for people; leave it out with --json", field="compare-published")
     workers = Embedded(evaluator_kind(evaluator), ray_address=ray_address, cpus=cpus)
-    overrides = Overrides(iterations, particles, seed, preference, scenarios, controller, name)
+    overrides = Overrides(
+        iterations, particles, seed, preference, scenarios, controller, name, robot
+    )
     asked = None
     if resume is None or spec is not None or overrides.any:
         asked = build_spec(spec, overrides)

@@ -31,7 +31,7 @@ def simulate(
         str, typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")
     ] = "fuzzy-pi",
     scenario: Annotated[
-        str, typer.Option(help="Name or number, several separated by commas, or all.")
+        str, typer.Option(help="Name, number or FILE.json, several separated by commas, or all.")
     ] = "all",
     trajectory: Annotated[
         Path | None,
@@ -51,16 +51,14 @@ def simulate(
     from api.simulation import SimulationRequest, run_simulation
     from cli.design_file import read_design
     from cli.output import note
-    from cli.robots import chosen_robot
+    from cli.robots import chosen_robot, scenario_data
     from cli.spec_file import invalid_request
-    from sim.scenario import SCENARIOS
 
-    chosen = [s.name for s in SCENARIOS] if scenario == "all" else scenario.split(",")
     data = {
         "robot": chosen_robot(robot),
         "controller": controller,
         "design": read_design(design, controller, trajectory),
-        "scenarios": [name.strip() for name in chosen],
+        "scenarios": scenario_data(scenario),
         "preference": preference,
         "log": log is not None,
     }

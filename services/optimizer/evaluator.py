@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.outcome import Outcome
-from sim.robot import RobotVariant
+from sim.robot import RobotSource
 from sim.scenario import Scenario
 
 
@@ -22,7 +22,7 @@ class EvaluationRequest:
     """
 
     job_id: str
-    robot: str | RobotVariant
+    robot: RobotSource
     controller: str
     scenarios: tuple[Scenario, ...]
     variables: tuple[str, ...]

@@ -10,7 +10,7 @@ from services.optimizer.design_space import DesignSpace
 from services.optimizer.optimizers.pso import PsoSettings
 from services.optimizer.preference import PREFERENCES, Preference, PreferenceName
 from sim.controllers import CONTROLLERS, ControllerName
-from sim.robot import RobotName, RobotVariant
+from sim.robot import RobotSource
 from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, ScenarioName, find_scenario
 from sim.variables import Variable, VariableName
 
@@ -38,10 +38,10 @@ class JobSpec(BaseModel):
 
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
     name: str = Field(default="", max_length=200, description="For people; need not be unique.")
-    robot: RobotName | RobotVariant = Field(
+    robot: RobotSource = Field(
         default="szabadka2",
         description="Robot to simulate, by name, or a variant with another law of friction or with"
-        " gearlash.",
+        " gearlash, or the text of the files of your own.",
     )
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller to be tuned; see /v1/controllers."

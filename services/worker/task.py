@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim import simulate
 from sim.errors import SimulationError
 from sim.outcome import Outcome
-from sim.robot import RobotVariant
+from sim.robot import RobotSource
 from sim.scenario import Scenario
 
 
@@ -19,7 +19,7 @@ from sim.scenario import Scenario
 class Task:
     """Some designs in one scenario. designs: (n, len(variables))."""
 
-    robot: str | RobotVariant
+    robot: RobotSource
     controller: str
     scenario: Scenario
     variables: tuple[str, ...]

@@ -12,10 +12,22 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from sim.errors import RobotFileError, SimulationInputError
-from sim.robot.description import JOINTS_PER_LEG, Contact, RobotDescription
+from sim.robot.description import (
+    JOINTS_PER_LEG,
+    Contact,
+    DriveTrain,
+    Gearhead,
+    Leg,
+    Motor,
+    Pwm,
+    RobotDescription,
+    Sensors,
+    Supply,
+)
+from sim.robot.toml_lines import line_of
 
 SHIPPED: Final = ("szabadka2",)
 
@@ -141,15 +153,53 @@ def parse_robot(toml: str, urdf: str) -> Robot:
     except tomllib.TOMLDecodeError as error:
         raise RobotFileError(f"robot.toml: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise RobotFileError(f"robot.toml: {where}: {first['msg']}") from error
+        raise RobotFileError(_describe(error, toml)) from error
     joints = _joint_origins(urdf)
     return Robot(
         description,
         urdf,
         tuple(_geometry(leg.name, joints) for leg in description.legs),
     )
+
+
+def _describe(error: ValidationError, toml: str) -> str:
+    """What is wrong first, with field, line, and what the field means in which unit."""
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"])
+    line = line_of(toml, [part for part in first["loc"] if not _is_class(part)])
+    message = first["msg"].removeprefix("Value error, ")
+    meaning = _meaning(str(first["loc"][-1])) if first["loc"] else None
+    return (
+        "robot.toml"
+        + (f", line {line}" if line else "")
+        + (f": {where}" if where else "")
+        + f": {message}"
+        + (f" ({meaning})" if meaning else "")
+    )
+
+
+def _is_class(part: str | int) -> bool:
+    """Pydantic names the members of unions among the keys."""
+    return isinstance(part, str) and part[:1].isupper() and part.isidentifier()
+
+
+def _meaning(field: str) -> str | None:
+    """Description, with unit, of a field of any part of a robot description."""
+    parts: tuple[type[BaseModel], ...] = (
+        RobotDescription,
+        Motor,
+        Gearhead,
+        DriveTrain,
+        Supply,
+        Pwm,
+        Sensors,
+        Contact,
+        Leg,
+    )
+    for part in parts:
+        if field in part.model_fields:
+            return part.model_fields[field].description
+    return None
 
 
 def _joint_origins(urdf: str) -> dict[str, tuple[float, float, float]]:

@@ -1,4 +1,4 @@
-"""A robot with another law of friction, or with play in its gears."""
+"""Robots as jobs name them: shipped, a variant of a shipped one, or one's own files."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sim.robot.description import ContactLaw, DriveTrain, Leg
-from sim.robot.robot import Robot, shipped_robot
+from sim.robot.robot import Robot, parse_robot, shipped_robot
 
 RobotName = Literal["szabadka2"]
 """Robots that ship with gaitswarm."""
@@ -36,13 +36,36 @@ class RobotVariant(BaseModel):
     )
 
 
-def load_robot(robot: str | RobotVariant | Robot) -> Robot:
-    """The robot of that name or variant. Raises SimulationInputError for an unknown name."""
+class RobotFiles(BaseModel):
+    """A robot of one's own: the text of its two files, as those in sim/robot/szabadka2."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    toml: str = Field(max_length=200_000, description="robot.toml: legs, drives, contact, supply.")
+    urdf: str = Field(max_length=800_000, description="robot.urdf: kinematic tree and inertias.")
+
+    @model_validator(mode="after")
+    def _is_a_robot(self) -> RobotFiles:
+        _load_files(self)
+        return self
+
+
+RobotSource = RobotName | RobotVariant | RobotFiles
+"""How jobs and requests name a robot."""
+
+
+def load_robot(robot: str | RobotVariant | RobotFiles | Robot) -> Robot:
+    """The robot of that name, variant or description. Raises SimulationInputError."""
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str):
         return shipped_robot(robot)
-    return _load_variant(robot)
+    return _load_files(robot) if isinstance(robot, RobotFiles) else _load_variant(robot)
+
+
+@lru_cache(maxsize=32)
+def _load_files(files: RobotFiles) -> Robot:
+    return parse_robot(files.toml, files.urdf)
 
 
 @lru_cache(maxsize=32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -155,3 +156,10 @@ def test_scenarios_are_found_by_name_and_number() -> None:
     assert find_scenario("3") is find_scenario("loaded-fast") is SCENARIOS[2]
     with pytest.raises(SimulationInputError, match=r"unknown scenario 'moon'.*normal-fast"):
         find_scenario("moon")
+
+
+def test_an_unreachable_pose_comes_back_from_another_process_as_itself() -> None:
+    error = UnreachablePose("steep", "left_rear", 0.0123)
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is UnreachablePose
+    assert (again.leg, again.miss, str(again)) == (error.leg, error.miss, str(error))

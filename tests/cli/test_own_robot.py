@@ -1,0 +1,103 @@
+"""A robot that is not shipped walks through the same commands."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from cli.main import run
+
+QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
+CRAWL = str(QUADRUPED / "crawl.json")
+SIMULATE = ["simulate", "--controller", "pi", "--design", "published:validation", "--json"]
+
+
+def test_a_quadruped_crawls(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", CRAWL]) == 0
+    walked = json.loads(capsys.readouterr().out)["scenarios"]["crawl"]
+    assert walked["status"] == "ok"
+    # Stride over support: 0.08 m in 0.8 of 2 s.
+    assert 1.0 / walked["objectives"]["reciprocal_speed"] == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_job_with_a_quadruped_is_stored_with_its_robot(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    database = str(tmp_path / "jobs.db")
+    arguments = ["optimize", "--robot", str(QUADRUPED), "--scenarios", CRAWL, "--json"]
+    arguments += ["--controller", "pi", "--iterations", "2", "--particles", "3"]
+    assert run([*arguments, "--db", database, "--evaluator", "in-process"]) == 0
+    job = json.loads(capsys.readouterr().out)
+    assert job["state"] == "succeeded"
+    assert job["best"]["scenarios"]["crawl"]["status"] == "ok"
+    assert "quadruped" in job["spec"]["robot"]["toml"]
+
+
+def test_a_scenario_out_of_its_reach_is_refused_by_leg_and_millimetres(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    far = tmp_path / "far.json"
+    far.write_text('{"name": "far", "cycle_time": 2, "radius": 0.5, "withers": 0.16}')
+    assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", str(far)]) == 2
+    told = capsys.readouterr().err
+    assert "far" in told
+    assert "mm" in told
+
+
+@pytest.mark.parametrize(
+    ("line", "broken", "said"),
+    [
+        ("stiffness = 10000.0", "stiffness = -5.0", ("line 50", "contact.stiffness", "[N/m]")),
+        ('motor = "2232SR"', 'motor = "9999"', ("drives.coxa.motor", "9999")),
+        ("voltage = 11.6", 'voltage = "high"', ("supply.voltage", "[V]")),
+        ("counts = 511", "counts = = 511", ("line 39",)),
+        ("phase = 0.75", "phase = 7.5", ("legs.1.phase", "line 64", "[1]")),
+    ],
+)
+def test_an_error_in_a_robot_file_names_field_line_and_unit(
+    line: str,
+    broken: str,
+    said: tuple[str, ...],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder = tmp_path / "robot"
+    shutil.copytree(QUADRUPED, folder)
+    text = (folder / "robot.toml").read_text(encoding="utf-8")
+    assert line in text
+    changed = text.replace(line, broken, 1)
+    (folder / "robot.toml").write_text(changed, encoding="utf-8")
+    assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
+    told = capsys.readouterr().err
+    for part in said:
+        assert part in told
+
+
+@pytest.mark.parametrize(
+    ("robot", "said"),
+    [
+        ("no-such-robot", "unknown robot 'no-such-robot'; known are szabadka2"),
+        ('{"contact_law": "glue"}', "robot.contact_law: Input should be 'linear_zone'"),
+        (str(QUADRUPED.parent), "is not a robot's folder"),
+    ],
+)
+@pytest.mark.parametrize("command", [SIMULATE, ["optimize", "--iterations", "1", "--json"]])
+def test_a_robot_that_is_none_is_named(
+    robot: str, said: str, command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run([*command, "--robot", robot]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_leg_without_its_joints_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "robot"
+    shutil.copytree(QUADRUPED, folder)
+    text = (folder / "robot.toml").read_text(encoding="utf-8")
+    (folder / "robot.toml").write_text(text.replace("left_rear", "tail"), encoding="utf-8")
+    assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
+    assert "leg 'tail' has no joint or frame 'tail_coxa'" in capsys.readouterr().err

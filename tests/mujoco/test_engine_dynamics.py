@@ -1,0 +1,168 @@
+"""One instant of the robot, in MuJoCo and here: masses, inertia, accelerations, contact."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sim.kernel.parameters import pack_parameters
+from sim.kernel.physics_step import physics_model
+from sim.robot import Robot, load_robot
+from sim.scenario import SCENARIOS, Scenario
+from tests.mujoco.export import Feet, model
+from tests.mujoco.walker import Floats, Ground, Motors, drag_of, ground_forces
+
+STEEP = Scenario(
+    name="steep",
+    cycle_time=1.5,
+    radius=0.16,
+    withers=0.15,
+    load=2.0,
+    slope=20.0,
+    slope_direction=30.0,
+)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("szabadka2")
+
+
+def random_state(rng: np.random.Generator, joints: int) -> tuple[Floats, Floats]:
+    """q and v as our kernel has them: quaternion x y z w, twist in the base's frame."""
+    quaternion = rng.normal(size=4)
+    q = np.concatenate(
+        [
+            rng.uniform([-1, -1, 0.0], [1, 1, 0.2]),
+            quaternion / np.linalg.norm(quaternion),
+            rng.uniform(-1.5, 1.5, joints),
+        ]
+    )
+    return q, rng.normal(size=6 + joints) * 3.0
+
+
+def into(d: mujoco.MjData, q: Floats, v: Floats) -> Floats:
+    """Give MuJoCo our state: quaternion w first, linear velocity in the world. -> attitude."""
+    d.qpos[:] = np.concatenate([q[:3], q[[6, 3, 4, 5]], q[7:]])
+    attitude: Floats = pin.Quaternion(q[3:7]).toRotationMatrix()
+    d.qvel[:] = np.concatenate([attitude @ v[:3], v[3:]])
+    return attitude
+
+
+def test_the_exported_robot_has_our_masses_and_joints_in_our_order(robot: Robot) -> None:
+    exported = model(robot)
+    total = pin.computeTotalMass(pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer()))
+    assert exported.body_mass.sum() == pytest.approx(total, rel=1e-14)
+    assert model(robot, scenario=STEEP).body_mass.sum() == pytest.approx(total + 2.0, rel=1e-14)
+    names = [exported.joint(k).name for k in range(1, exported.njnt)]
+    assert names == list(robot.joint_names)
+    np.testing.assert_array_equal(exported.dof_armature[6:], robot.drives().armature)
+    assert not exported.dof_armature[:6].any()
+    assert not exported.dof_damping.any()
+
+
+def test_joint_space_inertia_agrees_in_random_poses(robot: Robot) -> None:
+    exported = model(robot)
+    d = mujoco.MjData(exported)
+    rigid = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+    data = rigid.createData()
+    joints = [rigid.joints[rigid.getJointId(name)] for name in robot.joint_names]
+    order = [*range(6), *(joint.idx_v for joint in joints)]
+    rng = np.random.default_rng(2)
+    full = np.zeros((exported.nv, exported.nv))
+    for _ in range(100):
+        q, v = random_state(rng, robot.n_joints)
+        attitude = into(d, q, v)
+        mujoco.mj_forward(exported, d)
+        mujoco.mj_fullM(exported, d, full)
+        to_world = np.eye(exported.nv)
+        to_world[:3, :3] = attitude
+        theirs = np.empty(rigid.nq)
+        theirs[[*range(7), *(joint.idx_q for joint in joints)]] = q
+        ours = np.triu(pin.crba(rigid, data, theirs))
+        ours = (ours + np.triu(ours, 1).T)[np.ix_(order, order)]
+        ours[range(6, exported.nv), range(6, exported.nv)] += robot.drives().armature
+        np.testing.assert_allclose(to_world.T @ full @ to_world, ours, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("scenario", [SCENARIOS[0], STEEP], ids=lambda s: s.name)
+def test_driven_on_the_ground_both_engines_accelerate_alike(
+    robot: Robot, scenario: Scenario
+) -> None:
+    """Rigid bodies, motors, battery, contact, load and slope, each computed twice."""
+    assert robot.description.contact_law == "linear_zone"
+    assert not robot.has_gearlash
+    ours = physics_model(robot)
+    parameters = pack_parameters(robot, ours.body, scenario, 2e-4)
+    exported = model(robot, scenario=scenario)
+    d = mujoco.MjData(exported)
+    motors, tread = Motors(robot), ground_forces(exported, d, robot)
+    rng = np.random.default_rng(7)
+    touching, worst = 0, 0.0
+    for _ in range(300):
+        q, v = random_state(rng, robot.n_joints)
+        duty = rng.uniform(-1.0, 1.0, robot.n_joints)
+        push = rng.normal(size=robot.n_joints)
+        found = np.array(ours.observe(q, v, [], duty, push, parameters)[-1]).ravel()
+        attitude = into(d, q, v)
+        mujoco.mj_step1(exported, d)
+        d.qfrc_applied[:6] = 0.0
+        d.qfrc_applied[6:] = motors(duty, v[6:])[2] + push
+        touching += int(tread()[:, 2].any())
+        mujoco.mj_forward(exported, d)
+        # Pinocchio's base acceleration is the twist's derivative in the base's own frame.
+        twist = attitude.T @ d.qacc[:3] - np.cross(v[3:6], v[:3])
+        expected = np.concatenate([twist, d.qacc[3:]])
+        worst = max(worst, float(np.abs(found - expected).max() / np.abs(expected).max()))
+    assert touching > 60
+    assert worst < 1e-9
+
+
+def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
+    """Its normal force is ours; below the friction's limit, its drag is the one asked for."""
+    scenario = SCENARIOS[0]
+    feet = Feet(drag_of(robot, scenario))
+    exported = model(robot, scenario=scenario, feet=feet)
+    d = mujoco.MjData(exported)
+    ground, legs = Ground(robot), robot.description.legs
+    rng = np.random.default_rng(5)
+    q, _ = random_state(rng, robot.n_joints)
+    seen = 0
+    for _ in range(200):
+        q[:] = 0.0
+        q[2], q[6] = rng.uniform(0.0, 0.01), 1.0
+        into(d, q, rng.normal(size=6 + robot.n_joints) * 0.03)
+        mujoco.mj_forward(exported, d)
+        position, velocity = d.sensordata.reshape(2, len(legs), 3)
+        expected = ground(position, velocity)
+        for k in range(d.ncon):
+            (sole,) = (name for name in _geoms(exported, d.contact[k]) if name != "ground")
+            leg = [f"{leg.foot}_sole" for leg in legs].index(sole)
+            wrench = np.zeros(6)
+            mujoco.mj_contactForce(exported, d, k, wrench)
+            force = d.contact[k].frame.reshape(3, 3).T @ wrench[:3] * _upwards(d.contact[k])
+            assert force[2] == pytest.approx(expected[leg, 2], rel=0.01, abs=0.5)
+            point = _velocity_of(exported, d, d.contact[k].pos, legs[leg].foot)
+            pull = -feet.drag * point[:2]
+            if np.hypot(*pull) < 0.8 * robot.description.contact.friction * force[2]:
+                np.testing.assert_allclose(force[:2], pull, rtol=0.05, atol=1.0)
+                seen += 1
+    assert seen > 100
+
+
+def _geoms(m: mujoco.MjModel, contact: mujoco.MjContact) -> list[str]:
+    return [m.geom(int(geom)).name for geom in contact.geom]
+
+
+def _upwards(contact: mujoco.MjContact) -> float:
+    """Contact forces are given as they act on the second geom, along a normal towards it."""
+    return float(np.sign(contact.frame[2]))
+
+
+def _velocity_of(m: mujoco.MjModel, d: mujoco.MjData, point: Floats, foot: str) -> Floats:
+    jacobian = np.zeros((3, m.nv))
+    mujoco.mj_jac(m, d, jacobian, None, point, int(m.site_bodyid[m.site(foot).id]))
+    velocity: Floats = jacobian @ d.qvel
+    return velocity

@@ -1,0 +1,122 @@
+"""Whole walks, in MuJoCo and here: first under the same ground forces, then under MuJoCo's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from sim.controllers import CONTROLLERS
+from sim.kernel.observation import WalkLog
+from sim.outcome import Status
+from sim.robot import load_robot
+from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import simulate
+from tests.mujoco.controllers import Coded, FuzzyPi, Pi
+from tests.mujoco.export import Feet
+from tests.mujoco.walker import Controller, Floats, Trace, drag_of, walk
+
+pytestmark = pytest.mark.slow
+
+ROBOT = "szabadka2"
+NORMAL_FAST, LOADED_FAST, LOADED_SLOW, SLOPE_FAST = (SCENARIOS[k] for k in (0, 2, 3, 4))
+DRIVES: Mapping[str, tuple[str, Mapping[str, float], type[Coded]]] = {
+    "published optimum A": ("fuzzy-pi", CONTROLLERS["fuzzy-pi"].published["A"], FuzzyPi),
+    "stiff PI": ("pi", {"P": 0.45, "I": 0.2}, Pi),
+}
+ENERGY, RECIPROCAL_SPEED = 3, 4
+
+drive_names = pytest.mark.parametrize("drive", DRIVES)
+
+
+@lru_cache(maxsize=4)
+def our_walk(drive: str, scenario: Scenario) -> tuple[Floats, WalkLog]:
+    """Objectives and log of the compiled kernel's walk."""
+    controller, design, _ = DRIVES[drive]
+    result = simulate(
+        scenario, controller, list(design), np.array([list(design.values())]), robot=ROBOT, log=True
+    )
+    (log,) = result.logs
+    assert result.outcome.statuses.tolist() == [Status.OK]
+    assert log is not None
+    return result.outcome.objectives[0], log
+
+
+def own_controller(drive: str, log: WalkLog) -> Controller:
+    """The drive's controller in closed loop, in the tests' own integers."""
+    _, design, controller = DRIVES[drive]
+    return controller(load_robot(ROBOT), log, design)
+
+
+def deviations(trace: Trace, log: WalkLog, seconds: float = np.inf) -> dict[str, float]:
+    """Largest deviation of every trajectory from the log, up to a time."""
+    rows = log.time <= seconds + 1e-9
+    return {
+        name: float(np.abs(getattr(trace, name)[rows] - getattr(log, name)[rows]).max())
+        for name in ("base_position", "base_orientation", "joint_angle")
+    }
+
+
+@pytest.mark.parametrize(
+    ("drive", "scenario"),
+    [
+        ("published optimum A", NORMAL_FAST),
+        ("stiff PI", NORMAL_FAST),
+        ("published optimum A", LOADED_FAST),
+        ("stiff PI", SLOPE_FAST),
+    ],
+    ids=lambda value: getattr(value, "name", value),
+)
+def test_a_walk_is_the_same_in_mujoco_to_rounding(drive: str, scenario: Scenario) -> None:
+    """Same step in the same frame: nothing but rounding is left between the engines."""
+    objectives, log = our_walk(drive, scenario)
+    controller = own_controller(drive, log)
+    trace = walk(load_robot(ROBOT), scenario, log, controller, integration="body frame")
+    assert max(deviations(trace, log).values()) < 1e-9
+    np.testing.assert_allclose(trace.foot_force, log.foot_force, atol=1e-6)
+    np.testing.assert_allclose(trace.objectives, objectives, rtol=1e-8)
+
+
+@drive_names
+def test_under_mujocos_integrator_a_walk_stays_within_a_micrometre_and_two_percent(
+    drive: str,
+) -> None:
+    """MuJoCo's semi-implicit Euler differs from ours in second order of the step."""
+    objectives, log = our_walk(drive, NORMAL_FAST)
+    controller = own_controller(drive, log)
+    trace = walk(load_robot(ROBOT), NORMAL_FAST, log, controller, integration="mujoco")
+    assert max(deviations(trace, log, seconds=0.1).values()) < 1e-6
+    assert max(deviations(trace, log).values()) < 5e-3
+    np.testing.assert_allclose(trace.objectives[:5], objectives[:5], rtol=0.02)
+
+
+@drive_names
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
+def test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts(
+    scenario: Scenario, drive: str
+) -> None:
+    """Spherical soles as stiff and damped as ours, whose forces act 10 mm below the tibia's end."""
+    robot = load_robot(ROBOT)
+    objectives, log = our_walk(drive, scenario)
+    feet = Feet(drag_of(robot, scenario))
+    trace = walk(robot, scenario, log, own_controller(drive, log), feet=feet)
+    found = trace.objectives / objectives
+    assert found[ENERGY] == pytest.approx(1.0, abs=0.15)
+    assert found[RECIPROCAL_SPEED] == pytest.approx(1.0, abs=0.15)
+    # Not asked for, but as near: shocks of body and attitude.
+    np.testing.assert_allclose(found[1:3], 1.0, atol=0.15)
+
+
+def test_most_of_the_torques_difference_is_the_lever_of_the_sole() -> None:
+    """Where the gear torques differ most, MuJoCo's forces at the tibia's end bring them nearer."""
+    robot, scenario, drive = load_robot(ROBOT), LOADED_SLOW, "stiff PI"
+    objectives, log = our_walk(drive, scenario)
+    away = {}
+    for points in (False, True):
+        feet = Feet(drag_of(robot, scenario), points=points)
+        trace = walk(robot, scenario, log, own_controller(drive, log), feet=feet)
+        away[points] = abs(trace.objectives[0] / objectives[0] - 1.0)
+    assert away[False] < 0.25
+    assert away[True] < 0.5 * away[False]

@@ -13,7 +13,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve bench test lint format lock clean setup setup-dev
+.PHONY: help demo serve bench test unit lint format lock clean setup setup-dev
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -30,6 +30,9 @@ bench: setup ## Measure the simulator on one core of this machine.
 
 test: setup-dev ## Run all tests.
 	@$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+
+unit: setup-dev ## Run the fast tests only.
+	@$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow" $(ARGS)
 
 lint: setup-dev ## Check style, types, imports between packages and declared dependencies.
 	@$(BIN)/ruff check .

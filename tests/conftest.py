@@ -15,3 +15,9 @@ def _no_user_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         if name.startswith("GAITSWARM_"):
             monkeypatch.delenv(name)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "user-data"))
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out, of a run of the fast tests, a module that takes seconds only to be collected."""
+    fast_only = config.getoption("markexpr", "") == "not slow"
+    return True if fast_only and collection_path.name == "test_conformance.py" else None

@@ -17,6 +17,8 @@ import pytest
 from services.optimizer.job import Command, Job
 from services.optimizer.store.sql_store import SqlStore
 
+pytestmark = pytest.mark.slow
+
 Event = dict[str, Any]
 
 

@@ -11,6 +11,8 @@ from services.optimizer.job import Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import OBJECTIVE_NAMES
 
+pytestmark = pytest.mark.slow
+
 
 def test_iterations_come_in_pages_without_gap_or_repeat(
     client: httpx2.Client, job: Job, commit

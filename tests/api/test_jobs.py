@@ -9,6 +9,8 @@ from services.optimizer.job import Job, JobState
 from services.optimizer.job_spec import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 
+pytestmark = pytest.mark.slow
+
 SPEC = {"name": "mine", "scenarios": ["normal-fast", "2"], "iterations": 7, "seed": 3}
 
 

@@ -10,6 +10,8 @@ from services.optimizer.job import Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.errors import KernelBuildError
 
+pytestmark = pytest.mark.slow
+
 
 def test_every_answer_has_a_request_id_of_its_own(client: httpx2.Client) -> None:
     first, second = (client.get("/v1/healthz").headers["X-Request-ID"] for _ in range(2))

@@ -14,6 +14,8 @@ from sim.outcome import OBJECTIVE_NAMES
 from sim.scenario import find_scenario
 from sim.simulate import simulate
 
+pytestmark = pytest.mark.slow
+
 DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 REQUEST: dict[str, Any] = {"design": DESIGN, "scenarios": ["normal-fast"]}
 

@@ -9,6 +9,8 @@ import pytest
 
 from cli.main import run
 
+pytestmark = pytest.mark.slow
+
 
 def test_drives_are_compared_side_by_side(
     capsys: pytest.CaptureFixture[str], tmp_path: Path

@@ -9,6 +9,8 @@ import pytest
 
 from tests.cli.conftest import Finished, Gaitswarm
 
+pytestmark = pytest.mark.slow
+
 Place = Callable[[Path], list[str]]
 
 

@@ -11,6 +11,8 @@ import pytest
 from cli.spec_file import LARGEST_FILE
 from tests.cli.conftest import SMALL_SPEC, Finished, Gaitswarm, WriteJson
 
+pytestmark = pytest.mark.slow
+
 
 def test_it_prints_the_finished_job_as_one_json_document(finished: Finished) -> None:
     job = finished.job

@@ -10,6 +10,8 @@ import pytest
 
 from cli.main import run
 
+pytestmark = pytest.mark.slow
+
 QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
 CRAWL = str(QUADRUPED / "crawl.json")
 SIMULATE = ["simulate", "--controller", "pi", "--design", "published:validation", "--json"]

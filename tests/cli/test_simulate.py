@@ -12,6 +12,8 @@ from sim.outcome import OBJECTIVE_NAMES
 from sim.scenario import SCENARIOS
 from tests.cli.conftest import PUBLISHED_A, Gaitswarm, WriteJson
 
+pytestmark = pytest.mark.slow
+
 FAST = ("--scenario", "normal-fast")
 
 

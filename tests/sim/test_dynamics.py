@@ -14,6 +14,8 @@ from sim.kernel.physics_step import PhysicsModel, physics_model
 from sim.robot import Robot, load_robot, parse_robot
 from sim.scenario import SCENARIOS, Scenario
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:

@@ -15,6 +15,8 @@ from sim.kernel.native import native_kernel
 from sim.native.compilation import load_library, vector_header
 from sim.robot import load_robot
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 
 

@@ -14,6 +14,8 @@ from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.scenario import SCENARIOS, Scenario, find_scenario
 from sim.simulate import check_reach, simulate
 
+pytestmark = pytest.mark.slow
+
 OPTIMUM = CONTROLLERS["fuzzy-pi"].published["A"]
 NAMES = list(OPTIMUM)
 DESIGN = np.array([list(OPTIMUM.values())])

@@ -17,6 +17,8 @@ from sim.simulate import PHYSICS_RATE, course_of
 from sim.studies.accuracy import noise_on_links, step_halving, tables_against_inference
 from sim.studies.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
 
+pytestmark = pytest.mark.slow
+
 OPTIMUM = CONTROLLERS["fuzzy-pi"].published["A"]
 BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
 

@@ -21,6 +21,8 @@ from sim.robot.description import ContactLaw
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import course_of, simulate
 
+pytestmark = pytest.mark.slow
+
 PI = np.array([[0.45, 0.1]])
 BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
 KARNOPP = RobotVariant(contact_law="karnopp")

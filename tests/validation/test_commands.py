@@ -12,6 +12,8 @@ from sim.validation.tolerance import Tolerance
 from tests.cli.conftest import Result, run_command
 from tests.validation.conftest import TwoWalks
 
+pytestmark = pytest.mark.slow
+
 WALK = ("--design", "published:A", "--scenario", "1")
 
 

@@ -24,6 +24,8 @@ from sim.validation.synthetic import (
 from sim.validation.tolerance import Tolerance
 from tests.validation.conftest import DESIGN, TwoWalks
 
+pytestmark = pytest.mark.slow
+
 NO_CHANGE = Perturbation(
     supply_voltage=1.0,
     supply_resistance=1.0,

@@ -17,6 +17,8 @@ from sim.outcome import Outcome
 from sim.scenario import Scenario
 from tests.worker.requests import SCENARIOS, bits, request, walked_at_once
 
+pytestmark = pytest.mark.slow
+
 
 def never() -> bool:
     return False

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 LARGEST_FILE: Final = 1 << 28
 """Largest log that is read [B]; a second takes about a megabyte."""
 
-_ROBOT: Final = "szabadka2"
 _HUGE: Final = 1e300
 
 DesignOption = Annotated[
@@ -28,7 +27,9 @@ DesignOption = Annotated[
         "--design", metavar="FILE|published:NAME", help="Design as for `simulate`, or published:A."
     ),
 ]
-ScenarioOption = Annotated[str, typer.Option("--scenario", help="Name or number of the walk.")]
+ScenarioOption = Annotated[
+    str, typer.Option("--scenario", help="Name or number of the walk, or FILE.json.")
+]
 WalkController = Annotated[str, typer.Option("--controller", help="As for `simulate`.")]
 TrajectoryOption = Annotated[
     Path | None,
@@ -56,12 +57,18 @@ class Walk:
 
 
 def read_walk(
-    scenario: str, controller: str, design: str, trajectory: Path | None, cycles: int | None
+    scenario: str,
+    controller: str,
+    design: str,
+    trajectory: Path | None,
+    cycles: int | None,
+    robot: str | None,
 ) -> Walk:
     """Raises InvalidRequest or SimulationInputError that names what is wrong."""
     from cli.design_file import read_design
+    from cli.robots import chosen_robot, chosen_scenarios
     from sim.robot import load_robot
-    from sim.scenario import GAIT_VARIABLE_NAMES, find_scenario
+    from sim.scenario import GAIT_VARIABLE_NAMES
     from sim.simulate import check_reach, with_gait
 
     values = read_design(design, controller, trajectory)
@@ -69,14 +76,17 @@ def read_walk(
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and -_HUGE < value < _HUGE):
             raise InvalidRequest("must be a finite number", field=f"design.{name}")
-    chosen = find_scenario(scenario)
+    scenarios = chosen_scenarios(scenario)
+    if len(scenarios) != 1:
+        raise InvalidRequest("name one scenario: a log is of one walk", field="scenario")
+    (chosen,) = scenarios
     if cycles is not None:
         chosen = chosen.model_copy(update={"cycles": float(cycles)})
     gait = {name: value for name, value in values.items() if name in GAIT_VARIABLE_NAMES}
     walked = with_gait(chosen, gait)
-    robot = load_robot(_ROBOT)
-    check_reach(walked, [], [], robot=_ROBOT)
-    return Walk(robot, chosen, controller, values, walked.cycle_time)
+    machine = load_robot(chosen_robot(robot))
+    check_reach(walked, [], [], robot=machine)
+    return Walk(machine, chosen, controller, values, walked.cycle_time)
 
 
 def simulated_walk(walk: Walk) -> MeasuredLog:

@@ -14,6 +14,7 @@ from cli.measured_walk import (
     TrajectoryOption,
     WalkController,
 )
+from cli.options import RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -30,6 +31,7 @@ def synthesize(
     controller: WalkController = "fuzzy-pi",
     trajectory: TrajectoryOption = None,
     cycles: CyclesOption = None,
+    robot: RobotOption = None,
     seed: Annotated[
         int, typer.Option(min=0, max=(1 << 64) - 1, help="Source of the instruments' noise.")
     ] = 1,
@@ -44,7 +46,7 @@ def synthesize(
 
     if output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
-    walk = read_walk(scenario, controller, design, trajectory, cycles)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
     log = synthetic_log(walk.robot, walk.scenario, controller, walk.design, seed=seed)
     with replacing(output, "output") as file:
         file.write(format_measured_log(log).encode())

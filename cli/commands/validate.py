@@ -14,7 +14,7 @@ from cli.measured_walk import (
     TrajectoryOption,
     WalkController,
 )
-from cli.options import Json
+from cli.options import Json, RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -32,6 +32,7 @@ def validate(
     controller: WalkController = "fuzzy-pi",
     trajectory: TrajectoryOption = None,
     cycles: CyclesOption = None,
+    robot: RobotOption = None,
     repeat: Annotated[
         list[Path] | None,
         typer.Option(
@@ -51,7 +52,7 @@ def validate(
     from cli.validation_table import alignment, comparison_table, confidence_table, remarks
     from sim.validation.comparison import compare_synchronised
 
-    walk = read_walk(scenario, controller, design, trajectory, cycles)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
     logs = {path: read_measured(path, walk.robot) for path in (measured, *(repeat or ()))}
     simulated = simulated_walk(walk)
     pairs = [synchronised(path, log, simulated, walk) for path, log in logs.items()]

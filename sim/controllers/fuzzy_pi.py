@@ -24,26 +24,13 @@ from sim.controllers.fixed_point import (
     required_integer,
     to_fixed,
 )
-from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
+from sim.controllers.fuzzy_sets import AMOUNT, EXTREME, OUTPUT, SIGNED
+from sim.controllers.mamdani import Mamdani, Rule, Shape
 from sim.controllers.quantisation import OUTPUT_SCALE, Axis, ExactInference, quantised
 from sim.variables import Variable
 
 ERROR: Final = Axis(bits=10, centred=True)
 CURRENT: Final = Axis(bits=6, centred=False)
-
-_ERROR_SETS: Final = {
-    "negative": FuzzySet(-1.0, 1.0),
-    "zero": FuzzySet(0.0, 1.0),
-    "positive": FuzzySet(1.0, 1.0),
-}
-_CURRENT_SETS: Final = {"small": FuzzySet(0.0, 1.0), "large": FuzzySet(1.0, 1.0)}
-_OUTPUT_SETS: Final = {
-    "null": FuzzySet(0.0, 0.5),
-    "positive": FuzzySet(0.5, 0.5),
-    "negative": FuzzySet(-0.5, 0.5),
-    "positive-extreme": FuzzySet(1.0, 0.5),
-    "negative-extreme": FuzzySet(-1.0, 0.5),
-}
 
 
 def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Shape) -> Mamdani:
@@ -56,8 +43,8 @@ def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Sh
         Rule({"error": "negative", "current": "large"}, "positive-extreme", fw56),
         Rule({"error": "positive", "current": "large"}, "negative-extreme", fw56),
     )
-    inputs = {"error": _ERROR_SETS, "current": _CURRENT_SETS}
-    return Mamdani(inputs, _OUTPUT_SETS, rules, shape)
+    inputs = {"error": SIGNED, "current": AMOUNT}
+    return Mamdani(inputs, {**OUTPUT, **EXTREME}, rules, shape)
 
 
 @lru_cache(maxsize=256)

@@ -24,7 +24,8 @@ from sim.controllers.fixed_point import (
     required_integer,
     to_fixed,
 )
-from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
+from sim.controllers.fuzzy_sets import AMOUNT, OUTPUT, SIGNED
+from sim.controllers.mamdani import Mamdani, Rule, Shape
 from sim.controllers.quantisation import OUTPUT_SCALE, Axis, quantised
 from sim.variables import Variable
 
@@ -34,18 +35,6 @@ COARSE_ERROR: Final = Axis(bits=6, centred=True)
 COARSE_CURRENT: Final = Axis(bits=4, centred=False)
 VELOCITY: Final = Axis(bits=6, centred=True)
 """A range of 30 000 counts/s is 60 counts a tick, so 6 bits resolve all that can be measured."""
-
-_SIGNED: Final = {
-    "negative": FuzzySet(-1.0, 1.0),
-    "zero": FuzzySet(0.0, 1.0),
-    "positive": FuzzySet(1.0, 1.0),
-}
-_AMOUNT: Final = {"small": FuzzySet(0.0, 1.0), "large": FuzzySet(1.0, 1.0)}
-_OUTPUT: Final = {
-    "null": FuzzySet(0.0, 0.5),
-    "positive": FuzzySet(0.5, 0.5),
-    "negative": FuzzySet(-0.5, 0.5),
-}
 
 
 def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
@@ -57,7 +46,7 @@ def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
         Rule({"error": "positive", "current": "large"}, "negative", w56),
         Rule({"error": "negative", "current": "large"}, "positive", w56),
     )
-    return Mamdani({"error": _SIGNED, "current": _AMOUNT}, _OUTPUT, rules, shape)
+    return Mamdani({"error": SIGNED, "current": AMOUNT}, OUTPUT, rules, shape)
 
 
 def integral_system(w1: float, w2: float, w78: float, shape: Shape) -> Mamdani:
@@ -68,8 +57,8 @@ def integral_system(w1: float, w2: float, w78: float, shape: Shape) -> Mamdani:
         Rule({"velocity": "positive", "current": "small"}, "positive", w78),
         Rule({"velocity": "negative", "current": "small"}, "negative", w78),
     )
-    inputs = {"error": _SIGNED, "current": _AMOUNT, "velocity": _SIGNED}
-    return Mamdani(inputs, _OUTPUT, rules, shape)
+    inputs = {"error": SIGNED, "current": AMOUNT, "velocity": SIGNED}
+    return Mamdani(inputs, OUTPUT, rules, shape)
 
 
 @lru_cache(maxsize=256)

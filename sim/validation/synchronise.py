@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import fftconvolve
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.validation.errors import MeasuredLogError
@@ -105,10 +106,8 @@ def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, floa
 
 def _cross_correlation(x: Floats, y: Floats) -> Floats:
     """sum over rows and columns of x[t + k] y[t], for k from -(len(y) - 1) to len(x) - 1."""
-    length = 1 << (len(x) + len(y) - 2).bit_length()
-    spectrum = (np.fft.rfft(x, length, axis=0) * np.conj(np.fft.rfft(y, length, axis=0))).sum(1)
-    circular = np.fft.irfft(spectrum, length)
-    return np.concatenate([circular[length - (len(y) - 1) :], circular[: len(x)]])
+    product: Floats = fftconvolve(x, y[::-1], axes=0).sum(axis=1)
+    return product
 
 
 def _cumulated_energy(x: Floats) -> Floats:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from cli.main import run
 from sim.validation.comparison import compare
 from sim.validation.measured_csv import format_measured_log
 from sim.validation.tolerance import Tolerance
@@ -123,3 +124,16 @@ def test_other_bad_input_is_exit_code_2_too(measured: Path, tmp_path: Path) -> N
     assert run_command("synthesize", *WALK, "-o", tmp_path / "log.txt").code == 2
     (tmp_path / "file").write_text("")
     assert validate(measured, "--report", tmp_path / "file").code == 2
+
+
+def test_a_robot_of_ones_own_is_validated_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    quadruped = Path(__file__).parents[2] / "examples" / "quadruped"
+    log = str(tmp_path / "synthetic.csv")
+    walk = ["--robot", str(quadruped), "--scenario", str(quadruped / "crawl.json")]
+    walk += ["--controller", "pi", "--design", "published:validation"]
+    assert run(["synthesize", *walk, "--output", log]) == 0
+    assert run(["validate", log, *walk, "--json"]) == 0
+    assert "left_rear" in capsys.readouterr().out
+    assert run(["validate", log, *walk[:2], *walk[4:], "--scenario", "1,2"]) == 2

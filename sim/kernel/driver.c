@@ -149,7 +149,7 @@ static void walk(Walker *const *lane, const Coding *c)
   vec q[2][NQ], v[2][NV], x[2][NX + 1], p[NP], duty[NJ], push[NJ], current[NJ];
   vec sums[NTERMS], terms[NTERMS];
   Past past;
-  ivec walking = ISPLAT(-1);
+  int walking[LANES];
   int64_t last = 0;
 
   memset(&past, 0, sizeof past);
@@ -162,6 +162,7 @@ static void walk(Walker *const *lane, const Coding *c)
     for (int i = 0; i < NP; i++) p[i][k] = lane[k]->parameters[i];
     if (lane[k]->ticks > last) last = lane[k]->ticks;
     lane[k]->status = OK;
+    walking[k] = 1;
   }
 
   int now = 0;
@@ -172,7 +173,7 @@ static void walk(Walker *const *lane, const Coding *c)
       step(q[now], v[now], x[now], duty, push, p, q[1 - now], v[1 - now], x[1 - now], current,
            terms);
       now = 1 - now;
-      for (int i = 0; i < NTERMS; i++) sums[i] += (vec)((ivec)terms[i] & walking);
+      for (int i = 0; i < NTERMS; i++) sums[i] += terms[i];
     }
     const vec qx = q[now][3], qy = q[now][4];
     const vec upright = SPLAT(1.0) - SPLAT(2.0) * (qx * qx + qy * qy);
@@ -180,6 +181,7 @@ static void walk(Walker *const *lane, const Coding *c)
     int any = 0;
     for (int k = 0; k < LANES; k++) {
       Walker *w = lane[k];
+      /* A lane that has ended goes on computing, but its walker has its results. */
       if (!walking[k]) continue;
       if (!sound[k]) w->status = DIVERGED;
       else if (q[now][2][k] < w->fall_height || upright[k] < w->fall_cosine) w->status = FELL;

@@ -116,6 +116,21 @@ def test_one_walkers_divergence_and_fall_touch_no_neighbour(robot: Robot) -> Non
     assert mixed[1][1] == mixed[3][1] == expected
 
 
+def test_what_a_lane_does_after_its_walk_has_ended_does_not_count(robot: Robot) -> None:
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    long = _setup(robot, kernel, SHORT)
+    bottomless = long.parameters.copy()
+    for name in ("stiffness", "damping"):
+        bottomless[kernel.layout.slices[name]] = 0.0
+    falling = dataclasses.replace(long, parameters=bottomless)
+    brief = dataclasses.replace(falling, desired=falling.desired[:5])
+    alone = _sums(kernel, [brief], robot)
+    assert alone[0][0] is Status.OK
+    assert _sums(kernel, [falling], robot)[0][0] is Status.FELL
+    assert _sums(kernel, [brief, long], robot)[0] == alone[0]
+
+
 def test_walks_of_different_length_share_a_group(robot: Robot) -> None:
     kernel = native_kernel(robot)
     assert kernel is not None

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from sim.controllers import CONTROLLERS
-from sim.kernel.native import native_kernel
+from sim.kernel.native import NativeKernel, _identity, _source_of, native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import reference_kernel
 from sim.kernel.walk import Coding, Kernel, WalkSetup
+from sim.native import compilation
+from sim.native.compilation import Target, target
 from sim.outcome import Status
 from sim.robot import Robot, load_robot
 from sim.scenario import SCENARIOS, Scenario
@@ -176,3 +178,30 @@ def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
             charge += float(log.voltage[k] @ exact)
             quasi += float(log.voltage[k] @ settled)
     assert charge == pytest.approx(quasi, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("narrower", [Target(4, "x86-64-v3"), Target(2, "")], ids=str)
+def test_a_walk_has_the_same_bits_at_every_vector_width(
+    narrower: Target, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if target().lanes < narrower.lanes:
+        narrower = target()
+    wide = native_kernel(robot)
+    assert wide is not None
+    monkeypatch.setattr(compilation, "target", lambda: narrower)
+    library = compilation.load_library("kernel-szabadka2", _identity(robot), _source_of(robot))
+    assert library is not None
+    narrow = NativeKernel(robot, library)
+    assert narrow.lanes == narrower.lanes
+    setups = [_setup(robot, wide, s.model_copy(update={"cycles": 1.0})) for s in SCENARIOS]
+    ours, theirs = (k.walk(setups, Coding.of(robot, 10), log=True) for k in (wide, narrow))
+    for a, b in zip(ours, theirs, strict=True):
+        assert (a.status, a.sums.tobytes(), a.end.tobytes()) == (
+            b.status,
+            b.sums.tobytes(),
+            b.end.tobytes(),
+        )
+        assert a.states is not None
+        assert b.states is not None
+        assert a.states.tobytes() == b.states.tobytes()

@@ -171,7 +171,7 @@ def _describe(entry: Mapping[str, Any], body: Any) -> FieldErrorView:
     where, *path = entry["loc"]
     if where == "body":
         field = ".".join(str(part) for part in _own_path(path, body, entry["type"]))
-        if not path and entry["type"] in ("missing", "model_attributes_type"):
+        if not field and entry["type"] in ("missing", "model_attributes_type"):
             return FieldErrorView(
                 field="body", message="send a JSON object as application/json; /docs has examples"
             )

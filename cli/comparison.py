@@ -6,15 +6,18 @@ from api.simulation import SimulationRequest, run_simulation
 from api.views import SimulationView
 from services.optimizer.job_spec import JobSpec
 from services.optimizer.preference import PREFERENCES
+from services.optimizer.spec import Spec
 from sim.controllers import CONTROLLERS
 
 
-def published_beside(spec: JobSpec) -> dict[str, SimulationView]:
+def published_beside(spec: Spec) -> dict[str, SimulationView]:
     """The published optimum of the job's controller and preference, by the name to show.
 
     Evaluated in the job's scenarios under its preference. Where none was published for that
-    preference, the controller's first.
+    preference, the controller's first; none for a job that tunes no drive.
     """
+    if not isinstance(spec, JobSpec):
+        return {}
     published = CONTROLLERS[spec.controller].published
     wanted = spec.resolved_preference()
     names = [name for name, known in PREFERENCES.items() if known == wanted and name in published]

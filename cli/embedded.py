@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from api.views import JobView
     from cli.jobs.local import LocalJobs
     from services.optimizer.job import CompletedIteration
-    from services.optimizer.job_spec import JobSpec
     from services.optimizer.service import JobService
+    from services.optimizer.spec import Spec
     from services.optimizer.store.base import Store
 
 _TAKEN_UP = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 """States in which going on with a job needs the command to."""
 
 
-def resumed_job(service: JobService, job_id: str, asked: JobSpec | None) -> Job:
+def resumed_job(service: JobService, job_id: str, asked: Spec | None) -> Job:
     """An earlier job, ready to be run on.
 
     asked: the spec that the user gave once more, if any. Raises NotFound, and Conflict if the job
@@ -39,7 +39,7 @@ def resumed_job(service: JobService, job_id: str, asked: JobSpec | None) -> Job:
     return service.command(job_id, Command.RESUME) if job.state in _TAKEN_UP else job
 
 
-def _check_same(job: Job, asked: JobSpec) -> None:
+def _check_same(job: Job, asked: Spec) -> None:
     stored, wanted = job.spec.model_dump(), asked.resolved().model_dump()
     changed = [field for field in stored if field != "name" and stored[field] != wanted[field]]
     if changed:
@@ -128,10 +128,11 @@ def _report(job: JobView, place: str, *, compare: bool) -> None:
     else:
         evaluations = {"best": job.best} | (published_beside(job.spec) if compare else {})
         console.print(design_table(job.spec, {k: e.design for k, e in evaluations.items()}))
-        console.print(results_table({k: e.scenarios for k, e in evaluations.items()}))
+        results = {k: e.scenarios for k, e in evaluations.items()}
+        console.print(results_table(results, job.objectives))
         for name, evaluation in evaluations.items():
             console.print(f"fitness of {name}: {number(evaluation.fitness)}", markup=False)
     speed = f" at {job.simulations_per_second:.0f} walks/s" if job.simulations_per_second else ""
-    note(f"{job.evaluations} designs in {len(job.spec.scenarios)} scenarios each{speed}")
+    note(f"{job.evaluations} designs in {len(job.spec.trial_names)} walks each{speed}")
     note(f"its history: gaitswarm history {job.id}{place}")
     note(f"over REST: gaitswarm serve{place}, then http://127.0.0.1:8000/v1/jobs/{job.id}")

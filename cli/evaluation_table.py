@@ -15,20 +15,19 @@ from typing import IO, TYPE_CHECKING, Final
 
 from cli.atomic_file import replacing
 from services.optimizer.errors import InvalidRequest
-from sim.outcome import OBJECTIVE_NAMES
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
     from api.views import EvaluationView, HistoryIterationView
-    from services.optimizer.job_spec import JobSpec
+    from services.optimizer.spec import Spec
 
 Value = int | float | str | None
 
 _INTEGERS: Final = ("iteration", "particle")
 
 
-def write_evaluations(path: Path, spec: JobSpec, iterations: Iterable[HistoryIterationView]) -> int:
+def write_evaluations(path: Path, spec: Spec, iterations: Iterable[HistoryIterationView]) -> int:
     """Write as the file's suffix says; returns the number of rows.
 
     Read and written by iterations. Raises InvalidRequest for another suffix or a file that cannot
@@ -46,13 +45,13 @@ def write_evaluations(path: Path, spec: JobSpec, iterations: Iterable[HistoryIte
         return write(file, columns, batches)
 
 
-def _columns(spec: JobSpec) -> list[str]:
-    results = ("status", "utility", *OBJECTIVE_NAMES)
+def _columns(spec: Spec) -> list[str]:
+    results = ("status", "utility", *(objective.name for objective in spec.objectives))
     return [
         *_INTEGERS,
         "fitness",
         *(f"design.{name}" for name in spec.design_space().names),
-        *(f"{s.name}.{result}" for s in spec.resolved_scenarios() for result in results),
+        *(f"{trial}.{result}" for trial in spec.trial_names for result in results),
     ]
 
 
@@ -61,8 +60,7 @@ def _row(evaluation: EvaluationView) -> list[Value]:
     row: list[Value] = [evaluation.iteration, evaluation.particle, evaluation.fitness]
     row += evaluation.design.values()
     for result in evaluation.scenarios.values():
-        objectives = (getattr(result.objectives, name) for name in OBJECTIVE_NAMES)
-        row += [result.status, result.utility, *objectives]
+        row += [result.status, result.utility, *result.objectives.values()]
     return row
 
 

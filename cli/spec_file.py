@@ -14,7 +14,7 @@ from services.optimizer.errors import InvalidRequest
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-    from services.optimizer.job_spec import JobSpec
+    from services.optimizer.specs import AnySpec
 
 LARGEST_FILE: Final = 1 << 20
 """Largest JSON file that is read [B]; a spec takes a few kilobytes."""
@@ -69,7 +69,7 @@ class Overrides:
         return any(value is not None for value in asdict(self).values())
 
 
-def build_spec(path: Path | None, overrides: Overrides) -> JobSpec:
+def build_spec(path: Path | None, overrides: Overrides) -> AnySpec:
     """The spec in a file (without one: the defaults) with options laid over it.
 
     Raises InvalidRequest that names the field.
@@ -89,15 +89,15 @@ def build_spec(path: Path | None, overrides: Overrides) -> JobSpec:
     return parse_spec(data | chosen)
 
 
-def parse_spec(data: Mapping[str, Any]) -> JobSpec:
+def parse_spec(data: Mapping[str, Any]) -> AnySpec:
     """A checked spec that can be simulated. Raises InvalidRequest that names every bad field."""
     from pydantic import ValidationError
 
-    from services.optimizer.job_spec import JobSpec
     from services.optimizer.service import check_can_be_simulated
+    from services.optimizer.specs import SPECS
 
     try:
-        spec = JobSpec.model_validate(data)
+        spec = SPECS.validate_python(data)
     except ValidationError as error:
         raise invalid_request(error, data) from error
     check_can_be_simulated(spec)

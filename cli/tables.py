@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from rich.table import Table
 from rich.text import Text
 
-from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES
-
 if TYPE_CHECKING:
-    from api.views import IterationView, JobSummaryView, JobView, ScenarioResultView
-    from services.optimizer.job_spec import JobSpec
+    from api.views import (
+        IterationView,
+        JobSummaryView,
+        JobView,
+        ObjectiveView,
+        ScenarioResultView,
+    )
+    from services.optimizer.spec import Spec
+    from sim.outcome import Objective
 
 MISSING: Final = "–"
 
@@ -65,7 +70,7 @@ def iterations_table(iterations: Iterable[IterationView]) -> Table:
     return table
 
 
-def design_table(spec: JobSpec, designs: Mapping[str, Mapping[str, float]]) -> Table:
+def design_table(spec: Spec, designs: Mapping[str, Mapping[str, float]]) -> Table:
     """Variables as rows, designs as columns, with unit and bounds."""
     table = Table(title="Design", title_justify="left", box=None, padding=(0, 2, 0, 0))
     table.add_column("variable")
@@ -86,28 +91,31 @@ def design_table(spec: JobSpec, designs: Mapping[str, Mapping[str, float]]) -> T
     return table
 
 
-def results_table(designs: Mapping[str, Mapping[str, ScenarioResultView]]) -> Table:
+def results_table(
+    designs: Mapping[str, Mapping[str, ScenarioResultView]],
+    objectives: Sequence[Objective | ObjectiveView],
+) -> Table:
     """Scenarios as rows; with several designs, one row for each under the scenario's name.
 
-    Utility and objectives are minimized.
+    objectives: columns of the results. Utility and objectives are minimized.
     """
     table = Table(title="By scenario", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
     table.add_column("status")
     table.add_column("utility", justify="right")
-    for objective in OBJECTIVES:
-        table.add_column(f"{_SHORT[objective.name]}\n{objective.unit}", justify="right")
+    for objective in objectives:
+        heading = _SHORT.get(objective.name, objective.name.replace("_", " "))
+        table.add_column(f"{heading}\n{objective.unit}", justify="right")
     for scenario in next(iter(designs.values())):
         if len(designs) > 1:
             table.add_row(Text(scenario, style="bold"))
         for design, results in designs.items():
             result = results[scenario]
-            objectives = result.objectives.model_dump()
             table.add_row(
                 f"  {design}" if len(designs) > 1 else scenario,
                 Text(result.status, style="" if result.status == "ok" else "red"),
                 number(result.utility),
-                *(_objective(name, objectives[name]) for name in OBJECTIVE_NAMES),
+                *(_objective(name, value) for name, value in result.objectives.items()),
             )
     return table
 
@@ -142,7 +150,7 @@ def print_job(job: JobView) -> None:
     console.print(table)
     if job.best is not None:
         console.print(design_table(job.spec, {"best": job.best.design}))
-        console.print(results_table({"best": job.best.scenarios}))
+        console.print(results_table({"best": job.best.scenarios}, job.objectives))
 
 
 def number(value: float | None) -> str:

@@ -51,7 +51,7 @@ _PHRASES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """One thing to be minimized (thesis table 4.1)."""
+    """One thing to be minimized."""
 
     name: str
     unit: str
@@ -66,7 +66,7 @@ OBJECTIVES: Final[tuple[Objective, ...]] = (
     Objective("reciprocal_speed", "s/m", "f5: one over the mean forward speed"),
     Objective("height_loss", "m", "f6: height of the body at the end less that at the start"),
 )
-"""Columns of every objectives array, in order."""
+"""Objectives of a walk (thesis table 4.1): columns of its objectives array, in order."""
 
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in OBJECTIVES)
 N_OBJECTIVES: Final = len(OBJECTIVES)
@@ -74,10 +74,10 @@ N_OBJECTIVES: Final = len(OBJECTIVES)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """Results of a batch of designs in one scenario.
+    """Results of a batch of designs in one trial.
 
-    objectives: (n, 6) float64, columns as in `OBJECTIVES`; a value that does not exist
-        (the design did not walk) is NaN.
+    objectives: (n, m) float64, columns as in the trial's `objectives` (`OBJECTIVES` for a walk);
+        a value that does not exist (the design did not walk) is NaN.
     statuses: (n,) uint8, values of `Status`.
     """
 
@@ -86,8 +86,8 @@ class Outcome:
 
     def __post_init__(self) -> None:
         n = len(self.statuses)
-        if self.objectives.shape != (n, N_OBJECTIVES) or self.statuses.shape != (n,):
+        if self.objectives.ndim != 2 or len(self.objectives) != n or self.statuses.shape != (n,):
             raise SimulationInputError(
-                f"an outcome of {n} designs needs objectives of shape ({n}, {N_OBJECTIVES}),"
+                f"an outcome of {n} designs needs objectives of shape ({n}, m),"
                 f" not {self.objectives.shape}"
             )

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from sim.controllers import CONTROLLERS, Drive
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
-from sim.gait.trajectory import desired_angles, require_reachable
+from sim.gait.trajectory import Trajectory, desired_angles, require_reachable
 from sim.kernel.native import native_kernel
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.parameters import body_of, gravity_on, pack_parameters
@@ -61,6 +61,7 @@ def simulate(
     designs: NDArray[np.float64],
     *,
     robot: RobotChoice = "szabadka2",
+    planner: Robot | None = None,
     noise: LinkNoise | None = None,
     log: bool = False,
     backend: Backend = "auto",
@@ -70,6 +71,7 @@ def simulate(
 
     robot: a shipped robot by name, a variant of one, or a `Robot` of your own; with gearlash it is
         simulated at `GEARLASH_PHYSICS_RATE` at least.
+    planner: the robot that the desired angles are for, if its legs differ from the robot's.
     designs: (n, len(variables)); columns are controller variables (all of them) and gait
         variables (any of them, replacing the scenario's value).
     backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first
@@ -79,10 +81,8 @@ def simulate(
     """
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
-    kernel = _kernel(machine, backend)
-    if machine.has_gearlash:
-        physics_rate = max(physics_rate, GEARLASH_PHYSICS_RATE)
-    substeps = round(physics_rate * CONTROL_PERIOD)
+    kernel = kernel_of(machine, backend)
+    substeps, timestep = control_steps(machine, physics_rate)
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
     setups: dict[int, WalkSetup] = {}
@@ -94,14 +94,21 @@ def simulate(
         key = tuple(gait.values())
         if key not in courses:
             walked = with_gait(scenario, gait)
-            courses[key] = course_of(machine, kernel, walked, 1.0 / physics_rate, noise)
+            courses[key] = course_of(
+                machine,
+                kernel,
+                walked,
+                timestep,
+                noise,
+                trajectory=None if planner is None else desired_angles(planner, walked),
+            )
         course = courses[key]
         if course is not None:
             setups[index] = course(drive)
     results = kernel.walk(list(setups.values()), Coding.of(machine, substeps), log=log)
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
-        statuses[index], objectives[index] = judge(setup, result, substeps, 1.0 / physics_rate)
+        statuses[index], objectives[index] = judge(setup, result, substeps, timestep)
         if result.states is not None:
             logs[index] = walk_log(machine, setup, result.states)
     return Simulation(Outcome(objectives, statuses), tuple(logs) if log else ())
@@ -142,7 +149,7 @@ def check_reach(
 
 def prepare(robot: RobotChoice = "szabadka2", *, backend: Backend = "auto") -> str:
     """Build (or find in the cache) the kernel; returns the backend in use, native or reference."""
-    return _kernel(load_robot(robot), backend).backend
+    return kernel_of(load_robot(robot), backend).backend
 
 
 def lanes() -> int:
@@ -179,7 +186,15 @@ def _check_arguments(
         )
 
 
-def _kernel(robot: Robot, backend: Backend) -> Kernel:
+def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[int, float]:
+    """Physics steps a control tick, and their length [s]."""
+    if robot.has_gearlash:
+        physics_rate = max(physics_rate, GEARLASH_PHYSICS_RATE)
+    return round(physics_rate * CONTROL_PERIOD), 1.0 / physics_rate
+
+
+def kernel_of(robot: Robot, backend: Backend = "auto") -> Kernel:
+    """The robot's kernel, built if there is none yet; with a warning if it is the slow one."""
     if backend != "reference":
         native = native_kernel(robot)
         if native is not None:
@@ -204,12 +219,15 @@ def course_of(
     scenario: Scenario,
     timestep: float,
     noise: LinkNoise | None = None,
+    *,
+    trajectory: Trajectory | None = None,
 ) -> Callable[[Drive], WalkSetup] | None:
     """All of a walk but its drive, which designs of one gait share.
 
+    trajectory: desired angles, if they are not those for this robot's legs.
     None for a gait out of the legs' reach.
     """
-    trajectory = desired_angles(robot, scenario)
+    trajectory = trajectory or desired_angles(robot, scenario)
     if not trajectory.reachable:
         return None
     ticks, n_joints = trajectory.angles.shape

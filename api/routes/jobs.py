@@ -10,8 +10,8 @@ from api.context import JobId, Service
 from api.openapi import problems
 from api.views import PREFIX, JobSummaryView, JobView, PageView
 from services.optimizer.job import Command, Job, JobState
-from services.optimizer.job_spec import JobSpec
 from services.optimizer.service import JobService
+from services.optimizer.specs import AnySpec
 
 router = APIRouter(prefix=f"{PREFIX}/jobs", tags=["jobs"])
 
@@ -44,7 +44,7 @@ IdempotencyKey = Annotated[
     },
 )
 def submit_job(
-    spec: JobSpec, service: Service, response: Response, idempotency_key: IdempotencyKey = None
+    spec: AnySpec, service: Service, response: Response, idempotency_key: IdempotencyKey = None
 ) -> JobView:
     """Check that the job can be simulated and queue it.
 

@@ -18,7 +18,7 @@ from api.views.catalogue import (
 from api.views.evaluation import (
     BestView,
     EvaluationView,
-    ObjectivesView,
+    ObjectiveView,
     ScenarioResultView,
     evaluation_views,
 )
@@ -45,7 +45,7 @@ __all__ = [
     "IterationView",
     "JobSummaryView",
     "JobView",
-    "ObjectivesView",
+    "ObjectiveView",
     "PageView",
     "PreferenceView",
     "ProblemView",

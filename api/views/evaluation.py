@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from typing import Any, Final, Literal
+from collections.abc import Mapping, Sequence
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,12 @@ from pydantic import Field
 
 from api.views.base import View, finite
 from services.optimizer.job import Evaluation
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.preference import Preference, log_utilities
-from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
+from services.optimizer.judgement import exponential
+from services.optimizer.spec import Spec
+from sim.outcome import OBJECTIVES, Objective, Status
 
 StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled"]
-
-_EXAMPLES: Final = {
+_EXAMPLE: Final = {
     "torque": 8.71,
     "acceleration": 1.77,
     "angular_acceleration": 16.09,
@@ -28,33 +26,24 @@ _EXAMPLES: Final = {
 }
 
 
-def _objective(name: str) -> Any:
-    """Field of an objective; meaning and unit come from the simulator's own table."""
-    (objective,) = (o for o in OBJECTIVES if o.name == name)
-    return Field(
-        description=f"{objective.description} [{objective.unit}]; null if the walk has none.",
-        examples=[_EXAMPLES[name]],
+class ObjectiveView(View):
+    """One thing that a job minimizes in every trial."""
+
+    name: str = Field(description="Name, as in results.", examples=["torque"])
+    unit: str = Field(description="Its unit.", examples=["N m"])
+    description: str = Field(
+        description="What it means.",
+        examples=["f1: rms over time of the sum of the absolute gear torques"],
     )
 
-
-class ObjectivesView(View):
-    """Raw objectives of one walk, all to be minimized (thesis table 4.1)."""
-
-    torque: float | None = _objective("torque")
-    acceleration: float | None = _objective("acceleration")
-    angular_acceleration: float | None = _objective("angular_acceleration")
-    energy: float | None = _objective("energy")
-    reciprocal_speed: float | None = _objective("reciprocal_speed")
-    height_loss: float | None = _objective("height_loss")
-
     @classmethod
-    def from_row(cls, row: NDArray[np.float64]) -> ObjectivesView:
-        """row: (6,) as in `sim.outcome.OBJECTIVES`."""
-        return cls(**dict(zip(OBJECTIVE_NAMES, map(finite, row.tolist()), strict=True)))
+    def from_objective(cls, objective: Objective) -> ObjectiveView:
+        """As the simulator declares it."""
+        return cls(name=objective.name, unit=objective.unit, description=objective.description)
 
 
 class ScenarioResultView(View):
-    """How a design did in one scenario."""
+    """How a design did in one trial of its job: a walk in a scenario, or a fit to a recording."""
 
     status: StatusName = Field(
         description="How the walk ended; everything but `ok` is a failed walk.", examples=["ok"]
@@ -64,36 +53,43 @@ class ScenarioResultView(View):
         examples=["walked to the end"],
     )
     utility: float | None = Field(
-        description="Bias-weighted product of f1..f5 under the job's preference (eq. 4.1), to be"
-        " minimized [1]; null if the walk failed.",
+        description="To be minimized; null if the walk failed. A walk's is the bias-weighted"
+        " product of f1..f5 under the job's preference (eq. 4.1) [1], a fit's the mean absolute"
+        " error of currents over the job's links [A].",
         examples=[21.05],
     )
-    objectives: ObjectivesView = Field(description="Raw objectives f1..f6.")
+    objectives: dict[str, float | None] = Field(
+        description="Raw objectives by name, all to be minimized; null where there is none. Units"
+        " are in the job's `objectives`; a walk has those of table 4.1: "
+        + ", ".join(f"{o.name} [{o.unit}]" for o in OBJECTIVES)
+        + ".",
+        examples=[_EXAMPLE],
+    )
 
     @classmethod
-    def from_walk(
-        cls, status: int, objectives: NDArray[np.float64], log_utility: float
+    def from_trial(
+        cls, status: int, objectives: Mapping[str, float], log_utility: float
     ) -> ScenarioResultView:
-        """objectives: (6,); log_utility: logarithm of eq. 4.1, +inf for a failed walk."""
+        """log_utility: +inf for a failed walk."""
         ended = Status(status)
         return cls.model_validate(
             {
                 "status": ended.label,
                 "explanation": ended.phrase,
                 "utility": utility(log_utility),
-                "objectives": ObjectivesView.from_row(objectives),
+                "objectives": {name: finite(value) for name, value in objectives.items()},
             }
         )
 
 
 class EvaluationView(View):
-    """One design, judged in every scenario of its job."""
+    """One design, judged in every trial of its job."""
 
     iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
     particle: int = Field(description="Particle of the swarm, from 0.", examples=[7])
     fitness: float | None = Field(
-        description="Geometric mean of the scenarios' utilities (eq. 4.2), to be minimized [1];"
-        " null if the design failed in any scenario.",
+        description="To be minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or"
+        " mean error of the fits (eq. 2.21) [A]; null if the design failed in any trial.",
         examples=[20.87],
     )
     design: dict[str, float] = Field(
@@ -102,7 +98,7 @@ class EvaluationView(View):
         examples=[{"I": 0.171, "FI1R": 5837.0, "FI2R": 20111.0, "FOR": 781.0, "FOMF": 2.0}],
     )
     scenarios: dict[str, ScenarioResultView] = Field(
-        description="Result in each scenario, by the scenario's name."
+        description="Result in each trial, by the scenario's name or the recording's short id."
     )
 
 
@@ -110,50 +106,60 @@ class BestView(EvaluationView):
     """The best design that a job has found so far."""
 
     fitness: float = Field(
-        description="Geometric mean of the scenarios' utilities (eq. 4.2), to be minimized [1].",
+        description="As of any evaluation; never null.",
         examples=[20.87],
     )
 
     @classmethod
-    def from_evaluation(cls, evaluation: Evaluation, spec: JobSpec) -> BestView:
+    def from_evaluation(cls, evaluation: Evaluation, spec: Spec) -> BestView:
         """spec: that of the evaluation's job."""
         (view,) = evaluation_views([evaluation], spec)
         return cls.model_validate(dict(view))
 
 
-def evaluation_views(evaluations: Sequence[Evaluation], spec: JobSpec) -> list[EvaluationView]:
-    """Views of evaluations of one job, in their order; utilities are derived by its preference."""
-    names = spec.design_space().names
-    scenarios = [scenario.name for scenario in spec.resolved_scenarios()]
-    preference = spec.resolved_preference()
+def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
+    """Views of evaluations of one job, in their order; utilities are derived from its spec."""
+    if not evaluations:
+        return []
+    variables = spec.design_space().names
+    objectives = np.stack([evaluation.objectives for evaluation in evaluations])
+    statuses = np.stack([evaluation.statuses for evaluation in evaluations])
+    logs = spec.judge(objectives, statuses != Status.OK).log_utilities
     return [
         EvaluationView(
             iteration=evaluation.iteration,
             particle=evaluation.particle,
             fitness=finite(evaluation.fitness),
-            design=dict(zip(names, evaluation.design.tolist(), strict=True)),
-            scenarios=scenario_results(
-                scenarios, evaluation.statuses, evaluation.objectives, preference
+            design=dict(zip(variables, evaluation.design.tolist(), strict=True)),
+            scenarios=trial_results(
+                spec.trial_names,
+                spec.objectives,
+                evaluation.statuses,
+                evaluation.objectives,
+                log_utilities,
             ),
         )
-        for evaluation in evaluations
+        for evaluation, log_utilities in zip(evaluations, logs, strict=True)
     ]
 
 
-def scenario_results(
+def trial_results(
     names: Sequence[str],
+    objectives: Sequence[Objective],
     statuses: NDArray[np.uint8],
-    objectives: NDArray[np.float64],
-    preference: Preference,
+    values: NDArray[np.float64],
+    log_utilities: NDArray[np.float64],
 ) -> dict[str, ScenarioResultView]:
-    """names, statuses (K,) and objectives (K, 6) of one design in K scenarios -> views by name."""
-    logs = log_utilities(objectives, statuses != Status.OK, preference)
+    """names, statuses, log_utilities (K,), values (K, m) of one design in K trials, by name."""
+    columns = [objective.name for objective in objectives]
     return {
-        name: ScenarioResultView.from_walk(int(status), row, log)
-        for name, status, row, log in zip(names, statuses, objectives, logs.tolist(), strict=True)
+        name: ScenarioResultView.from_trial(status, dict(zip(columns, row, strict=True)), log)
+        for name, status, row, log in zip(
+            names, statuses.tolist(), values.tolist(), log_utilities.tolist(), strict=True
+        )
     }
 
 
 def utility(log_utility: float) -> float | None:
     """Number of its logarithm; None where it is not finite."""
-    return math.exp(log_utility) if log_utility < 709.0 else None
+    return finite(exponential(log_utility))

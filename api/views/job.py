@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, Literal, TypeVar
 
 from pydantic import ConfigDict, Field
 
 from api.views.base import View, finite, listing_name
-from api.views.evaluation import BestView, EvaluationView, evaluation_views
+from api.views.evaluation import BestView, EvaluationView, ObjectiveView, evaluation_views
 from services.optimizer.estimate import estimate
 from services.optimizer.job import TRANSITIONS, Evaluation, Iteration, Job, JobState
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.spec import Spec
+from services.optimizer.specs import AnySpec
 
 PREFIX: Final = "/v1"
 """Version of the HTTP API, in every path."""
@@ -46,6 +47,10 @@ class JobSummaryView(View):
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
+    kind: Literal["tuning", "identification"] = Field(
+        description="Whether it tunes a drive or fits parameters of the robot to recorded walks.",
+        examples=["tuning"],
+    )
     state: JobState = Field(
         description="queued, running, pausing (ends its iteration first), paused, cancelled,"
         " failed or succeeded.",
@@ -105,7 +110,10 @@ class JobView(JobSummaryView):
     best: BestView | None = Field(
         description="Best design so far; null while there is none that walks in every scenario."
     )
-    spec: JobSpec = Field(
+    objectives: list[ObjectiveView] = Field(
+        description="What every trial of this job yields; columns of its results."
+    )
+    spec: AnySpec = Field(
         description="What was asked, with every preset written out as it was on submission."
     )
 
@@ -113,7 +121,10 @@ class JobView(JobSummaryView):
     def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
         """best: as `JobService.best` returns it."""
         view = None if best is None else BestView.from_evaluation(best, job.spec)
-        return cls.model_validate({**_summary(job), "best": view, "spec": job.spec})
+        objectives = [ObjectiveView.from_objective(o) for o in job.spec.objectives]
+        return cls.model_validate(
+            {**_summary(job), "best": view, "objectives": objectives, "spec": job.spec}
+        )
 
 
 class IterationView(View):
@@ -151,7 +162,7 @@ class HistoryIterationView(IterationView):
 
     @classmethod
     def from_iteration_and_evaluations(
-        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: JobSpec
+        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
     ) -> HistoryIterationView:
         """evaluations: those of the iteration; spec: that of its job."""
         particles = evaluation_views(evaluations, spec)
@@ -190,6 +201,7 @@ def _summary(job: Job) -> dict[str, object]:
     return {
         "id": job.id,
         "name": spec.name,
+        "kind": spec.kind,
         "state": job.state,
         "error": job.error,
         "iterations": progress.iterations,

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema
 
 from api.views.base import View, finite
-from api.views.evaluation import ScenarioResultView, scenario_results
-from services.optimizer.preference import Preference, geometric_mean, log_utilities
+from api.views.evaluation import ScenarioResultView, trial_results
+from services.optimizer.preference import Preference, judge
 from sim.kernel.observation import WalkLog
-from sim.outcome import Status
+from sim.outcome import OBJECTIVES, Status
 from sim.robot import RobotSource
 
 LOG_RATE: Final = 500
@@ -118,15 +118,15 @@ class SimulationView(View):
         logs: Sequence[WalkLog | None],
     ) -> SimulationView:
         """names, statuses (K,), objectives (K, 6): one walk per scenario; logs: K or none."""
-        results = scenario_results(names, statuses, objectives, preference)
+        judged = judge(objectives[None], (statuses != Status.OK)[None], preference)
+        results = trial_results(names, OBJECTIVES, statuses, objectives, judged.log_utilities[0])
         recorded = [None if log is None else WalkLogView.from_log(log) for log in logs]
-        mean = geometric_mean(log_utilities(objectives, statuses != Status.OK, preference)[None])
         return cls(
             robot=robot,
             controller=controller,
             design=dict(design),
             preference=preference,
-            fitness=finite(float(mean[0])),
+            fitness=finite(float(judged.fitness[0])),
             scenarios={
                 name: SimulatedScenarioView.model_construct(**dict(results[name]), log=log)
                 for name, log in zip(names, recorded or [None] * len(names), strict=True)

@@ -61,6 +61,7 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     from cli.design_file import read_design
     from cli.jobs.open import open_jobs
     from services.optimizer.errors import InvalidRequest
+    from services.optimizer.job_spec import JobSpec
     from sim.controllers import CONTROLLERS
     from sim.studies.drives import drive_of_design, find_drive
 
@@ -70,6 +71,8 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     if kind == "job":
         with open_jobs(server, db) as jobs:
             job, best = jobs.job(what), jobs.best(what)
+        if not isinstance(job.spec, JobSpec):
+            raise InvalidRequest(f"job {what} fits parameters, it tunes no drive", field="drive")
         return drive_of_design(name, job.spec.controller, best.design)
     for controller in CONTROLLERS:
         if kind == controller:

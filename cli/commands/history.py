@@ -55,7 +55,7 @@ def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = Fa
             markup=False,
         )
         console.print(design_table(job.spec, {"best": found.design}))
-        console.print(results_table({"best": found.scenarios}))
+        console.print(results_table({"best": found.scenarios}, job.objectives))
 
 
 def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> None:

@@ -78,12 +78,13 @@ def simulate(
 def _show(view: SimulationView, *, as_json: bool) -> None:
     from cli.output import print_text, stdout_console
     from cli.tables import number, results_table
+    from sim.outcome import OBJECTIVES
 
     if as_json:
         print_text(view.model_dump_json(indent=2, exclude={"scenarios": {"__all__": {"log"}}}))
         return
     console = stdout_console()
-    console.print(results_table({"": view.scenarios}))
+    console.print(results_table({"": view.scenarios}, OBJECTIVES))
     console.print(f"fitness {number(view.fitness)}", markup=False)
     for name, result in view.scenarios.items():
         if result.status != "ok":

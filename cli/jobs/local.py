@@ -20,8 +20,8 @@ from api.views import (
 from cli.settings import default_database
 from services.optimizer.errors import NotFound
 from services.optimizer.job import Command, Job, JobState
-from services.optimizer.job_spec import JobSpec
 from services.optimizer.service import JobService
+from services.optimizer.spec import Spec
 
 _POLL_SECONDS: Final = 0.5
 _PAGE: Final = 100
@@ -35,7 +35,7 @@ class LocalJobs:
         # The default goes without saying.
         self.place = "" if url == str(default_database()) else f" --db {shlex.quote(url)}"
 
-    def submit(self, spec: JobSpec, *, idempotency_key: str | None = None) -> JobView:
+    def submit(self, spec: Spec, *, idempotency_key: str | None = None) -> JobView:
         """See `Jobs.submit`."""
         job, _ = self._service.submit(spec, idempotency_key=idempotency_key)
         return self._in_full(job)

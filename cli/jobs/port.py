@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         StateView,
     )
     from services.optimizer.job import Command, JobState
-    from services.optimizer.job_spec import JobSpec
+    from services.optimizer.spec import Spec
 
 
 class Jobs(Protocol):
@@ -31,7 +31,7 @@ class Jobs(Protocol):
     def place(self) -> str:
         """What to add to another command that is to find the same jobs, such as " --db FILE"."""
 
-    def submit(self, spec: JobSpec, *, idempotency_key: str | None = None) -> JobView:
+    def submit(self, spec: Spec, *, idempotency_key: str | None = None) -> JobView:
         """Queue a job. Raises InvalidRequest, IdempotencyConflict."""
 
     def jobs(self, *, state: JobState | None, limit: int) -> Iterator[JobSummaryView]:

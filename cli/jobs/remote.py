@@ -37,7 +37,7 @@ from services.optimizer.errors import (
     StoreUnavailable,
 )
 from services.optimizer.job import Command, JobState
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.spec import Spec
 
 V = TypeVar("V", bound=BaseModel)
 
@@ -66,7 +66,7 @@ class RemoteJobs:
             base_url=self._url + PREFIX, timeout=_SECONDS, transport=transport
         )
 
-    def submit(self, spec: JobSpec, *, idempotency_key: str | None = None) -> JobView:
+    def submit(self, spec: Spec, *, idempotency_key: str | None = None) -> JobView:
         """See `Jobs.submit`."""
         headers = {} if idempotency_key is None else {"Idempotency-Key": idempotency_key}
         body = spec.model_dump_json()

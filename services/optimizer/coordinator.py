@@ -31,7 +31,8 @@ from services.optimizer.evaluator import EvaluationRequest
 from services.optimizer.job import Ask, Claim, CompletedIteration, Job, JobState
 from services.optimizer.optimizers.base import Optimizer
 from services.optimizer.optimizers.registry import create_optimizer
-from services.optimizer.preference import aggregate
+from services.optimizer.spec import judge_outcomes
+from sim.identification.recorded_walk import Recordings
 from sim.outcome import Outcome
 
 
@@ -44,7 +45,7 @@ class Claimed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluated:
-    """The ask was evaluated. outcomes: one per scenario; seconds: how long it took."""
+    """The ask was evaluated. outcomes: one per trial; seconds: how long it took."""
 
     outcomes: tuple[Outcome, ...]
     seconds: float
@@ -166,6 +167,7 @@ class Coordination:
     backoff: Backoff = field(default_factory=Backoff)
     phase: Phase = Phase.START
     job: Job | None = None
+    recordings: Recordings = field(default_factory=dict)
     ask: Ask | None = None
     following: Ask | None = None
     failures: int = 0
@@ -203,7 +205,13 @@ def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Act
 
 
 def _start(state: Coordination, claim: Claim) -> tuple[Coordination, tuple[Action, ...]]:
-    state = replace(state, phase=Phase.EVALUATING, job=claim.job, ask=claim.ask)
+    state = replace(
+        state,
+        phase=Phase.EVALUATING,
+        job=claim.job,
+        recordings=claim.recordings,
+        ask=claim.ask,
+    )
     if claim.ask is not None:
         return state, (_evaluate(state),)
     first = _ask(create_optimizer(claim.job.spec))
@@ -213,7 +221,7 @@ def _start(state: Coordination, claim: Claim) -> tuple[Coordination, tuple[Actio
 
 def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
     job, ask = _current(state)
-    fitness, _ = aggregate(event.outcomes, job.spec.resolved_preference())
+    fitness = judge_outcomes(job.spec, event.outcomes).fitness
     optimizer = create_optimizer(job.spec)
     optimizer.load(ask.state)
     optimizer.tell(fitness)
@@ -257,16 +265,11 @@ def _release(
 
 def _evaluate(state: Coordination) -> Evaluate:
     job, ask = _current(state)
-    spec = job.spec
-    space = spec.design_space()
     return Evaluate(
         EvaluationRequest(
             job_id=job.id,
-            robot=spec.robot,
-            controller=spec.controller,
-            scenarios=spec.resolved_scenarios(),
-            variables=space.names,
-            designs=space.designs(ask.positions),
+            trials=job.spec.trials(state.recordings),
+            designs=job.spec.design_space().designs(ask.positions),
         )
     )
 

@@ -39,4 +39,4 @@ def estimate(job: Job, now: datetime) -> Estimate:
         remaining = max(0, job.spec.iterations - progress.iterations) * one
         under_way = min(one, max(0.0, (now - job.updated_at).total_seconds()))
         eta = max(0.0, remaining - under_way)
-    return Estimate(eta, rate, rate * len(job.spec.scenarios))
+    return Estimate(eta, rate, rate * len(job.spec.trial_names))

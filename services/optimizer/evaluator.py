@@ -10,22 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.outcome import Outcome
-from sim.robot import RobotSource
-from sim.scenario import Scenario
+from sim.trial import Trial
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationRequest:
-    """One iteration of one job: every design in every scenario.
-
-    designs: (n, len(variables)) float64, values of `variables`, controller and gait alike.
-    """
+    """One iteration of one job: every design in every trial. designs: (n, v) float64."""
 
     job_id: str
-    robot: RobotSource
-    controller: str
-    scenarios: tuple[Scenario, ...]
-    variables: tuple[str, ...]
+    trials: tuple[Trial, ...]
     designs: NDArray[np.float64]
 
 
@@ -43,7 +36,7 @@ class Evaluator(Protocol):
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
-        """One outcome per scenario, in the request's order, of n designs each, in index order.
+        """One outcome per trial, in the request's order, of n designs each, in index order.
 
         should_stop: polled at least once a second; when true, work under way is dropped and
             `EvaluationStopped` raised.

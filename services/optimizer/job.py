@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.errors import Conflict
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.specs import AnySpec
+from sim.identification.recorded_walk import Recordings
 from sim.outcome import Outcome
 
 
@@ -67,11 +68,12 @@ def commanded(state: JobState, command: Command) -> JobState:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """One design, judged in every scenario of its job.
+    """One design, judged in every trial of its job.
 
     design: (v,) values of `Job.spec.design_space().names`.
-    objectives: (K, 6) raw objectives by scenario, NaN where there is none; statuses: (K,) uint8.
-    fitness: geometric mean of the scenarios' utilities, minimized, +inf if any scenario failed.
+    objectives: (K, m) raw objectives by trial, columns as in `Job.spec.objectives`, NaN where there
+        is none; statuses: (K,) uint8.
+    fitness: as `Job.spec.judge` has it, minimized, +inf if any trial failed.
     """
 
     iteration: int
@@ -99,7 +101,7 @@ class Job:
     """A job as stored. `spec` is resolved: no preset is left to be looked up."""
 
     id: str
-    spec: JobSpec
+    spec: AnySpec
     state: JobState
     created_at: datetime
     updated_at: datetime
@@ -145,7 +147,7 @@ class Ask:
 class CompletedIteration:
     """All that one transaction commits of an iteration.
 
-    designs: (n, v); outcomes: one per scenario, of n designs each; fitness: (n,).
+    designs: (n, v); outcomes: one per trial, of n designs each; fitness: (n,).
     """
 
     iteration: int
@@ -157,10 +159,14 @@ class CompletedIteration:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A lease on a job. `token` fences: a store refuses writes under an older one."""
+    """A lease on a job. `token` fences: a store refuses writes under an older one.
+
+    ask: the stored one to go on with; None for a job that has not begun.
+    recordings: those that the job's spec names.
+    """
 
     job: Job
     runner: str
     token: int
     ask: Ask | None
-    """The stored ask to go on with; None for a job that has not begun."""
+    recordings: Recordings = field(default_factory=dict)

@@ -1,26 +1,30 @@
-"""What a job is asked to do. The same object is request body, stored JSON and argument."""
+"""Jobs that tune a drive. The same object is request body, stored JSON and argument."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from services.optimizer.design_space import DesignSpace
-from services.optimizer.optimizers.pso import PsoSettings
-from services.optimizer.preference import PREFERENCES, Preference, PreferenceName
+from services.optimizer.judgement import Judgement
+from services.optimizer.preference import PREFERENCES, Preference, PreferenceName, judge
+from services.optimizer.spec import Spec
 from sim.controllers import CONTROLLERS, ControllerName
-from sim.robot import RobotSource
+from sim.identification.recorded_walk import Recordings
+from sim.outcome import OBJECTIVES, Objective
 from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, ScenarioName, find_scenario
-from sim.variables import Variable, VariableName
+from sim.trial import Trial, Walk
+
+Floats = NDArray[np.float64]
 
 
-class JobSpec(BaseModel):
-    """An optimization: which variables to tune, in which scenarios, by which measure, how long."""
+class JobSpec(Spec):
+    """Tuning of a drive: which variables, in which scenarios, by which measure, how long."""
 
     model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
         json_schema_extra={
             "examples": [
                 {
@@ -36,13 +40,7 @@ class JobSpec(BaseModel):
         },
     )
 
-    schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
-    name: str = Field(default="", max_length=200, description="For people; need not be unique.")
-    robot: RobotSource = Field(
-        default="szabadka2",
-        description="Robot to simulate, by name, or a variant with another law of friction or with"
-        " gearlash, or the text of the files of your own.",
-    )
+    kind: Literal["tuning"] = Field(default="tuning", description="Tune a drive to walk well.")
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller to be tuned; see /v1/controllers."
     )
@@ -53,28 +51,8 @@ class JobSpec(BaseModel):
         description="Walks in which every design is judged: names or numbers of presets (see"
         " /v1/scenarios), or scenarios of your own.",
     )
-    variables: tuple[VariableName | Variable, ...] | None = Field(
-        default=None,
-        min_length=1,
-        max_length=64,
-        description="What the optimizer may choose: names (with the catalogue's bounds) or"
-        " variables with bounds of your own. Default: all of the controller's, less `fixed`.",
-    )
-    fixed: dict[VariableName, FiniteFloat] = Field(
-        default_factory=dict,
-        description="Variables held at one value, by name; controller or gait variables.",
-    )
     preference: PreferenceName | Preference = Field(
         default="A", description="How objectives are weighed: A, B, C of table 4.5, or your own."
-    )
-    optimizer: PsoSettings = Field(
-        default_factory=PsoSettings, description="Search algorithm and its settings."
-    )
-    iterations: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
-        default=25, description="Budget: iterations to run (generations of the swarm)."
-    )
-    seed: int = Field(
-        default=1, ge=0, lt=2**63, description="Source of all randomness; same seed, same bits."
     )
 
     @field_validator("scenarios")
@@ -105,7 +83,7 @@ class JobSpec(BaseModel):
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def design_space(self) -> DesignSpace:
-        """The optimizer's variables and the fixed ones, checked against the catalogue."""
+        """See `Spec.design_space`: the controller's variables, and any of the gait's."""
         controller = CONTROLLERS[self.controller]
         return DesignSpace.build(
             required=controller.variables,
@@ -114,8 +92,30 @@ class JobSpec(BaseModel):
             fixed=self.fixed,
         )
 
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """See `Spec.objectives`: f1..f6 of table 4.1."""
+        return OBJECTIVES
+
+    @property
+    def trial_names(self) -> tuple[str, ...]:
+        """See `Spec.trial_names`: the scenarios."""
+        return tuple(scenario.name for scenario in self.resolved_scenarios())
+
+    def trials(self, recordings: Recordings) -> tuple[Trial, ...]:  # noqa: ARG002 - needs none
+        """See `Spec.trials`: one walk in each scenario."""
+        names = self.design_space().names
+        return tuple(
+            Walk(self.robot, self.controller, scenario, names)
+            for scenario in self.resolved_scenarios()
+        )
+
+    def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
+        """See `Spec.judge`: by the preference."""
+        return judge(objectives, failed, self.resolved_preference())
+
     def resolved(self) -> JobSpec:
-        """The same job with every preset written out, so that it stays what it was when stored."""
+        """See `Spec.resolved`."""
         space = self.design_space()
         return self.model_copy(
             update={

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from sim.outcome import Outcome, Status
+from services.optimizer.judgement import Judgement, exponential
 
 N_PREFERRED: Final = 5
 """Objectives f1..f5 enter the product; f6 belongs to the single-scenario fitness of chapter 3."""
@@ -57,19 +56,12 @@ PREFERENCES: Final[dict[PreferenceName, Preference]] = {
 """Table 4.5."""
 
 
-def aggregate(
-    outcomes: Sequence[Outcome], preference: Preference
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What designs are worth, from one outcome per scenario.
-
-    Returns fitness (n,), eq. 4.2, and utilities (n, K), eq. 4.1, of n designs in K scenarios;
-    both are minimized, and +inf where a walk failed.
-    """
-    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
-    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
+def judge(
+    objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
+) -> Judgement:
+    """Eq. 4.1 and 4.2 of n designs in K scenarios: objectives (n, K, >= 5), failed (n, K)."""
     logarithms = log_utilities(objectives, failed, preference)
-    utilities = np.array([[_exp(u) for u in row] for row in logarithms.tolist()], dtype=np.float64)
-    return geometric_mean(logarithms), utilities.reshape(failed.shape)
+    return Judgement(geometric_mean(logarithms), logarithms)
 
 
 def log_utilities(
@@ -94,7 +86,7 @@ def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
     means = [
         math.inf if math.inf in row else math.fsum(row) / len(row) for row in log_utility.tolist()
     ]
-    return np.array([_exp(mean) for mean in means], dtype=np.float64)
+    return np.array([exponential(mean) for mean in means], dtype=np.float64)
 
 
 def _log_product(row: list[float], preference: Preference) -> float:
@@ -108,10 +100,3 @@ def _log_product(row: list[float], preference: Preference) -> float:
         # A factor of zero or less cannot be improved upon; only a robot at rest reaches it.
         terms.append(e * math.log(factor) if factor > 0.0 else -math.inf)
     return math.fsum(terms)
-
-
-def _exp(logarithm: float) -> float:
-    try:
-        return math.exp(logarithm)
-    except OverflowError:
-        return math.inf

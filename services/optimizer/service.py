@@ -7,12 +7,17 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
-from services.optimizer.errors import InvalidRequest
+from services.optimizer.design_space import DesignSpace
+from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.job import Command, Evaluation, Iteration, Job, JobState
 from services.optimizer.job_spec import JobSpec
+from services.optimizer.spec import Spec
 from services.optimizer.store.base import Page, Store
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
+from sim.identification.parameters import with_parameters
+from sim.identification.recorded_walk import RecordedWalk
+from sim.robot import load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES
 from sim.simulate import check_reach, with_gait
 from sim.variables import Variable
@@ -26,13 +31,22 @@ class JobService:
 
     store: Store
 
-    def submit(self, spec: JobSpec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
+    def submit(self, spec: Spec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
         """Check that the job can be simulated and queue it; (job, whether it is new).
 
         Raises InvalidRequest that names the field, IdempotencyConflict.
         """
         check_can_be_simulated(spec)
+        self._check_recordings(spec)
         return self.store.create_job(spec.resolved(), idempotency_key=idempotency_key)
+
+    def record(self, walk: RecordedWalk) -> str:
+        """Keep a recorded walk, to which jobs can fit; its id."""
+        return self.store.add_recording(walk)
+
+    def recording(self, recording_id: str) -> RecordedWalk:
+        """Raises NotFound."""
+        return self.store.recordings([recording_id])[recording_id]
 
     def job(self, job_id: str) -> Job:
         """Raises NotFound."""
@@ -82,9 +96,36 @@ class JobService:
             if page.next is None:
                 return
 
+    def _check_recordings(self, spec: Spec) -> None:
+        """Each is there, of the robot's joints, and of a gait within the legs' reach."""
+        joints = load_robot(spec.robot).joint_names
+        for index, name in enumerate(spec.recording_ids):
+            field = f"recordings.{index}"
+            try:
+                walk = self.recording(name)
+                if walk.joints != joints:
+                    raise InvalidRequest("recorded on other joints than the robot's", field=field)
+                walk.check_reach(spec.robot)
+            except (NotFound, SimulationInputError) as error:
+                raise InvalidRequest(str(error), field=field) from error
 
-def check_can_be_simulated(spec: JobSpec) -> None:
-    """Raise InvalidRequest for bounds that nothing can run with, or a gait beyond the legs.
+
+def check_can_be_simulated(spec: Spec) -> None:
+    """Raise InvalidRequest for bounds that nothing can run with, or a gait beyond the legs."""
+    if isinstance(spec, JobSpec):
+        _check_walks(spec)
+        return
+    robot, space = load_robot(spec.robot), spec.design_space()
+    for corner in (space.low, space.high):
+        (values,) = space.designs(corner.reshape(1, -1))
+        try:
+            with_parameters(robot, dict(zip(space.names, values.tolist(), strict=True)))
+        except SimulationInputError as error:
+            raise _blamed(error, space) from error
+
+
+def _check_walks(spec: JobSpec) -> None:
+    """A job whose designs walk.
 
     A gait that is itself searched may leave the legs' reach at some points of the box: there a
     status says so. Only a scenario whose gentlest gait is beyond reach is refused.
@@ -99,15 +140,20 @@ def check_can_be_simulated(spec: JobSpec) -> None:
             CONTROLLERS[spec.controller].compile(design)
             with_gait(scenarios[0], _gait_of(design))
         except SimulationInputError as error:
-            culprit = str(error).partition(":")[0]
-            field = "fixed" if culprit in fixed else "variables"
-            raise InvalidRequest(str(error), field=field) from error
+            raise _blamed(error, space) from error
     gait = _gait_of(fixed) | _gentlest_gait(space.variables)
     for index, scenario in enumerate(scenarios):
         try:
             check_reach(scenario, tuple(gait), tuple(gait.values()), robot=spec.robot)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
+
+
+def _blamed(error: SimulationInputError, space: DesignSpace) -> InvalidRequest:
+    """The field of the spec that an error in a design's variable comes from."""
+    culprit = str(error).partition(":")[0]
+    field = "fixed" if culprit in dict(space.fixed) else "variables"
+    return InvalidRequest(str(error), field=field)
 
 
 def _gait_of(design: Mapping[str, float]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""How one iteration is cut into tasks: one scenario and one run of designs each."""
+"""How one iteration is cut into tasks: one trial and one run of designs each."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ _SHORTEST: Final = 10.0
 send it."""
 
 _LONGEST: Final = 250.0
-"""Simulated seconds in a task at most, if its scenario can be cut so fine: about a second, so
+"""Simulated seconds in a task at most, if its trial can be cut so fine: about a second, so
 that other jobs, and whoever cancels this one, need not wait."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Designs start <= index < stop in one scenario.
+    """Designs start <= index < stop in one trial.
 
     cost: simulated seconds that the kernel steps through, with its lanes filled up.
     """
 
-    scenario: int
+    trial: int
     start: int
     stop: int
     cost: float
 
 
 def cut(durations: Sequence[float], designs: int, *, slots: int, lanes: int) -> tuple[Chunk, ...]:
-    """Chunks of all scenarios, longest first.
+    """Chunks of all trials, longest first.
 
-    durations: simulated seconds of each scenario. Every chunk but a scenario's last is a multiple
+    durations: simulated seconds of each trial. Every chunk but a trial's last is a multiple
     of `lanes`, because the kernel steps so many walkers together, present or not.
     """
     blocks = math.ceil(designs / lanes)
     total = sum(durations) * blocks * lanes
     wanted = min(max(total / (_TASKS_PER_SLOT * slots), _SHORTEST), _LONGEST)
     chunks: list[Chunk] = []
-    for scenario, duration in enumerate(durations):
+    for trial, duration in enumerate(durations):
         largest = max(1, round(wanted / (duration * lanes)))
         pieces = max(1, math.ceil(blocks / largest))
         edges = [blocks * piece // pieces for piece in range(pieces + 1)]
         chunks += [
-            Chunk(scenario, a * lanes, min(b * lanes, designs), (b - a) * lanes * duration)
+            Chunk(trial, a * lanes, min(b * lanes, designs), (b - a) * lanes * duration)
             for a, b in itertools.pairwise(edges)
             if b > a
         ]
-    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.scenario, chunk.start)))
+    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.trial, chunk.start)))

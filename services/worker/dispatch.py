@@ -14,7 +14,7 @@ from services.optimizer.evaluator import EvaluationRequest, EvaluationStopped
 from services.worker.chunks import Chunk, cut
 from services.worker.fair_queue import FairQueue
 from services.worker.task import Task
-from sim.outcome import N_OBJECTIVES, Outcome
+from sim.outcome import Outcome
 
 _GLANCE: Final = 0.1
 """Seconds between looks at `should_stop`."""
@@ -52,10 +52,7 @@ class Work:
         """What is sent to the worker."""
         request, chunk = self.batch.request, self.chunk
         return Task(
-            robot=request.robot,
-            controller=request.controller,
-            scenario=request.scenarios[chunk.scenario],
-            variables=request.variables,
+            trial=request.trials[chunk.trial],
             designs=np.ascontiguousarray(request.designs[chunk.start : chunk.stop]),
         )
 
@@ -78,12 +75,14 @@ class Dispatcher:
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
         """See `Evaluator.evaluate`."""
-        durations = [scenario.duration for scenario in request.scenarios]
+        durations = [trial.duration for trial in request.trials]
         count = len(request.designs)
         chunks = cut(durations, count, slots=self.slots, lanes=self.lanes())
         blank = tuple(
-            Outcome(np.full((count, N_OBJECTIVES), np.nan), np.zeros(count, dtype=np.uint8))
-            for _ in durations
+            Outcome(
+                np.full((count, len(trial.objectives)), np.nan), np.zeros(count, dtype=np.uint8)
+            )
+            for trial in request.trials
         )
         batch = Batch(request, blank, missing=len(chunks))
         with self._changed:
@@ -106,7 +105,7 @@ class Dispatcher:
         with self._changed:
             if batch.ended:
                 return
-            into = batch.outcomes[chunk.scenario]
+            into = batch.outcomes[chunk.trial]
             into.objectives[chunk.start : chunk.stop] = outcome.objectives
             into.statuses[chunk.start : chunk.stop] = outcome.statuses
             batch.missing -= 1

@@ -66,7 +66,8 @@ class RayEvaluator:
     ) -> tuple[Outcome, ...]:
         """See `Evaluator.evaluate`."""
         # Built here, the kernel lies in the cache when this machine's workers look for it.
-        simulate.prepare(request.robot)
+        for robot in {trial.robot for trial in request.trials}:
+            simulate.prepare(robot)
         return self._living_dispatcher().evaluate(request, should_stop)
 
     def close(self) -> None:

@@ -8,28 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import simulate
 from sim.errors import SimulationError
 from sim.outcome import Outcome
-from sim.robot import RobotSource
-from sim.scenario import Scenario
+from sim.trial import Trial
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """Some designs in one scenario. designs: (n, len(variables))."""
+    """Some designs in one trial. designs: (n, v)."""
 
-    robot: RobotSource
-    controller: str
-    scenario: Scenario
-    variables: tuple[str, ...]
+    trial: Trial
     designs: NDArray[np.float64]
 
     def run(self) -> Outcome:
-        """Let them walk."""
-        return simulate.simulate(
-            self.scenario, self.controller, self.variables, self.designs, robot=self.robot
-        ).outcome
+        """Put them to it."""
+        return self.trial.run(self.designs)
 
 
 @dataclass(frozen=True, slots=True)

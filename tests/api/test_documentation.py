@@ -91,9 +91,12 @@ def test_every_error_is_a_problem(document: Document) -> None:
 def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -> None:
     schemas = document["components"]["schemas"]
 
-    assert "JobSpec" in schemas
-    assert not [name for name in schemas if name.startswith("JobSpec-")]
-    assert schemas["JobView"]["properties"]["spec"]["$ref"].endswith("/JobSpec")
+    kinds = ["JobSpec", "IdentificationSpec"]
+    assert not [name for name in schemas if name.startswith(tuple(f"{kind}-" for kind in kinds))]
+    answered = schemas["JobView"]["properties"]["spec"]["oneOf"]
+    asked = document["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"]
+    assert [kind["$ref"].rpartition("/")[2] for kind in answered] == kinds
+    assert asked["schema"]["oneOf"] == answered
     assert schemas["JobSpec"]["examples"]
 
 

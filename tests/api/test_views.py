@@ -15,7 +15,6 @@ import pytest
 from api.views import (
     HistoryIterationView,
     JobView,
-    ObjectivesView,
     SimulationView,
     WalkLogView,
     evaluation_views,
@@ -25,7 +24,7 @@ from services.optimizer.job import Evaluation, Job
 from services.optimizer.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
 from sim.kernel.observation import WalkLog
-from sim.outcome import N_OBJECTIVES, OBJECTIVE_NAMES, Status
+from sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
 
 
 def strict(text: str) -> object:
@@ -37,8 +36,9 @@ def strict(text: str) -> object:
     return json.loads(text, parse_constant=refuse)
 
 
-def test_objectives_and_statuses_are_the_simulators() -> None:
-    assert tuple(ObjectivesView.model_fields) == OBJECTIVE_NAMES
+def test_objectives_and_statuses_are_the_simulators(job: Job) -> None:
+    shown = JobView.from_job_and_best(job, None).objectives
+    assert [(o.name, o.unit) for o in shown] == [(o.name, o.unit) for o in OBJECTIVES]
     assert get_args(StatusName) == tuple(status.label for status in Status)
 
 
@@ -55,7 +55,7 @@ def test_numbers_that_are_not_finite_are_null(job: Job) -> None:
     (view,) = evaluation_views([evaluation], job.spec)
 
     assert strict(view.model_dump_json())["fitness"] is None
-    assert set(view.scenarios["normal-fast"].objectives.model_dump().values()) == {None}
+    assert set(view.scenarios["normal-fast"].objectives.values()) == {None}
 
 
 def test_a_log_that_ended_early_has_nulls() -> None:

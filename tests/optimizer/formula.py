@@ -33,7 +33,8 @@ def job(spec: JobSpec = SPEC, state: JobState = JobState.RUNNING) -> Job:
 def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:
     """Objectives that depend on every variable and scenario; one design in seven falls."""
     outcomes = []
-    for scenario in request.scenarios:
+    for trial in request.trials:
+        scenario = trial.scenario
         scale = scenario.cycle_time + scenario.slope + np.arange(1.0, 7.0)
         objectives = np.abs(request.designs.sum(axis=1, keepdims=True) - 0.7) * scale + 0.01
         statuses = np.full(len(request.designs), Status.OK, dtype=np.uint8)

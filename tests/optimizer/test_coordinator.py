@@ -30,7 +30,7 @@ from services.optimizer.coordinator import (
     handle,
 )
 from services.optimizer.job import Ask, Claim, CompletedIteration, JobState
-from services.optimizer.preference import aggregate
+from services.optimizer.spec import judge_outcomes
 from tests.optimizer.formula import SPEC, job, walk
 
 
@@ -109,7 +109,7 @@ def test_the_ask_is_stored_before_it_is_sent_out() -> None:
     np.testing.assert_array_equal(
         sent.request.designs, SPEC.design_space().designs(first.ask.positions)
     )
-    assert sent.request.scenarios == SPEC.resolved_scenarios()
+    assert sent.request.trials == SPEC.trials({})
 
 
 @pytest.mark.parametrize("crash_before", range(2 * SPEC.iterations + 1))
@@ -141,7 +141,7 @@ def test_what_is_committed_is_the_fitness_of_the_preference() -> None:
     event = evaluated(actions)
     _, (commit,) = handle(state, event)
     assert isinstance(commit, Commit)
-    expected, _ = aggregate(event.outcomes, SPEC.resolved_preference())
+    expected = judge_outcomes(SPEC, event.outcomes).fitness
     np.testing.assert_array_equal(commit.done.fitness, expected)
     assert commit.done.evaluate_seconds == 0.5
     assert commit.following is not None and commit.following.iteration == 1

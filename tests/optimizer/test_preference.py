@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from services.optimizer.preference import PREFERENCES, Preference, aggregate, log_utilities
+from services.optimizer.preference import PREFERENCES, Preference, judge, log_utilities
 from services.optimizer.single_scenario_fitness import general_fitness, single_scenario_fitness
 from sim.outcome import Outcome, Status
 
@@ -26,8 +27,17 @@ def outcome(*rows: tuple[float, ...], statuses: tuple[int, ...] | None = None) -
     )
 
 
+def worth(
+    outcomes: list[Outcome], preference: Preference
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
+    judged = judge(objectives, failed, preference)
+    return judged.fitness, judged.utilities
+
+
 def utility(row: tuple[float, ...], preference: Preference) -> float:
-    _, utilities = aggregate([outcome(row)], preference)
+    _, utilities = worth([outcome(row)], preference)
     return float(utilities[0, 0])
 
 
@@ -46,7 +56,7 @@ def test_preference_c_is_the_plain_product() -> None:
 
 def test_fitness_is_the_geometric_mean_over_the_scenarios() -> None:
     first, second = (2.0, 3.0, 5.0, 7.0, 11.0), (1.0, 4.0, 9.0, 16.0, 25.0)
-    fitness, utilities = aggregate([outcome(first), outcome(second)], PREFERENCES["B"])
+    fitness, utilities = worth([outcome(first), outcome(second)], PREFERENCES["B"])
     assert utilities.shape == (1, 2)
     assert fitness[0] == pytest.approx(math.sqrt(math.prod(utilities[0])), rel=1e-14)
 
@@ -55,7 +65,7 @@ def test_a_design_that_fails_in_one_scenario_is_worth_nothing() -> None:
     row = (*TABLE_3_6, 6.4)
     good = outcome(row, row)
     bad = outcome(row, (math.nan,) * 5, statuses=(Status.OK, Status.FELL))
-    fitness, utilities = aggregate([good, bad], PREFERENCES["A"])
+    fitness, utilities = worth([good, bad], PREFERENCES["A"])
     assert math.isfinite(fitness[0]) and math.isinf(fitness[1])
     assert np.isfinite(utilities[:, 0]).all() and math.isinf(utilities[1, 1])
 
@@ -63,7 +73,7 @@ def test_a_design_that_fails_in_one_scenario_is_worth_nothing() -> None:
 def test_a_failure_beats_a_perfect_scenario() -> None:
     perfect = outcome((0.0,) * 5)
     fallen = outcome((1.0,) * 5, statuses=(Status.FELL,))
-    fitness, _ = aggregate([perfect, fallen], PREFERENCES["C"])
+    fitness, _ = worth([perfect, fallen], PREFERENCES["C"])
     assert math.isinf(fitness[0])
 
 
@@ -83,7 +93,7 @@ def test_an_undefined_objective_counts_only_if_it_has_a_weight() -> None:
 def test_no_objectives_below_a_million_overflow(
     rows: list[tuple[float, ...]], bias: tuple[float, ...], exponent: tuple[float, ...]
 ) -> None:
-    fitness, utilities = aggregate(
+    fitness, utilities = worth(
         [outcome(row) for row in rows], Preference(bias=bias, exponent=exponent)
     )
     assert np.isfinite(fitness).all() and np.isfinite(utilities).all()

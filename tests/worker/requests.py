@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from services.optimizer.evaluator import EvaluationRequest
-from sim import simulate
 from sim.outcome import Outcome
 from sim.scenario import Scenario
+from sim.simulate import simulate
+from sim.trial import Walk
 
 SCENARIOS = (
     Scenario(name="level", cycle_time=1.0, radius=0.16, withers=0.15, cycles=1),
@@ -19,14 +20,15 @@ def request(
     count: int, *, job_id: str = "job", scenarios: tuple[Scenario, ...] = SCENARIOS, seed: int = 1
 ) -> EvaluationRequest:
     gains = np.random.default_rng(seed).uniform((0.1, 0.0), (0.5, 0.5), (count, 2))
-    return EvaluationRequest(job_id, "szabadka2", "pi", scenarios, ("P", "I"), gains)
+    trials = tuple(Walk("szabadka2", "pi", scenario, ("P", "I")) for scenario in scenarios)
+    return EvaluationRequest(job_id, trials, gains)
 
 
 def walked_at_once(wanted: EvaluationRequest) -> tuple[Outcome, ...]:
     """The same walks without any evaluator: one batch per scenario."""
     return tuple(
-        simulate.simulate(scenario, wanted.controller, wanted.variables, wanted.designs).outcome
-        for scenario in wanted.scenarios
+        simulate(trial.scenario, trial.controller, trial.variables, wanted.designs).outcome
+        for trial in wanted.trials
     )
 
 

@@ -20,12 +20,12 @@ DURATIONS = [scenario.duration for scenario in SCENARIOS]
     slots=st.integers(1, 64),
     lanes=st.sampled_from([1, 2, 4, 8, 16]),
 )
-def test_every_design_of_every_scenario_is_in_one_chunk_and_lanes_are_filled(
+def test_every_design_of_every_trial_is_in_one_chunk_and_lanes_are_filled(
     durations: list[float], designs: int, slots: int, lanes: int
 ) -> None:
     chunks = cut(durations, designs, slots=slots, lanes=lanes)
-    for scenario in range(len(durations)):
-        own = sorted((c.start, c.stop) for c in chunks if c.scenario == scenario)
+    for trial in range(len(durations)):
+        own = sorted((c.start, c.stop) for c in chunks if c.trial == trial)
         assert [start for start, _ in own] == [0, *(stop for _, stop in own[:-1])]
         assert own[-1][1] == designs
         assert all(start % lanes == 0 and start < stop for start, stop in own)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from services.optimizer.evaluation_columns import EvaluationColumns
 from services.optimizer.job import (
     Ask,
     Claim,
@@ -15,7 +17,8 @@ from services.optimizer.job import (
     Job,
     JobState,
 )
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.spec import Spec
+from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 T = TypeVar("T")
 
@@ -35,7 +38,7 @@ class Store(Protocol):
     LeaseLost, and change nothing, if the claim's token is no longer the job's.
     """
 
-    def create_job(self, spec: JobSpec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
+    def create_job(self, spec: Spec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
         """Insert a queued job of the resolved spec; (job, True).
 
         With a key used before: (the job it made, False) if the spec is equal, else
@@ -56,13 +59,20 @@ class Store(Protocol):
         Cancelling clears the lease, so a runner's next write is refused.
         """
 
+    def add_recording(self, walk: RecordedWalk) -> str:
+        """Keep a recorded walk; its id, which depends on its content alone."""
+
+    def recordings(self, ids: Sequence[str]) -> Recordings:
+        """Recorded walks by id. Raises NotFound for the first that is not there."""
+
     def claim(
         self, runner: str, *, lease_seconds: float, job_id: str | None = None
     ) -> Claim | None:
         """Take the oldest job that is queued, or running/pausing with a lease that ran out.
 
         job_id: only that one. A pausing job without a live lease becomes paused and is not claimed.
-        The claimed job is running, its token one higher than any before.
+        The claimed job is running, its token one higher than any before. The claim brings the
+        recordings that the job needs.
         """
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
@@ -100,6 +110,9 @@ class Store(Protocol):
         For reading a long history by pieces, each a transaction of its own; committed iterations
         never change, so the pieces fit together.
         """
+
+    def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
+        """As `evaluations_between`, as columns and a dozen times as fast; None if there is none."""
 
     def best(self, job_id: str) -> Evaluation | None:
         """The evaluation of least fitness, the earliest of equals; None if none is finite."""

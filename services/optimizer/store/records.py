@@ -10,7 +10,7 @@ from sqlalchemy import Connection, insert, select, update
 
 from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.job import Ask, CompletedIteration, Job, JobState
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.spec import Spec
 from services.optimizer.store.cursors import is_job_id, new_job_id
 from services.optimizer.store.rows import (
     Row,
@@ -48,7 +48,7 @@ def job_of_key(connection: Connection, idempotency_key: str | None) -> Job | Non
 
 
 def insert_job(
-    connection: Connection, resolved: JobSpec, idempotency_key: str | None, now: datetime
+    connection: Connection, resolved: Spec, idempotency_key: str | None, now: datetime
 ) -> Job:
     """A new queued job."""
     columns = {

@@ -24,8 +24,9 @@ from services.optimizer.job import (
     JobState,
     Progress,
 )
-from services.optimizer.job_spec import JobSpec
-from sim.outcome import N_OBJECTIVES, Status
+from services.optimizer.spec import Spec
+from services.optimizer.specs import SPECS
+from sim.outcome import Status
 
 Row = Mapping[Any, Any]
 """Columns of one row by name, as selected or as they are about to be."""
@@ -34,7 +35,7 @@ Row = Mapping[Any, Any]
 def to_job(row: Row) -> Job:
     """A row of `jobs`. Raises StoreUnavailable for a spec that this version cannot read."""
     try:
-        spec = JobSpec.model_validate(row["spec"])
+        spec = SPECS.validate_python(row["spec"])
     except ValidationError as error:
         raise StoreUnavailable(
             f"job {row['id']} was stored with a spec that this version cannot read: {error}"
@@ -59,7 +60,7 @@ def to_job(row: Row) -> Job:
     )
 
 
-def spec_document(spec: JobSpec) -> dict[str, Any]:
+def spec_document(spec: Spec) -> dict[str, Any]:
     """The JSON document of a spec; it carries its schema version."""
     return spec.model_dump(mode="json")
 
@@ -114,7 +115,7 @@ def best_particle(fitness: NDArray[np.float64]) -> int | None:
 
 def to_evaluation(row: Row) -> Evaluation:
     """A row of `evaluations`."""
-    objectives = np.array(row["objectives"], dtype=np.float64).reshape(-1, N_OBJECTIVES)
+    objectives = np.array(row["objectives"], dtype=np.float64)
     return Evaluation(
         iteration=row["iteration"],
         particle=row["particle"],
@@ -127,7 +128,7 @@ def to_evaluation(row: Row) -> Evaluation:
 
 def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any]]:
     """One row of `evaluations` per particle."""
-    # (K, n, 6) and (K, n), by scenario, are turned to one (K, 6) and (K,) per particle.
+    # (K, n, m) and (K, n), by trial, are turned to one (K, m) and (K,) per particle.
     objectives = np.stack([outcome.objectives for outcome in done.outcomes], axis=1)
     statuses = np.stack([outcome.statuses for outcome in done.outcomes], axis=1)
     return [
@@ -136,11 +137,11 @@ def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any
             "iteration": done.iteration,
             "particle": particle,
             "design": design,
-            "objectives": [_numbers(scenario) for scenario in by_scenario],
+            "objectives": [_numbers(trial) for trial in by_trial],
             "statuses": [Status(status).label for status in labels],
             "fitness": _number(fitness),
         }
-        for particle, (design, by_scenario, labels, fitness) in enumerate(
+        for particle, (design, by_trial, labels, fitness) in enumerate(
             zip(
                 done.designs.tolist(),
                 objectives.tolist(),

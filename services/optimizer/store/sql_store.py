@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
@@ -10,6 +10,7 @@ from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
+from services.optimizer.evaluation_columns import EvaluationColumns
 from services.optimizer.job import (
     Ask,
     Claim,
@@ -21,12 +22,18 @@ from services.optimizer.job import (
     JobState,
     commanded,
 )
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.spec import Spec
 from services.optimizer.store.base import Page
 from services.optimizer.store.cursors import from_cursor, to_cursor
 from services.optimizer.store.engine import Database, connect, parse_url
+from services.optimizer.store.evaluation_columns import select_columns
 from services.optimizer.store.leases import claimable, held, lease_is_live
 from services.optimizer.store.migrate import check_revision, migrate
+from services.optimizer.store.recordings import (
+    insert_recording,
+    load_recordings,
+    recording_id,
+)
 from services.optimizer.store.records import (
     complete_iteration,
     insert_ask,
@@ -44,6 +51,7 @@ from services.optimizer.store.transitions import (
     state_after_commit,
     state_after_release,
 )
+from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _LARGEST_INDEX: Final = 2**31 - 1
 _LARGEST_PAGE: Final = 10_000
@@ -71,7 +79,7 @@ class SqlStore:
 
     # jobs, as their users see them
 
-    def create_job(self, spec: JobSpec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
+    def create_job(self, spec: Spec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
         """See `Store.create_job`. Raises InvalidRequest for a key that is empty or too long."""
         resolved = spec.resolved()
         _check_key(idempotency_key)
@@ -131,6 +139,22 @@ class SqlStore:
                 changes["error"] = None
             return to_job(update_job(connection, row, changes))
 
+    # recorded walks
+
+    def add_recording(self, walk: RecordedWalk) -> str:
+        """See `Store.add_recording`."""
+        try:
+            with self._database.transaction(write=True) as connection:
+                return insert_recording(connection, walk, self._clock())
+        except IntegrityError:
+            # Another process has stored the same walk between our look and our insertion.
+            return recording_id(walk)
+
+    def recordings(self, ids: Sequence[str]) -> Recordings:
+        """See `Store.recordings`."""
+        with self._database.transaction(write=False) as connection:
+            return load_recordings(connection, ids)
+
     # the runner's side
 
     def claim(
@@ -154,7 +178,8 @@ class SqlStore:
                     "lease_expires_at": now + timedelta(seconds=lease_seconds),
                 }
                 job = to_job(update_job(connection, row, changes))
-                return Claim(job, runner, token, outstanding_ask(connection, row))
+                walks = load_recordings(connection, job.spec.recording_ids)
+                return Claim(job, runner, token, outstanding_ask(connection, row), walks)
         return None
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
@@ -240,6 +265,12 @@ class SqlStore:
             job_row(connection, job_id)
             rows = connection.execute(query).mappings().all()
         return tuple(to_evaluation(row) for row in rows)
+
+    def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
+        """See `Store.evaluation_columns`."""
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            return select_columns(connection, job_id, _bounded(first), _bounded(last))
 
     def best(self, job_id: str) -> Evaluation | None:
         """See `Store.best`."""

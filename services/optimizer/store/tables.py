@@ -121,11 +121,21 @@ evaluations: Final = Table(
     Column("job_id", Text, nullable=False),
     Column("iteration", Integer, nullable=False),
     Column("particle", Integer, nullable=False),
-    # (v,) numbers; [K][6] numbers, null for none; (K,) labels; NULL fitness for +inf.
+    # (v,) numbers; [K][m] numbers, null for none; (K,) labels; NULL fitness for +inf.
     Column("design", JSON, nullable=False),
     Column("objectives", JSON, nullable=False),
     Column("statuses", JSON, nullable=False),
     Column("fitness", Double),
     PrimaryKeyConstraint("job_id", "iteration", "particle"),
     ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
+)
+
+recordings: Final = Table(
+    "recordings",
+    metadata,
+    # Of the content: a recording never changes.
+    Column("id", Text, nullable=False),
+    Column("document", JSON, nullable=False),
+    Column("created_at", UtcDateTime, nullable=False),
+    PrimaryKeyConstraint("id"),
 )

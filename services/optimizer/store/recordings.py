@@ -1,0 +1,49 @@
+"""Statements on recorded walks, inside a transaction that someone else began.
+
+A recording's id is its content's hash: it never changes, and storing it again is storing it once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from datetime import datetime
+
+from pydantic import ValidationError
+from sqlalchemy import Connection, insert, select
+
+from services.optimizer.errors import NotFound, StoreUnavailable
+from services.optimizer.store.tables import recordings
+from sim.identification.recorded_walk import RecordedWalk, Recordings
+
+
+def recording_id(walk: RecordedWalk) -> str:
+    """32 hexadecimal digits of the SHA-256 of its JSON."""
+    return hashlib.sha256(walk.model_dump_json().encode()).hexdigest()[:32]
+
+
+def insert_recording(connection: Connection, walk: RecordedWalk, now: datetime) -> str:
+    """Store a walk unless it is there; its id."""
+    name = recording_id(walk)
+    known = connection.execute(select(recordings.c.id).where(recordings.c.id == name)).first()
+    if known is None:
+        document = walk.model_dump(mode="json")
+        connection.execute(insert(recordings).values(id=name, document=document, created_at=now))
+    return name
+
+
+def load_recordings(connection: Connection, ids: Sequence[str]) -> Recordings:
+    """Recorded walks by id. Raises NotFound for the first that is not there."""
+    if not ids:
+        return {}
+    query = select(recordings.c.id, recordings.c.document).where(recordings.c.id.in_(ids))
+    documents = {row.id: row.document for row in connection.execute(query)}
+    for name in ids:
+        if name not in documents:
+            raise NotFound(f"there is no recording {name!r}")
+    try:
+        return {name: RecordedWalk.model_validate(documents[name]) for name in ids}
+    except ValidationError as error:
+        raise StoreUnavailable(
+            f"a recording was stored in a form that this version cannot read: {error}"
+        ) from error

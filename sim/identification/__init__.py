@@ -1,0 +1,1 @@
+"""Parameters of a robot from measured walks (thesis 2.4)."""

@@ -1,0 +1,112 @@
+"""How well a robot with other parameters draws the currents that were measured (eq. 2.21)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers import CONTROLLERS
+from sim.errors import SimulationInputError
+from sim.gait.trajectory import desired_angles
+from sim.identification.parameters import with_parameters
+from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.drive import electrical
+from sim.kernel.walk import Coding
+from sim.outcome import Objective, Outcome, Status
+from sim.robot import Robot, RobotSource, load_robot
+from sim.robot.description import JOINTS_PER_LEG
+from sim.simulate import control_steps, course_of, kernel_of, with_gait
+
+Floats = NDArray[np.float64]
+
+LINK_CURRENTS: Final = tuple(
+    Objective(
+        f"current_link_{link}",
+        "A",
+        f"mean absolute error of the motor currents of the {part}s, eq. 2.16",
+    )
+    for link, part in enumerate(("coxa", "femur", "tibia"), start=1)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class CurrentFit:
+    """Designs are parameters of the robot; each walks as the recorded one did.
+
+    variables: columns of the designs, names of `identifiable_variables`. Desired angles are those
+    of the robot as described: its controller knows nothing of the true parameters.
+    """
+
+    name: str
+    robot: RobotSource
+    walk: RecordedWalk
+    variables: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """See `Trial.duration`."""
+        return self.walk.walked_seconds
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """See `Trial.objectives`: one mean absolute error a link."""
+        return LINK_CURRENTS
+
+    def run(self, designs: Floats) -> Outcome:
+        """See `Trial.run`. A design that does not walk to the end has failed."""
+        described = load_robot(self.robot)
+        if self.walk.joints != described.joint_names:
+            raise SimulationInputError(
+                f"{self.name}: recorded on other joints than those of the robot"
+            )
+        scenario = with_gait(self.walk.scenario, self.walk.gait)
+        drive = CONTROLLERS[self.walk.controller].compile(self.walk.gains)
+        kernel = kernel_of(described)
+        substeps, timestep = control_steps(described)
+        robots = [
+            with_parameters(described, dict(zip(self.variables, row, strict=True)))
+            for row in designs.tolist()
+        ]
+        trajectory = desired_angles(described, scenario)
+        setups = []
+        for robot in robots:
+            course = course_of(robot, kernel, scenario, timestep, trajectory=trajectory)
+            if course is None:
+                raise SimulationInputError(f"{self.name}: the gait leaves the legs' reach")
+            setups.append(course(drive))
+        results = kernel.walk(setups, Coding.of(described, substeps), log=True)
+        errors = np.full((len(designs), JOINTS_PER_LEG), np.nan)
+        statuses = np.full(len(designs), Status.OK, dtype=np.uint8)
+        for index, (robot, result) in enumerate(zip(robots, results, strict=True)):
+            statuses[index] = result.status
+            if result.status is Status.OK and result.states is not None:
+                errors[index] = self._errors(motor_currents(robot, result.states))
+        return Outcome(errors, statuses)
+
+    def _errors(self, currents: Floats) -> Floats:
+        """(T, J) simulated currents [A] -> (3,) mean absolute error by link [A]."""
+        measured = self.walk.amperes
+        rows = slice(self.walk.first_tick, self.walk.first_tick + len(measured))
+        by_joint = np.abs(np.abs(currents[rows]) - measured).mean(axis=0)
+        return np.asarray(by_joint.reshape(-1, JOINTS_PER_LEG).mean(axis=0))
+
+
+def motor_currents(robot: Robot, states: Floats) -> Floats:
+    """Currents [A] of every motor at every control tick, (T, J), from a kernel's states.
+
+    states: see `walk.WalkResult`. The same formula as in the kernel, on whole columns.
+    """
+    n = robot.n_joints
+    duty = states[:, -n:]
+    # Behind gearlash the motors have angles and rates of their own, first in the memory.
+    first = 7 + n + 6
+    rates = states[:, first : first + n]
+    if robot.has_gearlash:
+        rates = states[:, first + 2 * n : first + 3 * n]
+    drives, supply = robot.drives(), robot.description.supply
+    columns = list(duty.T), list(rates.T), drives.viscous.tolist()
+    seen = electrical(drives, *columns, supply.voltage, supply.resistance)
+    return np.stack(seen.currents, axis=1)

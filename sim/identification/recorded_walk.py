@@ -1,0 +1,104 @@
+"""A measured walk as a fit needs it: what walked where, and the motor currents that it drew."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.robot import RobotSource
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
+from sim.simulate import check_reach
+from sim.variables import VariableName
+
+Amperes = Annotated[float, Field(ge=0.0, le=1000.0, allow_inf_nan=False)]
+
+
+class RecordedWalk(BaseModel):
+    """Absolute motor currents of one walk, on the time axis of the simulated one.
+
+    Made of a measured log by `record`, which synchronises the two and keeps whole cycles.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
+    scenario: Scenario = Field(description="The walk, as a job would name it.")
+    controller: ControllerName = Field(description="Controller that drove the robot.")
+    design: dict[VariableName, FiniteFloat] = Field(
+        description="Value of each of its variables, and of any gait variable, as it walked."
+    )
+    first_tick: int = Field(
+        ge=0, le=10_000_000, description="Control tick (500 a second) of the walk at the first row."
+    )
+    joints: tuple[str, ...] = Field(
+        min_length=1, max_length=256, description="Joints of the columns, in the robot's order."
+    )
+    current: tuple[tuple[Amperes, ...], ...] = Field(
+        min_length=1,
+        max_length=100_000,
+        description="Absolute motor currents [A], one row a tick, one number a joint.",
+        examples=[[[0.12, 0.4, 0.31], [0.12, 0.38, 0.3]]],
+    )
+    synthetic: bool = Field(
+        default=False, description="Whether the log was computed, not measured on a robot."
+    )
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> RecordedWalk:
+        for number, row in enumerate(self.current):
+            if len(row) != len(self.joints):
+                raise ValueError(
+                    f"current.{number}: {len(row)} numbers for {len(self.joints)} joints"
+                )
+        needed = {variable.name for variable in CONTROLLERS[self.controller].variables}
+        missing = sorted(needed - self.design.keys())
+        if missing:
+            raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
+        for name in self.design:
+            if name not in needed and name not in GAIT_VARIABLE_NAMES:
+                raise ValueError(f"design: unknown variable {name!r}")
+        last, walked = self.first_tick + len(self.current), self.walked_seconds
+        if last > round(walked / CONTROL_PERIOD):
+            raise ValueError(
+                f"current: row {last - self.first_tick - 1} lies behind the walk's end after"
+                f" {walked:g} s; let the scenario have as many cycles as were measured"
+            )
+        return self
+
+    @property
+    def walked_seconds(self) -> float:
+        """Length of the simulated walk [s]."""
+        cycle_time = self.design.get("cycle_time", self.scenario.cycle_time)
+        return self.scenario.cycles * cycle_time
+
+    @property
+    def gait(self) -> dict[str, float]:
+        """The gait variables of the design."""
+        return {name: v for name, v in self.design.items() if name in GAIT_VARIABLE_NAMES}
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """The controller's variables of the design."""
+        return {name: v for name, v in self.design.items() if name not in GAIT_VARIABLE_NAMES}
+
+    def check_reach(self, robot: RobotSource) -> None:
+        """Raise UnreachablePose if the gait leaves the legs' reach."""
+        check_reach(self.scenario, tuple(self.design), tuple(self.design.values()), robot=robot)
+
+    @cached_property
+    def amperes(self) -> NDArray[np.float64]:
+        """`current` as an array (T, J) [A], read-only."""
+        array = np.array(self.current, dtype=np.float64)
+        array.flags.writeable = False
+        return array
+
+
+Recordings = Mapping[str, RecordedWalk]
+"""Recorded walks by their id."""

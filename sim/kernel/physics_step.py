@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
@@ -13,6 +13,7 @@ from sim.kernel.articulated_body import (
     BASE,
     Acceleration,
     Inertia,
+    Link,
     LinkState,
     Motion,
     articulated_body,
@@ -157,29 +158,15 @@ def _dynamics(ca: Any, robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
     """Kinematics, then the forces of drives and ground, then accelerations."""
     links = links_of(model, robot.joint_names)
     attitude = rotation_of(s.q[3:7])
-    angles, rates = s.q[7:], s.v[6:]
-    base = LinkState(
-        velocity=Motion(_triple(s.v[0:3]), _triple(s.v[3:6])),
-        up=attitude[2],
-        ahead=attitude[0],
-        height=s.q[2],
-    )
-    states, rotations = kinematics(
-        links, base, [ca.sin(x) for x in angles], [ca.cos(x) for x in angles], rates
-    )
+    states, rotations = link_states(ca, links, s.q, s.v, attitude)
     drive = _drive(ca, robot, s)
     feet, pushes, memory = _feet(ca, robot, model, s, states)
-    xx, yy, zz, xy, xz, yz = s.p["base_inertia"]
     acceleration = articulated_body(
         links,
-        Inertia.of_body(
-            s.p["base_mass"][0],
-            _triple(s.p["base_moment"]),
-            ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)),
-        ),
+        base_inertia(s.p),
         states,
         rotations,
-        rates,
+        s.v[6:],
         drive.torques,
         drive.armature,
         pushes,
@@ -203,6 +190,34 @@ def _dynamics(ca: Any, robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
         acceleration,
         [*drive.memory, *memory],
     )
+
+
+def link_states(
+    ca: Any,
+    links: Sequence[Link],
+    q: Sequence[Scalar],
+    v: Sequence[Scalar],
+    attitude: Matrix,
+) -> tuple[list[LinkState], list[Matrix]]:
+    """Where every link is and how it moves (the base first), each joint's rotation to its parent.
+
+    q, v: see `PhysicsModel`; attitude: rotation of the base.
+    """
+    base = LinkState(
+        velocity=Motion(_triple(v[0:3]), _triple(v[3:6])),
+        up=attitude[2],
+        ahead=attitude[0],
+        height=q[2],
+    )
+    sines, cosines = [ca.sin(x) for x in q[7:]], [ca.cos(x) for x in q[7:]]
+    return kinematics(links, base, sines, cosines, v[6:])
+
+
+def base_inertia(p: Mapping[str, Sequence[Scalar]]) -> Inertia:
+    """The body's, with its load, from parameters by name; see `parameters.Layout`."""
+    xx, yy, zz, xy, xz, yz = p["base_inertia"]
+    tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    return Inertia.of_body(p["base_mass"][0], _triple(p["base_moment"]), tensor)
 
 
 @dataclass(frozen=True, slots=True)

@@ -213,6 +213,12 @@ def _joint_origins(urdf: str) -> dict[str, tuple[float, float, float]]:
     for joint in root.findall("joint"):
         origin, child = joint.find("origin"), joint.find("child")
         text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+        turn = "0" if origin is None else origin.get("rpy", "0")
+        if joint.get("type") != "fixed" and set(turn.split()) - {"0", "0.0", "-0", "-0.0"}:
+            raise RobotFileError(
+                f"robot.urdf: joint {joint.get('name')!r}: rpy {turn!r} turns its frame, which the"
+                " inverse kinematics does not know; let every frame be parallel to the body's"
+            )
         try:
             x, y, z = (float(part) for part in text.split())
         except ValueError as error:

@@ -103,3 +103,15 @@ def test_a_leg_without_its_joints_is_named(
     (folder / "robot.toml").write_text(text.replace("left_rear", "tail"), encoding="utf-8")
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
     assert "leg 'tail' has no joint or frame 'tail_coxa'" in capsys.readouterr().err
+
+
+def test_a_leg_joint_with_a_turned_frame_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "robot"
+    shutil.copytree(QUADRUPED, folder)
+    text = (folder / "robot.urdf").read_text(encoding="utf-8")
+    turned = text.replace("<origin xyz=", '<origin rpy="0 0 0.5" xyz=')
+    (folder / "robot.urdf").write_text(turned, encoding="utf-8")
+    assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
+    assert "rpy '0 0 0.5' turns its frame" in capsys.readouterr().err

@@ -125,7 +125,9 @@ def mjcf(
 def _add_leg(
     base: ET.Element, urdf: ET.Element, robot: Robot, leg: str, joints: Sequence[str]
 ) -> None:
-    armature = dict(zip(robot.joint_names, robot.drives().armature, strict=True))
+    # Behind gearlash, rotors do not turn with the links.
+    rotors = np.zeros(robot.n_joints) if robot.has_gearlash else robot.drives().armature
+    armature = dict(zip(robot.joint_names, rotors, strict=True))
     parent = base
     for name in joints:
         joint = _named(urdf, "joint", name)

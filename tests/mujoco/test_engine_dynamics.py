@@ -9,11 +9,20 @@ import pytest
 
 from sim.kernel.parameters import pack_parameters
 from sim.kernel.physics_step import physics_model
-from sim.robot import Robot, load_robot
+from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
 from tests.mujoco.export import Feet, model
-from tests.mujoco.walker import Floats, Ground, Motors, drag_of, ground_forces
+from tests.mujoco.ground import GROUNDS, Floats, Ground, LinearZone, Stick, ground_forces
+from tests.mujoco.motors import Gears, LooseGears, gears_of
+from tests.mujoco.walker import drag_of
 
+TIMESTEP = 2e-4
+VARIANTS = {
+    "linear zone": RobotVariant(),
+    "karnopp": RobotVariant(contact_law="karnopp"),
+    "stick": RobotVariant(contact_law="stick"),
+    "stick and gearlash": RobotVariant(contact_law="stick", gearlash=(2.5, 1.0, 1.0)),
+}
 STEEP = Scenario(
     name="steep",
     cycle_time=1.5,
@@ -88,36 +97,72 @@ def test_joint_space_inertia_agrees_in_random_poses(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("scenario", [SCENARIOS[0], STEEP], ids=lambda s: s.name)
+@pytest.mark.parametrize(
+    "variant",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name != "linear zone")) for name in VARIANTS],
+)
 def test_driven_on_the_ground_both_engines_accelerate_alike(
-    robot: Robot, scenario: Scenario
+    variant: str, scenario: Scenario
 ) -> None:
-    """Rigid bodies, motors, battery, contact, load and slope, each computed twice."""
-    assert robot.description.contact_law == "linear_zone"
-    assert not robot.has_gearlash
+    """Rigid bodies, motors, gears, battery, contact, load and slope, each computed twice.
+
+    From creeping to violent, so that every law of friction is seen on both sides of its threshold.
+    """
+    robot = load_robot(VARIANTS[variant])
     ours = physics_model(robot)
-    parameters = pack_parameters(robot, ours.body, scenario, 2e-4)
+    parameters = pack_parameters(robot, ours.body, scenario, TIMESTEP)
     exported = model(robot, scenario=scenario)
     d = mujoco.MjData(exported)
-    motors, tread = Motors(robot), ground_forces(exported, d, robot)
+    ground = GROUNDS[robot.description.contact_law](robot, TIMESTEP)
+    tread = ground_forces(exported, d, robot, ground)
     rng = np.random.default_rng(7)
-    touching, worst = 0, 0.0
+    held, slid, worst = 0, 0, 0.0
     for _ in range(300):
         q, v = random_state(rng, robot.n_joints)
+        v *= 10.0 ** rng.uniform(-4.0, 0.0)
+        gears = gears_of(robot, q[7:], TIMESTEP)
+        remembered = remember_anything(rng, gears, ground, v[6:])
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
         push = rng.normal(size=robot.n_joints)
-        found = np.array(ours.observe(q, v, [], duty, push, parameters)[-1]).ravel()
+        state = q, v, remembered, duty, push, parameters
+        found = np.array(ours.observe(*state)[-1]).ravel()
+        kept = np.array(ours.step(*state)[2]).ravel()
         attitude = into(d, q, v)
         mujoco.mj_step1(exported, d)
         d.qfrc_applied[:6] = 0.0
-        d.qfrc_applied[6:] = motors(duty, v[6:])[2] + push
-        touching += int(tread()[:, 2].any())
+        d.qfrc_applied[6:] = gears.drive(duty, q[7:], v[6:]).torque + push
+        forces = tread()
+        limit = robot.description.contact.friction * forces[:, 2]
+        rub = np.hypot(forces[:, 0], forces[:, 1])
+        slid += int((rub > 0.99 * limit)[limit > 0.0].sum())
+        held += int((rub < 0.99 * limit).sum())
         mujoco.mj_forward(exported, d)
         # Pinocchio's base acceleration is the twist's derivative in the base's own frame.
         twist = attitude.T @ d.qacc[:3] - np.cross(v[3:6], v[:3])
         expected = np.concatenate([twist, d.qacc[3:]])
         worst = max(worst, float(np.abs(found - expected).max() / np.abs(expected).max()))
-    assert touching > 60
+        np.testing.assert_allclose(kept, memory_of(gears, ground), rtol=1e-12, atol=1e-12)
+    assert min(held, slid) > 20
     assert worst < 1e-9
+
+
+def remember_anything(
+    rng: np.random.Generator, gears: Gears, ground: Ground, rates: Floats
+) -> Floats:
+    """Give gears and ground any past, with rotors inside the play and beyond; our x of it."""
+    if isinstance(gears, LooseGears):
+        gears.angles = gears.angles + rng.uniform(-0.03, 0.03, len(rates))
+        gears.rates = rates + rng.normal(size=len(rates))
+    if isinstance(ground, Stick):
+        ground.elongation = rng.normal(size=ground.elongation.shape) * 5e-3
+    return memory_of(gears, ground)
+
+
+def memory_of(gears: Gears, ground: Ground) -> Floats:
+    """What our kernel carries beside q and v: rotors, then springs along the ground."""
+    rotors = [gears.angles, gears.rates] if isinstance(gears, LooseGears) else []
+    springs = [ground.elongation.ravel()] if isinstance(ground, Stick) else []
+    return np.concatenate([*rotors, *springs, []])
 
 
 def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
@@ -126,7 +171,7 @@ def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
     feet = Feet(drag_of(robot, scenario))
     exported = model(robot, scenario=scenario, feet=feet)
     d = mujoco.MjData(exported)
-    ground, legs = Ground(robot), robot.description.legs
+    ground, legs = LinearZone(robot, TIMESTEP), robot.description.legs
     rng = np.random.default_rng(5)
     q, _ = random_state(rng, robot.n_joints)
     seen = 0

@@ -1,13 +1,12 @@
 """A walk in MuJoCo, with everything but the rigid bodies written anew from docs/model.md.
 
-Motors, battery, ground, controllers and objectives are computed here in NumPy; nothing of the
-simulator's kernel takes part. From its own log of the same walk come the start and the desired
-angles.
+Motors, gears, battery, ground, controllers and objectives are computed in NumPy, here and in the
+modules beside; nothing of the simulator's kernel takes part. From its own log of the same walk come
+the start and the desired angles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -19,6 +18,8 @@ from sim.kernel.observation import WalkLog
 from sim.robot import Robot
 from sim.scenario import Scenario
 from tests.mujoco.export import Feet, model
+from tests.mujoco.ground import GROUNDS, ground_forces
+from tests.mujoco.motors import gears_of
 
 Floats = NDArray[np.float64]
 Integration = Literal["mujoco", "body frame"]
@@ -31,68 +32,28 @@ class Controller(Protocol):
     """What sets the duty cycles at every control tick."""
 
     def __call__(self, tick: int, angles: Floats, current: Floats) -> Floats:
-        """Joint angles (J,) [rad], currents of the last step (J,) [A] -> duty (J,) [1]."""
+        """Encoders' angles (J,) [rad], currents of the last step (J,) [A] -> duty (J,) [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
     """States at the control ticks (T rows) and objectives f1..f6 of one walk in MuJoCo.
 
-    base_position (T, 3) [m]; base_orientation (T, 4) x y z w; joint_angle (T, J) [rad];
-    foot_force (T, L, 3) [N] if the ground's forces were ours.
+    base_position (T, 3) [m]; base_orientation (T, 4) x y z w; joint_angle, motor_angle (T, J)
+    [rad]; foot_force (T, L, 3) [N] if the ground's forces were ours.
     """
 
     base_position: Floats
     base_orientation: Floats
     joint_angle: Floats
+    motor_angle: Floats
     foot_force: Floats
     objectives: Floats
 
 
-class Motors:
-    """Quasi-static currents on a battery of finite resistance (thesis 2.2.5)."""
-
-    def __init__(self, robot: Robot) -> None:
-        drive, supply = robot.drives(), robot.description.supply
-        self._k, self._r, self._viscous = drive.torque, drive.resistance, drive.viscous
-        self._source, self._internal = supply.voltage, supply.resistance
-
-    def __call__(self, duty: Floats, rates: Floats) -> tuple[Floats, Floats, Floats]:
-        """Voltages, currents and torques after friction, by joint.
-
-        The battery gives sum(duty I) at U = source - internal sum(duty I).
-        """
-        back = self._k * rates
-        share = duty / self._r
-        supply = (self._source + self._internal * (share @ back)) / (
-            1.0 + self._internal * (share @ duty)
-        )
-        voltage = duty * supply
-        current = (voltage - back) / self._r
-        return voltage, current, self._k * current - self._viscous * rates
-
-
-class Ground:
-    """Law `linear_zone`: a clamped spring and damper, friction linear below a slip velocity."""
-
-    def __init__(self, robot: Robot) -> None:
-        contacts = robot.contacts()
-        self._k, self._c, self._sole, self._mu, self._slip = (
-            np.array([getattr(contact, name) for contact in contacts])
-            for name in ("stiffness", "damping", "sole", "friction", "slip_velocity")
-        )
-
-    def __call__(self, position: Floats, velocity: Floats) -> Floats:
-        """Feet's positions [m] and velocities [m/s], (L, 3) each -> forces (L, 3) [N]."""
-        depth = self._sole - position[:, 2]
-        normal = np.where(
-            depth > 0.0, np.maximum(self._k * depth - self._c * velocity[:, 2], 0.0), 0.0
-        )
-        slip = np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), self._slip)
-        force = np.empty_like(position)
-        force[:, :2] = velocity[:, :2] * (-self._mu * normal / slip)[:, None]
-        force[:, 2] = normal
-        return force
+def timestep_of(robot: Robot) -> float:
+    """[s]; links without their rotors answer the ground too fast for 5 kHz."""
+    return 5e-5 if robot.has_gearlash else 2e-4
 
 
 def drag_of(robot: Robot, scenario: Scenario) -> float:
@@ -123,7 +84,7 @@ def walk(
         has it; they differ in second order of the step.
     feet: MuJoCo's own contacts in place of our law of ground forces.
     """
-    m = model(robot, scenario=scenario, feet=feet)
+    m = model(robot, scenario=scenario, timestep=timestep_of(robot), feet=feet)
     d = mujoco.MjData(m)
     n, legs = robot.n_joints, len(robot.legs)
     substeps = round(CONTROL_PERIOD / m.opt.timestep)
@@ -131,44 +92,32 @@ def walk(
     d.qpos[:] = np.concatenate(
         [log.base_position[0], log.base_orientation[0, [3, 0, 1, 2]], log.joint_angle[0]]
     )
-    motors, push = Motors(robot), ground_forces(m, d, robot) if feet is None else None
+    ground = GROUNDS[robot.description.contact_law](robot, m.opt.timestep)
+    push = ground_forces(m, d, robot, ground) if feet is None else None
+    gears = gears_of(robot, d.qpos[7:], m.opt.timestep)
     advance = _advance_in_body_frame if integration == "body frame" else mujoco.mj_step2
-    measures = _Measures(robot)
+    measures = _Measures(gears.armature)
     current, forces = np.zeros(n), np.zeros((legs, 3))
-    states, trodden = np.empty((ticks, 7 + n)), np.empty((ticks, legs, 3))
+    states, turned = np.empty((ticks, 7 + n)), np.empty((ticks, n))
+    trodden = np.empty((ticks, legs, 3))
     for tick in range(ticks):
-        states[tick] = d.qpos
-        duty = controller(tick, d.qpos[7:], current)
+        states[tick], turned[tick] = d.qpos, gears.encoders(d.qpos[7:])
+        duty = controller(tick, turned[tick], current)
         for substep in range(substeps):
             mujoco.mj_step1(m, d)
-            voltage, current, torque = motors(duty, d.qvel[6:])
+            driven = gears.drive(duty, d.qpos[7:], d.qvel[6:])
+            current = driven.current
             d.qfrc_applied[:6] = 0.0
-            d.qfrc_applied[6:] = torque
+            d.qfrc_applied[6:] = driven.torque
             if push is not None:
                 forces = push()
             if substep == 0:
                 trodden[tick] = forces
             before = d.qpos[3:7].copy(), d.qvel[:3].copy()
             advance(m, d)
-            measures.add(*before, d.qacc, torque, float(voltage @ current))
+            measures.add(*before, d.qacc, driven.torque, float(driven.voltage @ current))
     objectives = measures.objectives(m.opt.timestep, d.qpos[2] - states[0, 2])
-    return Trace(states[:, :3], states[:, [4, 5, 6, 3]], states[:, 7:], trodden, objectives)
-
-
-def ground_forces(m: mujoco.MjModel, d: mujoco.MjData, robot: Robot) -> Callable[[], Floats]:
-    """A call adds our ground's forces to qfrc_applied and returns them, (L, 3) [N]."""
-    ground, legs = Ground(robot), len(robot.legs)
-    bodies = [int(m.site_bodyid[m.site(leg.foot).id]) for leg in robot.description.legs]
-    nothing = np.zeros(3)
-
-    def push() -> Floats:
-        seen = d.sensordata.reshape(2, legs, 3)
-        forces = ground(seen[0], seen[1])
-        for leg in np.flatnonzero(forces[:, 2]):
-            mujoco.mj_applyFT(m, d, forces[leg], nothing, seen[0, leg], bodies[leg], d.qfrc_applied)
-        return forces
-
-    return push
+    return Trace(states[:, :3], states[:, [4, 5, 6, 3]], states[:, 7:], turned, trodden, objectives)
 
 
 def _advance_in_body_frame(m: mujoco.MjModel, d: mujoco.MjData) -> None:
@@ -193,8 +142,8 @@ def _advance_in_body_frame(m: mujoco.MjModel, d: mujoco.MjData) -> None:
 class _Measures:
     """Objectives of table 4.1, summed over the physics steps."""
 
-    def __init__(self, robot: Robot) -> None:
-        self._armature = robot.drives().armature
+    def __init__(self, armature: Floats) -> None:
+        self._armature = armature
         self._sums = np.zeros(5)
         self._steps = 0
 

@@ -1,9 +1,8 @@
-"""The symbolic physics against Pinocchio, and its conservation laws."""
+"""The symbolic physics: accelerations against Pinocchio's, and conservation of energy."""
 
 from __future__ import annotations
 
 from importlib import resources
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,83 +10,21 @@ import pytest
 
 from sim.kernel.parameters import gravity_on, pack_parameters
 from sim.kernel.physics_step import PhysicsModel, physics_model
-from sim.robot import Robot, load_robot, parse_robot
+from sim.robot import Robot, parse_robot
 from sim.scenario import SCENARIOS, Scenario
+from tests.sim.pinocchio_oracle import ROBOTS, Oracle, random_state, robot_named
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return load_robot("szabadka2")
+@pytest.fixture(scope="module", params=ROBOTS)
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return robot_named(request.param)
 
 
 @pytest.fixture(scope="module")
 def model(robot: Robot) -> PhysicsModel:
     return physics_model(robot)
-
-
-class Oracle:
-    """Pinocchio's view of the robot, in our order of joints."""
-
-    def __init__(self, robot: Robot) -> None:
-        self.robot = robot
-        self.model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
-        joints = [self.model.joints[self.model.getJointId(n)] for n in robot.joint_names]
-        self.q_index = [*range(7), *(joint.idx_q for joint in joints)]
-        self.v_index = [*range(6), *(joint.idx_v for joint in joints)]
-        armature = np.zeros(self.model.nv)
-        armature[self.v_index[6:]] = robot.drives().armature
-        self.model.armature = armature
-        self.data = self.model.createData()
-
-    def q(self, ours: np.ndarray) -> np.ndarray:
-        theirs = np.empty(self.model.nq)
-        theirs[self.q_index] = ours
-        return theirs
-
-    def v(self, ours: np.ndarray) -> np.ndarray:
-        theirs = np.empty(self.model.nv)
-        theirs[self.v_index] = ours
-        return theirs
-
-    def contact_forces(self, q: np.ndarray, v: np.ndarray) -> tuple[Any, np.ndarray]:
-        """Spatial forces for pin.aba and world forces (L, 3), written anew from eq. 2.13."""
-        pin.forwardKinematics(self.model, self.data, self.q(q), self.v(v))
-        pin.updateFramePlacements(self.model, self.data)
-        external = [pin.Force.Zero() for _ in range(self.model.njoints)]
-        world = []
-        for leg, contact in zip(self.robot.description.legs, self.robot.contacts(), strict=True):
-            frame = self.model.getFrameId(leg.foot)
-            place = self.data.oMf[frame]
-            speed = pin.getFrameVelocity(
-                self.model, self.data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            ).linear
-            depth = contact.sole - place.translation[2]
-            force = np.zeros(3)
-            if depth > 0.0:
-                normal = max(0.0, contact.stiffness * depth - contact.damping * speed[2])
-                slip = max(float(np.hypot(*speed[:2])), contact.slip_velocity)
-                force = np.array([*(-contact.friction * normal * speed[:2] / slip), normal])
-            joint = self.model.frames[frame].parentJoint
-            lever = self.model.frames[frame].placement.translation
-            local = self.data.oMi[joint].rotation.T @ force
-            external[joint] = pin.Force(local, np.cross(lever, local))
-            world.append(force)
-        return external, np.array(world)
-
-
-def random_state(rng: np.random.Generator, joints: int) -> tuple[np.ndarray, np.ndarray]:
-    """A pose near walking height with any attitude, and violent velocities."""
-    quaternion = rng.normal(size=4)
-    q = np.concatenate(
-        [
-            rng.uniform([-1, -1, 0.0], [1, 1, 0.2]),
-            quaternion / np.linalg.norm(quaternion),
-            rng.uniform(-1.5, 1.5, joints),
-        ]
-    )
-    return q, rng.normal(size=6 + joints) * 3.0
 
 
 def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
@@ -135,17 +72,14 @@ def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -
     rng = np.random.default_rng(3)
     loaded = SCENARIOS[2]
     assert loaded.load == 2.0
-    at = pin.SE3(np.eye(3), np.array([0.0, 0.0, robot.description.load_height]))
-    oracle.model.appendBodyToJoint(1, pin.Inertia(loaded.load, np.zeros(3), np.zeros((3, 3))), at)
-    oracle.data = oracle.model.createData()
+    oracle.carry(loaded.load)
     p = pack_parameters(robot, model.body, loaded, 2e-4)
-    drive = robot.drives()
+    drive, still = robot.drives(), np.zeros(robot.n_joints)
     for _ in range(20):
         q, v = random_state(rng, robot.n_joints)
         q[2] = 5.0
         current, *_, found = (
-            np.array(part).ravel()
-            for part in model.observe(q, v, [], np.zeros(18), np.zeros(18), p)
+            np.array(part).ravel() for part in model.observe(q, v, [], still, still, p)
         )
         tau = np.zeros(oracle.model.nv)
         tau[oracle.v_index[6:]] = drive.torque * current - drive.viscous * v[6:]
@@ -177,10 +111,8 @@ def energy_drift(robot: Robot, timestep: float) -> float:
     p = pack_parameters(robot, model.body, SCENARIOS[0], timestep)
 
     def energy() -> float:
-        inertia = pin.crba(oracle.model, oracle.data, oracle.q(q))
-        inertia = np.triu(inertia) + np.triu(inertia, 1).T
-        kinetic = 0.5 * oracle.v(v) @ inertia @ oracle.v(v)
-        return float(kinetic + pin.computePotentialEnergy(oracle.model, oracle.data, oracle.q(q)))
+        potential = pin.computePotentialEnergy(oracle.model, oracle.data, oracle.q(q))
+        return float(oracle.kinetic_energy(q, v) + potential)
 
     before = energy()
     for _ in range(round(0.2 / timestep)):

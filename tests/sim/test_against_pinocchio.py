@@ -1,0 +1,156 @@
+"""Where our links are, how they move and what energy they have, against Pinocchio."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from sim.kernel.articulated_body import LinkState, links_of
+from sim.kernel.parameters import Floats, gravity_on, pack_parameters
+from sim.kernel.physics_step import base_inertia, link_states, physics_model
+from sim.kernel.spatial import Matrix, add, apply, cross, dot, rotation_of, scale
+from sim.robot import Robot
+from sim.scenario import Scenario
+from tests.sim.pinocchio_oracle import ROBOTS, Oracle, random_state, robot_named
+
+pytestmark = pytest.mark.slow
+
+STATES = 500
+STEEP = Scenario(
+    name="steep",
+    cycle_time=1.5,
+    radius=0.16,
+    withers=0.15,
+    load=2.0,
+    slope=20.0,
+    slope_direction=30.0,
+)
+
+
+class Found:
+    """Our tree in STATES random states: (S, ...), by link (base first) where there is a B.
+
+    position (S, B, 3) [m]; rotation (S, B, 3, 3) to the world; velocity (S, B, 6) linear and
+    angular in the link's own frame; kinetic energy of links and of rotors, potential energy (S,)
+    [J]; centre of mass (S, 3).
+    """
+
+    def __init__(self, robot: Robot, q: Floats, v: Floats) -> None:
+        links = 1 + robot.n_joints
+        tree = _symbolic_tree(robot)
+        parts = [np.array(part).T for part in tree.map(len(q))(q.T, v.T)]
+        self.height, self.centre = parts[0], parts[5]
+        self.kinetic, self.rotors, self.potential = parts[4].T
+        self.position = parts[1].reshape(-1, links, 3)
+        self.rotation = parts[2].reshape(-1, links, 3, 3)
+        self.velocity = parts[3].reshape(-1, links, 6)
+
+
+def _symbolic_tree(robot: Robot) -> Any:
+    """A CasADi function (q, v) -> what `Found` holds, of the model's own links and parameters."""
+    model = physics_model(robot)
+    packed = pack_parameters(robot, model.body, STEEP, 2e-4)
+    p = {name: packed[where].tolist() for name, where in model.layout.slices.items()}
+    links = links_of(Oracle(robot).model, robot.joint_names)
+    inputs = ca.SX.sym("q", 7 + robot.n_joints), ca.SX.sym("v", 6 + robot.n_joints)
+    q, v = ([s[k] for k in range(s.numel())] for s in inputs)
+    states, _ = link_states(ca, links, q, v, rotation_of(q[3:7]))
+    rotations = [_to_world(state) for state in states]
+    # The model itself has no use for the links' x and y; height is its own.
+    positions = [(q[0], q[1], q[2])]
+    for link in links:
+        positions.append(add(positions[link.parent], apply(rotations[link.parent], link.offset)))
+    kinetic, rotors, mass, moment = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
+    inertias = [base_inertia(p), *(link.inertia for link in links)]
+    for inertia, state, rotation, at in zip(inertias, states, rotations, positions, strict=True):
+        momentum = inertia.times(state.velocity)
+        kinetic += 0.5 * dot(state.velocity.linear, momentum.linear)
+        kinetic += 0.5 * dot(state.velocity.angular, momentum.angular)
+        assert inertia.rigid is not None
+        own, first_moment = inertia.rigid
+        mass += own
+        moment = add(moment, scale(own, at), apply(rotation, first_moment))
+    for armature, rate in zip(robot.drives().armature.tolist(), v[6:], strict=True):
+        rotors += 0.5 * armature * rate * rate
+    outputs = [
+        [state.height for state in states],
+        [x for position in positions for x in position],
+        [x for rotation in rotations for row in rotation for x in row],
+        [x for s in states for x in (*s.velocity.linear, *s.velocity.angular)],
+        [kinetic, rotors, -dot(p["gravity"], moment)],
+        list(scale(1.0 / mass, moment)),
+    ]
+    return ca.Function("tree", list(inputs), [ca.vertcat(*output) for output in outputs])
+
+
+def _to_world(state: LinkState) -> Matrix:
+    """A link's rotation: its rows are the world's axes in the link's frame."""
+    return state.ahead, cross(state.up, state.ahead), state.up
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def oracle(request: pytest.FixtureRequest) -> Oracle:
+    oracle = Oracle(robot_named(request.param))
+    oracle.carry(STEEP.load)
+    oracle.model.gravity.linear = gravity_on(STEEP.slope, STEEP.slope_direction)
+    return oracle
+
+
+@pytest.fixture(scope="module")
+def states(oracle: Oracle) -> list[tuple[Floats, Floats]]:
+    rng = np.random.default_rng(19)
+    return [random_state(rng, oracle.robot.n_joints) for _ in range(STATES)]
+
+
+@pytest.fixture(scope="module")
+def found(oracle: Oracle, states: list[tuple[Floats, Floats]]) -> Found:
+    q, v = (np.array(part) for part in zip(*states, strict=True))
+    return Found(oracle.robot, q, v)
+
+
+def same(ours: Floats | float, theirs: Floats | float) -> None:
+    np.testing.assert_allclose(ours, theirs, rtol=1e-10, atol=1e-10)
+
+
+def test_every_link_is_where_pinocchio_has_it(
+    oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
+) -> None:
+    assert len(found.position) == STATES
+    for k, (q, _) in enumerate(states):
+        pin.forwardKinematics(oracle.model, oracle.data, oracle.q(q))
+        places = [oracle.data.oMi[joint] for joint in (1, *oracle.joints)]
+        same(found.position[k], np.array([place.translation for place in places]))
+        same(found.height[k], np.array([place.translation[2] for place in places]))
+        same(found.rotation[k], np.array([place.rotation for place in places]))
+
+
+def test_every_link_moves_as_in_pinocchio(
+    oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
+) -> None:
+    for k, (q, v) in enumerate(states):
+        pin.forwardKinematics(oracle.model, oracle.data, oracle.q(q), oracle.v(v))
+        twists = [oracle.data.v[joint].vector for joint in (1, *oracle.joints)]
+        same(found.velocity[k], np.array(twists))
+
+
+def test_energy_is_pinocchios_with_a_load_and_on_a_slope(
+    oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
+) -> None:
+    links = pin.Model(oracle.model)
+    links.armature = np.zeros(links.nv)
+    data = links.createData()
+    for k, (q, v) in enumerate(states):
+        same(found.kinetic[k], pin.computeKineticEnergy(links, data, oracle.q(q), oracle.v(v)))
+        same(found.kinetic[k] + found.rotors[k], oracle.kinetic_energy(q, v))
+        same(found.potential[k], pin.computePotentialEnergy(links, data, oracle.q(q)))
+
+
+def test_the_centre_of_mass_is_pinocchios(
+    oracle: Oracle, states: list[tuple[Floats, Floats]], found: Found
+) -> None:
+    for k, (q, _) in enumerate(states):
+        same(found.centre[k], pin.centerOfMass(oracle.model, oracle.data, oracle.q(q)))

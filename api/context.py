@@ -8,6 +8,7 @@ from typing import Annotated, cast
 
 import anyio
 from fastapi import Depends, Path, Request
+from pydantic import Field
 
 from api.settings import ApiSettings
 from services.optimizer.job import Job
@@ -46,15 +47,12 @@ def service(request: Request) -> JobService:
 Context = Annotated[ApiContext, Depends(context)]
 Service = Annotated[JobService, Depends(service)]
 
+JobIdText = Annotated[
+    str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", examples=["k2q7zr5dm9xw"])
+]
+
 JobId = Annotated[
-    str,
-    Path(
-        min_length=1,
-        max_length=64,
-        pattern=r"^[A-Za-z0-9_-]+$",
-        description="Identifier of the job, as POST /v1/jobs answered it.",
-        examples=["k2q7zr5dm9xw"],
-    ),
+    JobIdText, Path(description="Identifier of the job, as POST /v1/jobs answered it.")
 ]
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from fastapi import FastAPI
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
 
 from api.problems import MEDIA_TYPE
 from api.views import ProblemView
@@ -29,6 +31,8 @@ server's log names it; a client may send its own.
 TAGS: Final[list[dict[str, str]]] = [
     {"name": "jobs", "description": "Optimizations: submit, follow, pause, resume, cancel."},
     {"name": "history", "description": "What a job has committed: iterations and evaluations."},
+    {"name": "analysis", "description": "Questions about all evaluations of a job at once."},
+    {"name": "recordings", "description": "Measured walks, to which a robot is fitted."},
     {"name": "simulations", "description": "One design walking on request, outside any job."},
     {"name": "catalogue", "description": "What there is to choose from."},
     {"name": "health", "description": "For load balancers and container engines."},
@@ -67,6 +71,23 @@ def document_problems(app: FastAPI) -> None:
                     if status >= "400":
                         (body,) = response["content"].values()
                         response["content"] = {MEDIA_TYPE: body}
+        return document
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def document_headers(app: FastAPI, *headers: type[BaseModel]) -> None:
+    """Add the schemas of what is JSON inside binary answers to the OpenAPI document."""
+    derive = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        document = derive()
+        _, schemas = models_json_schema(
+            [(header, "serialization") for header in headers],
+            ref_template="#/components/schemas/{model}",
+        )
+        components = document["components"]
+        components["schemas"] = schemas["$defs"] | components["schemas"]
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]

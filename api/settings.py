@@ -22,7 +22,7 @@ class ApiSettings(BaseSettings):
         default=0.5, gt=0.0, le=60.0, description="How often an event stream asks the store [s]."
     )
     simulation_workers: int = Field(
-        default=2, ge=1, le=64, description="POST /v1/simulations that compute at the same time."
+        default=2, ge=1, le=64, description="Walks on request that compute at the same time."
     )
     simulation_queue: int = Field(
         default=16, ge=0, description="Further ones that may wait; more are told to come later."

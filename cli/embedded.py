@@ -119,6 +119,7 @@ def finish(
 
 
 def _report(job: JobView, place: str, *, compare: bool) -> None:
+    from api.page_folder import is_built
     from cli.comparison import published_beside
     from cli.tables import design_table, number, results_table
 
@@ -135,4 +136,5 @@ def _report(job: JobView, place: str, *, compare: bool) -> None:
     speed = f" at {job.simulations_per_second:.0f} walks/s" if job.simulations_per_second else ""
     note(f"{job.evaluations} designs in {len(job.spec.trial_names)} walks each{speed}")
     note(f"its history: gaitswarm history {job.id}{place}")
-    note(f"over REST: gaitswarm serve{place}, then http://127.0.0.1:8000/v1/jobs/{job.id}")
+    way, path = ("look at it", "jobs") if is_built() else ("over REST", "v1/jobs")
+    note(f"{way}: gaitswarm serve{place}, then http://127.0.0.1:8000/{path}/{job.id}")

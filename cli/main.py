@@ -15,9 +15,11 @@ from cli.commands import (
     compare,
     export,
     history,
+    identify,
     jobs,
     optimize,
     plot,
+    rank,
     serve,
     simulate,
     study,
@@ -48,9 +50,11 @@ for _module in (
     study,
     bench,
     export,
+    rank,
     plot,
     validate,
     synthesize,
+    identify,
 ):
     _module.register(app)
 

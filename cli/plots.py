@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from cli.atomic_file import replacing
 from services.optimizer.errors import InvalidRequest
 
@@ -21,14 +19,12 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
     from api.views import IterationView
-    from sim.controllers import Drive
+    from sim.controllers.surface import Surface
     from sim.studies.drives import WalkFigures
 
 _FORMATS: Final = ("png", "svg", "pdf")
 _INK: Final = "#1f3a5f"
 _ACCENT: Final = "#d1495b"
-_FRACTION: Final = 1 << 16
-"""A drive's gains have 16 fractional bits."""
 
 
 def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figure:
@@ -62,31 +58,24 @@ def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figu
     return figure
 
 
-def draw_surface(drive: Drive, *, title: str) -> Figure:
+def draw_surface(surface: Surface, *, title: str) -> Figure:
     """Output over angle error and motor current, from the table that the robot looks up."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
-    from sim.controllers import LookupTable
-
-    table = drive.direct
-    if not isinstance(table, LookupTable):
-        raise InvalidRequest("this controller has no table, so there is no surface to draw")
-    rows, columns, _ = table.values.shape
-    error = (np.arange(rows) - rows // 2) * _FRACTION / table.error_gain
-    current = np.arange(columns) * _FRACTION / table.current_gain
-    output = table.values[:, :, 0].astype(np.float64) * table.output_gain / _FRACTION
+    error, current = (surface.inputs[name].values for name in ("error", "current"))
+    highest = abs(surface.table).max()
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     axes: Axes3D = figure.add_subplot(projection="3d")
     drawn = axes.plot_surface(
         error[:, None] / 1000.0,
         current[None, :] / 1000.0,
-        output,
+        surface.table,
         cmap="coolwarm",
-        vmin=-abs(output).max(),
-        vmax=abs(output).max(),
-        rcount=128,
-        ccount=64,
+        vmin=-highest,
+        vmax=highest,
+        rcount=len(error),
+        ccount=len(current),
         linewidth=0.0,
         antialiased=False,
     )
@@ -98,7 +87,8 @@ def draw_surface(drive: Drive, *, title: str) -> Figure:
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((0.97, 0.97, 0.98))
     figure.suptitle(title, x=0.04, ha="left", weight="bold")
-    figure.colorbar(drawn, ax=axes, shrink=0.6, pad=0.06, label="output  [PWM counts]")
+    unit = surface.output.universe.unit
+    figure.colorbar(drawn, ax=axes, shrink=0.6, pad=0.06, label=f"output  [{unit}]")
     return figure
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         JobSummaryView,
         JobView,
         ObjectiveView,
+        RankingView,
         ScenarioResultView,
     )
     from services.optimizer.spec import Spec
@@ -123,6 +124,24 @@ def results_table(
 def _objective(name: str, value: float | None) -> str:
     # A height is lost by millimetres: four decimals say more than four digits.
     return f"{value:.4f}" if name == "height_loss" and value is not None else number(value)
+
+
+def ranking_table(ranking: RankingView) -> Table:
+    """The best designs by another preference, best first, beside their places before."""
+    table = Table(box=None)
+    columns = ("rank", "before", "iteration", "particle", "fitness", "before")
+    for column in columns:
+        table.add_column(column, justify="right")
+    for design in ranking.top:
+        table.add_row(
+            str(design.rank),
+            MISSING if design.rank_before is None else str(design.rank_before),
+            str(design.iteration),
+            str(design.particle),
+            number(design.fitness),
+            number(design.fitness_before),
+        )
+    return table
 
 
 def print_job(job: JobView) -> None:

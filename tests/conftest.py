@@ -6,6 +6,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# Machines are noisy: how long an example takes says nothing about the code.
+settings.register_profile("gaitswarm", deadline=None)
+settings.load_profile("gaitswarm")
 
 
 @pytest.fixture(autouse=True)

@@ -28,3 +28,21 @@ def test_the_physics_benchmark_tells_ratios() -> None:
     rows = json.loads(done.stdout)
     assert rows[0]["times_the_kernel"] == 1.0
     assert all(row["us_per_step"] > 0.0 for row in rows)
+
+
+@pytest.mark.slow
+def test_the_history_benchmark_reads_a_store_of_its_own() -> None:
+    options = ["--jobs", "8", "--iterations", "20", "--repeats", "1", "--json"]
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.history", *options],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["evaluations"] == 500
+    assert all(seconds > 0.0 for seconds in found["seconds"].values())

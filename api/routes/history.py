@@ -6,9 +6,11 @@ from collections.abc import AsyncIterable
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Header, Path, Query
+from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from api.context import Context, ExistingJob, JobId, Service
+from api.evaluation_table import MEDIA_TYPES, TableFormat, encoded_table
 from api.events import job_events
 from api.openapi import problems
 from api.views import (
@@ -95,6 +97,39 @@ def get_best(job: ExistingJob, service: Service) -> BestView:
             " next iteration, or see why designs fail in its evaluations"
         )
     return BestView.from_evaluation(best, job.spec)
+
+
+@router.get(
+    "/export",
+    operation_id="export_job",
+    summary="Download every evaluation",
+    response_class=StreamingResponse,
+    response_description="The table, as a file.",
+    responses={
+        200: {
+            "content": {
+                kind: {"schema": {"type": "string", "format": "binary"}}
+                for kind in MEDIA_TYPES.values()
+            }
+        },
+        **problems(404, 422),
+    },
+)
+def export_job(
+    job: ExistingJob,
+    service: Service,
+    file_format: Annotated[
+        TableFormat, Query(alias="format", description="Format of the file.")
+    ] = "csv",
+) -> StreamingResponse:
+    """One row per design: iteration, particle, fitness, `design.<variable>`, and for every scenario
+    `<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`; floats are exact.
+    """
+    return StreamingResponse(
+        encoded_table(file_format, job.spec, service.column_pieces(job)),
+        media_type=MEDIA_TYPES[file_format],
+        headers={"Content-Disposition": f'attachment; filename="{job.id}.{file_format}"'},
+    )
 
 
 @router.get(

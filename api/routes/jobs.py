@@ -8,8 +8,8 @@ from fastapi import APIRouter, Header, Query, Response, status
 
 from api.context import JobId, Service
 from api.openapi import problems
-from api.views import PREFIX, JobSummaryView, JobView, PageView
-from services.optimizer.job import Command, Job, JobState
+from api.views import PREFIX, ExtensionRequest, JobSummaryView, JobView, PageView
+from services.optimizer.job import Command, Job, JobOrder, JobState
 from services.optimizer.service import JobService
 from services.optimizer.specs import AnySpec
 
@@ -59,19 +59,31 @@ def submit_job(
     return _in_full(service, job)
 
 
-@router.get(
-    "", operation_id="list_jobs", summary="List jobs, newest first", responses=problems(422)
-)
+@router.get("", operation_id="list_jobs", summary="List jobs", responses=problems(422))
 def list_jobs(
     service: Service,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
+    search: Annotated[
+        str,
+        Query(
+            max_length=200,
+            description="Only jobs whose name or id contains this, whatever its case.",
+        ),
+    ] = "",
+    order: Annotated[
+        JobOrder,
+        Query(
+            description="`created`: newest first; `fitness`: best first, jobs without one last;"
+            " `name`: by name, jobs without one last."
+        ),
+    ] = JobOrder.CREATED,
     after: Annotated[
         str | None, Query(max_length=200, description="`next` of the page before.")
     ] = None,
     limit: Annotated[int, Query(ge=1, le=200, description="Most jobs on a page.")] = 50,
 ) -> PageView[JobSummaryView]:
     """Jobs with their progress, in pages. Jobs submitted meanwhile do not shift later pages."""
-    page = service.jobs(state=state, after=after, limit=limit)
+    page = service.jobs(state=state, search=search, order=order, after=after, limit=limit)
     return PageView(items=[JobSummaryView.from_job(job) for job in page.items], next=page.next)
 
 
@@ -111,6 +123,25 @@ def resume_job(job_id: JobId, service: Service) -> JobView:
     409 if it is queued or running already, or has ended.
     """
     return _in_full(service, service.command(job_id, Command.RESUME))
+
+
+@router.post(
+    "/{job_id}/extend",
+    operation_id="extend_job",
+    summary="Give a job another budget",
+    status_code=status.HTTP_202_ACCEPTED,
+    responses=problems(400, 404, 409, 413, 422),
+)
+def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> JobView:
+    """A job that has succeeded is queued again and goes on from its last iteration; any other goes
+    on as it would, up to the new budget.
+
+    What is committed stays, and the iteration under way is committed as it was asked. Later ones
+    follow the schedule of the new budget, over which the swarm's inertia falls: so a job of 25
+    iterations that is extended to 50 is another than one of 50 from its beginning, but the same
+    every time. 409 if the job was cancelled.
+    """
+    return _in_full(service, service.extend(job_id, extension.iterations))
 
 
 @router.post(

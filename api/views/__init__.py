@@ -5,6 +5,13 @@ Nothing in this package knows FastAPI or HTTP.
 
 from __future__ import annotations
 
+from api.views.analysis import (
+    DistributionItemView,
+    DistributionView,
+    RankedDesignView,
+    RankingRequest,
+    RankingView,
+)
 from api.views.base import View, finite
 from api.views.catalogue import (
     CatalogueView,
@@ -15,6 +22,7 @@ from api.views.catalogue import (
     preference_views,
     scenario_views,
 )
+from api.views.cost import CostView
 from api.views.evaluation import (
     BestView,
     EvaluationView,
@@ -24,6 +32,7 @@ from api.views.evaluation import (
 )
 from api.views.job import (
     PREFIX,
+    ExtensionRequest,
     HistoryIterationView,
     IterationView,
     JobSummaryView,
@@ -31,6 +40,7 @@ from api.views.job import (
     PageView,
     StateView,
 )
+from api.views.particles import ParticlesHeaderView, encoded_particles
 from api.views.problem import FieldErrorView, ProblemView
 from api.views.simulation import SimulatedScenarioView, SimulationView, WalkLogView
 
@@ -39,7 +49,11 @@ __all__ = [
     "BestView",
     "CatalogueView",
     "ControllerView",
+    "CostView",
+    "DistributionItemView",
+    "DistributionView",
     "EvaluationView",
+    "ExtensionRequest",
     "FieldErrorView",
     "HistoryIterationView",
     "IterationView",
@@ -47,8 +61,12 @@ __all__ = [
     "JobView",
     "ObjectiveView",
     "PageView",
+    "ParticlesHeaderView",
     "PreferenceView",
     "ProblemView",
+    "RankedDesignView",
+    "RankingRequest",
+    "RankingView",
     "ScenarioResultView",
     "ScenarioView",
     "SimulatedScenarioView",
@@ -57,6 +75,7 @@ __all__ = [
     "View",
     "WalkLogView",
     "controller_views",
+    "encoded_particles",
     "evaluation_views",
     "finite",
     "preference_views",

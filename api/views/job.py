@@ -5,17 +5,27 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Any, Final, Generic, Literal, TypeVar
 
-from pydantic import ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from api.views.base import View, finite, listing_name
 from api.views.evaluation import BestView, EvaluationView, ObjectiveView, evaluation_views
 from services.optimizer.estimate import estimate
-from services.optimizer.job import TRANSITIONS, Evaluation, Iteration, Job, JobState
+from services.optimizer.job import (
+    LARGEST_BUDGET,
+    TRANSITIONS,
+    Evaluation,
+    Iteration,
+    Job,
+    JobState,
+)
+from services.optimizer.job_spec import JobSpec
 from services.optimizer.spec import Spec
 from services.optimizer.specs import AnySpec
 
 PREFIX: Final = "/v1"
 """Version of the HTTP API, in every path."""
+
+_RESOURCES: Final = ("best", "iterations", "events", "distribution", "particles", "export")
 
 T = TypeVar("T")
 
@@ -57,6 +67,15 @@ class JobSummaryView(View):
         examples=["running"],
     )
     error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
+    controller: str | None = Field(
+        description="Motor controller that it tunes; null for a job that tunes none.",
+        examples=["fuzzy-pi"],
+    )
+    scenarios: list[str] = Field(
+        description="Scenarios in which every design walks, or recordings that it is fitted to.",
+        examples=[["normal-fast", "turn-right-fast"]],
+    )
+    particles: int = Field(description="Size of the swarm [1].", examples=[25])
     iterations: int = Field(description="Iterations committed so far [1].", examples=[12])
     iterations_planned: int = Field(description="Budget of iterations [1].", examples=[25])
     evaluations: int = Field(
@@ -93,8 +112,9 @@ class JobSummaryView(View):
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(
-        description="Where to go on: `self`, `best`, `iterations`, `events`, and those of `pause`,"
-        " `resume`, `cancel` (POST) that its state allows.",
+        description="Where to go on: `self`, `best`, `iterations`, `events`, `distribution`,"
+        " `particles`, `export`, `ranking` (POST) for a job that tunes a drive, and those of"
+        " `pause`, `resume`, `cancel`, `extend` (POST) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -125,6 +145,19 @@ class JobView(JobSummaryView):
         return cls.model_validate(
             {**_summary(job), "best": view, "objectives": objectives, "spec": job.spec}
         )
+
+
+class ExtensionRequest(BaseModel):
+    """Another budget for a job."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    iterations: int = Field(
+        ge=1,
+        le=LARGEST_BUDGET,
+        description="Iterations in all, more than the job has committed [1].",
+        examples=[50],
+    )
 
 
 class IterationView(View):
@@ -186,12 +219,16 @@ class StateView(View):
 def job_links(job: Job) -> dict[str, str]:
     """Paths of the job's resources, and of the commands that its state allows."""
     here = f"{PREFIX}/jobs/{job.id}"
-    resources = {name: f"{here}/{name}" for name in ("best", "iterations", "events")}
+    resources = {name: f"{here}/{name}" for name in _RESOURCES}
+    if isinstance(job.spec, JobSpec):
+        resources["ranking"] = f"{here}/ranking"
     commands = {
         command.value: f"{here}/{command.value}"
         for state, command in TRANSITIONS
         if state is job.state
     }
+    if job.state is not JobState.CANCELLED:
+        commands["extend"] = f"{here}/extend"
     return {"self": here, **resources, **commands}
 
 
@@ -204,6 +241,9 @@ def _summary(job: Job) -> dict[str, object]:
         "kind": spec.kind,
         "state": job.state,
         "error": job.error,
+        "controller": spec.controller if isinstance(spec, JobSpec) else None,
+        "scenarios": list(spec.trial_names),
+        "particles": spec.optimizer.particles,
         "iterations": progress.iterations,
         "iterations_planned": spec.iterations,
         "evaluations": progress.evaluations,

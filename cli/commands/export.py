@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.options import Db, JobId, Server
+
+if TYPE_CHECKING:
+    from api.evaluation_table import TableFormat
 
 
 def register(app: typer.Typer) -> None:
@@ -24,10 +27,27 @@ def export(
     db: Db = None,
 ) -> None:
     """Write one row per evaluated design: fitness, variables, and results by scenario."""
-    from cli.evaluation_table import write_evaluations
+    from cli.atomic_file import replacing
     from cli.jobs.open import open_jobs
     from cli.output import note
 
+    file_format = _format(output)
     with open_jobs(server, db) as jobs:
-        rows = write_evaluations(output, jobs.job(job_id).spec, jobs.history(job_id))
-    note(f"{rows} evaluations written to {output}")
+        job = jobs.job(job_id)
+        with replacing(output, "output") as file:
+            for part in jobs.export(job_id, file_format):
+                file.write(part)
+    note(f"{job.evaluations} evaluations written to {output}")
+
+
+def _format(path: Path) -> TableFormat:
+    """As the file's suffix says. Raises InvalidRequest for another."""
+    from services.optimizer.errors import InvalidRequest
+
+    match path.suffix:
+        case ".csv":
+            return "csv"
+        case ".parquet":
+            return "parquet"
+        case _:
+            raise InvalidRequest(f"{path} must end in .csv or .parquet", field="output")

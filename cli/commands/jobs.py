@@ -1,8 +1,9 @@
-"""Commands about jobs: submit, list, status, watch, pause, resume, cancel."""
+"""Commands about jobs: submit, list, status, watch, pause, resume, extend, cancel."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from enum import StrEnum
+from typing import Annotated, TypeVar
 
 import typer
 
@@ -22,6 +23,8 @@ from cli.options import (
     SpecFile,
 )
 
+S = TypeVar("S", bound=StrEnum)
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
@@ -31,6 +34,7 @@ def register(app: typer.Typer) -> None:
     app.command()(watch)
     app.command()(pause)
     app.command()(resume)
+    app.command()(extend)
     app.command()(cancel)
 
 
@@ -77,25 +81,27 @@ def list_jobs(
             " succeeded."
         ),
     ] = None,
+    search: Annotated[
+        str, typer.Option(metavar="TEXT", help="Only jobs whose name or id contains this.")
+    ] = "",
+    order: Annotated[
+        str, typer.Option(help="created (newest first), fitness (best first) or name.")
+    ] = "created",
     limit: Annotated[int, typer.Option(min=1, help="Most jobs to list.")] = 50,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """List jobs, newest first."""
+    """List jobs, newest first unless another order is chosen."""
     from cli.jobs.open import open_jobs
     from cli.output import print_json_list, stdout_console
     from cli.tables import jobs_table
-    from services.optimizer.errors import InvalidRequest
-    from services.optimizer.job import JobState
+    from services.optimizer.job import JobOrder, JobState
 
-    try:
-        chosen = None if state is None else JobState(state)
-    except ValueError:
-        known = ", ".join(s.value for s in JobState)
-        raise InvalidRequest(f"{state!r} is none of {known}", field="state") from None
+    in_state = None if state is None else _one_of(JobState, state, "state")
+    sorted_by = _one_of(JobOrder, order, "order")
     with open_jobs(server, db) as jobs:
-        found = jobs.jobs(state=chosen, limit=limit)
+        found = jobs.jobs(state=in_state, search=search, order=sorted_by, limit=limit)
         if as_json:
             print_json_list(found)
         else:
@@ -139,9 +145,43 @@ def resume(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = 
     _command("resume", job_id, server, db, as_json=as_json)
 
 
+def extend(
+    job_id: JobId,
+    iterations: Annotated[int, typer.Option(help="Iterations in all, not further ones.")],
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """Give a job another budget; one that has succeeded is queued and goes on from its end."""
+    from cli.jobs.open import open_jobs
+    from cli.output import print_json, stdout_console
+
+    with open_jobs(server, db) as jobs:
+        job = jobs.extend(job_id, iterations)
+    if as_json:
+        print_json(job)
+    else:
+        stdout_console().print(
+            f"job {job.id} is {job.state}, with {job.iterations} of {job.iterations_planned}"
+            " iterations",
+            markup=False,
+        )
+
+
 def cancel(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """End a job for good; what it has committed stays."""
     _command("cancel", job_id, server, db, as_json=as_json)
+
+
+def _one_of(kind: type[S], text: str, option: str) -> S:
+    """Raises InvalidRequest that says which there are."""
+    from services.optimizer.errors import InvalidRequest
+
+    try:
+        return kind(text)
+    except ValueError:
+        known = ", ".join(kind)
+        raise InvalidRequest(f"{text!r} is none of {known}", field=option) from None
 
 
 def _command(

@@ -49,8 +49,10 @@ def surface(
     from cli.output import note
     from cli.plots import draw_surface, save
     from sim.controllers import CONTROLLERS
+    from sim.controllers.surface import surface as surface_of
 
-    drive = CONTROLLERS["fuzzy-pi"].compile(read_design(design, "fuzzy-pi"))
+    (inference,) = CONTROLLERS["fuzzy-pi"].inferences(read_design(design, "fuzzy-pi"))
     title = f"Fuzzy-P of design {design.rpartition(':')[2] if ':' in design else Path(design).stem}"
-    save(draw_surface(drive, title=title), output)
+    drawn = surface_of(inference, error_points=129, current_points=65)
+    save(draw_surface(drawn, title=title), output)
     note(f"picture written to {output}")

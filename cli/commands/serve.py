@@ -36,8 +36,9 @@ def serve(
     cpus: Cpus = None,
     ray_address: RayAddress = None,
 ) -> None:
-    """Serve the REST API and run queued jobs, until Ctrl-C."""
+    """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
     from api.app import create_app
+    from api.page_folder import is_built
     from api.server import ApiServer
     from cli.jobs.open import database_url
     from cli.options import evaluator_kind
@@ -65,5 +66,7 @@ def serve(
                 " another --port, or --port 0"
             ) from error
         doing = "runs no jobs" if opened.runner is None else "runs queued jobs"
+        if not is_built():
+            note("there is no page, only the API: in a checkout, `make page` builds the page")
         note(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
         server.run()

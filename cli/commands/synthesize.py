@@ -35,19 +35,38 @@ def synthesize(
     seed: Annotated[
         int, typer.Option(min=0, max=(1 << 64) - 1, help="Source of the instruments' noise.")
     ] = 1,
+    parameters: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.json",
+            help="Values of single parameters by name: the twin then differs in these alone.",
+        ),
+    ] = None,
 ) -> None:
     """Write a SYNTHETIC log: a perturbed twin of the robot, with sensor noise. No measurement."""
     from cli.atomic_file import replacing
     from cli.measured_walk import read_walk
     from cli.output import note
+    from cli.parameters_table import read_truth
     from services.optimizer.errors import InvalidRequest
+    from sim.identification.parameters import identifiable_variables
     from sim.validation.measured_csv import format_measured_log
-    from sim.validation.synthetic import synthetic_log
+    from sim.validation.synthetic import Perturbation, synthetic_log
 
     if output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
-    log = synthetic_log(walk.robot, walk.scenario, controller, walk.design, seed=seed)
+    twin = None
+    if parameters is not None:
+        known = {variable.name for variable in identifiable_variables(walk.robot)}
+        values = read_truth(parameters)
+        for name in values:
+            if name not in known:
+                raise InvalidRequest("no such parameter of the robot", field=f"parameters.{name}")
+        twin = Perturbation.of(values)
+    log = synthetic_log(
+        walk.robot, walk.scenario, controller, walk.design, seed=seed, perturbation=twin
+    )
     with replacing(output, "output") as file:
         file.write(format_measured_log(log).encode())
     note(f"SYNTHETIC log of {len(log.time)} rows written to {output}")

@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from types import TracebackType
 from typing import Final, Self
 
+from api.evaluation_table import TableFormat, encoded_table
 from api.views import (
     BestView,
     HistoryIterationView,
     IterationView,
     JobSummaryView,
     JobView,
+    RankingRequest,
+    RankingView,
     StateView,
 )
+from api.views.convergence import ConvergenceView
+from api.views.recording import RecordingView
 from cli.settings import default_database
 from services.optimizer.errors import NotFound
-from services.optimizer.job import Command, Job, JobState
+from services.optimizer.job import Command, Job, JobOrder, JobState
 from services.optimizer.service import JobService
 from services.optimizer.spec import Spec
+from sim.identification.recorded_walk import RecordedWalk
 
 _POLL_SECONDS: Final = 0.5
 _PAGE: Final = 100
@@ -40,9 +46,12 @@ class LocalJobs:
         job, _ = self._service.submit(spec, idempotency_key=idempotency_key)
         return self._in_full(job)
 
-    def jobs(self, *, state: JobState | None, limit: int) -> Iterator[JobSummaryView]:
+    def jobs(
+        self, *, state: JobState | None, search: str, order: JobOrder, limit: int
+    ) -> Iterator[JobSummaryView]:
         """See `Jobs.jobs`."""
-        return (JobSummaryView.from_job(job) for job in islice(self._all(state), limit))
+        found = islice(self._all(state, search, order), limit)
+        return (JobSummaryView.from_job(job) for job in found)
 
     def job(self, job_id: str) -> JobView:
         """See `Jobs.job`."""
@@ -51,6 +60,16 @@ class LocalJobs:
     def command(self, job_id: str, command: Command) -> JobView:
         """See `Jobs.command`."""
         return self._in_full(self._service.command(job_id, command))
+
+    def extend(self, job_id: str, iterations: int) -> JobView:
+        """See `Jobs.extend`."""
+        return self._in_full(self._service.extend(job_id, iterations))
+
+    def ranking(self, job_id: str, request: RankingRequest) -> RankingView:
+        """See `Jobs.ranking`."""
+        job = self._service.job(job_id)
+        ranked = self._service.rank(job, request.resolved_preference(), top=request.top)
+        return RankingView.from_ranked_job(request, ranked)
 
     def best(self, job_id: str) -> BestView:
         """See `Jobs.best`."""
@@ -87,6 +106,20 @@ class LocalJobs:
                 return
             time.sleep(_POLL_SECONDS)
 
+    def record(self, walk: RecordedWalk) -> RecordingView:
+        """See `Jobs.record`."""
+        return RecordingView.from_walk(self._service.record(walk), walk)
+
+    def parameters(self, job_ids: Sequence[str]) -> ConvergenceView:
+        """See `Jobs.parameters`."""
+        jobs = [self._service.job(job_id) for job_id in job_ids]
+        return ConvergenceView.from_convergence(list(job_ids), self._service.convergence(jobs))
+
+    def export(self, job_id: str, file_format: TableFormat) -> Iterator[bytes]:
+        """See `Jobs.export`."""
+        job = self._service.job(job_id)
+        return encoded_table(file_format, job.spec, self._service.column_pieces(job))
+
     def close(self) -> None:
         """See `Jobs.close`."""
         self._service.store.close()
@@ -104,10 +137,12 @@ class LocalJobs:
         """Close the store."""
         self.close()
 
-    def _all(self, state: JobState | None) -> Iterator[Job]:
+    def _all(self, state: JobState | None, search: str, order: JobOrder) -> Iterator[Job]:
         after: str | None = None
         while True:
-            page = self._service.jobs(state=state, after=after, limit=_PAGE)
+            page = self._service.jobs(
+                state=state, search=search, order=order, after=after, limit=_PAGE
+            )
             yield from page.items
             if page.next is None:
                 return

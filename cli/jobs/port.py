@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
 if TYPE_CHECKING:
+    from api.evaluation_table import TableFormat
     from api.views import (
         BestView,
         HistoryIterationView,
         IterationView,
         JobSummaryView,
         JobView,
+        RankingRequest,
+        RankingView,
         StateView,
     )
-    from services.optimizer.job import Command, JobState
+    from api.views.convergence import ConvergenceView
+    from api.views.recording import RecordingView
+    from services.optimizer.job import Command, JobOrder, JobState
     from services.optimizer.spec import Spec
+    from sim.identification.recorded_walk import RecordedWalk
 
 
 class Jobs(Protocol):
@@ -34,14 +40,27 @@ class Jobs(Protocol):
     def submit(self, spec: Spec, *, idempotency_key: str | None = None) -> JobView:
         """Queue a job. Raises InvalidRequest, IdempotencyConflict."""
 
-    def jobs(self, *, state: JobState | None, limit: int) -> Iterator[JobSummaryView]:
-        """Newest first, at most `limit`."""
+    def jobs(
+        self,
+        *,
+        state: JobState | None,
+        search: str,
+        order: JobOrder,
+        limit: int,
+    ) -> Iterator[JobSummaryView]:
+        """Jobs in a state whose name or id contains a text, in order, at most `limit`."""
 
     def job(self, job_id: str) -> JobView:
         """One job in full."""
 
     def command(self, job_id: str, command: Command) -> JobView:
         """Pause, resume or cancel. Raises Conflict."""
+
+    def extend(self, job_id: str, iterations: int) -> JobView:
+        """Give a job a budget of `iterations` in all. Raises Conflict, InvalidRequest."""
+
+    def ranking(self, job_id: str, request: RankingRequest) -> RankingView:
+        """All designs of a job by another preference. Raises InvalidRequest, Conflict."""
 
     def best(self, job_id: str) -> BestView:
         """The best design so far; NotFound while there is none."""
@@ -54,6 +73,15 @@ class Jobs(Protocol):
 
     def follow(self, job_id: str) -> Iterator[IterationView | StateView]:
         """What is committed, then what comes, until the job has ended; state when it changes."""
+
+    def record(self, walk: RecordedWalk) -> RecordingView:
+        """Keep a recorded walk. The same walk again is the same recording."""
+
+    def parameters(self, job_ids: Sequence[str]) -> ConvergenceView:
+        """How the parameters of runs of one problem converge. Raises Conflict, InvalidRequest."""
+
+    def export(self, job_id: str, file_format: TableFormat) -> Iterator[bytes]:
+        """A file with every evaluation, in parts; see `api.evaluation_table`."""
 
     def close(self) -> None:
         """Release connections. Idempotent."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from http import HTTPStatus
 from itertools import islice
@@ -14,6 +14,7 @@ from urllib.parse import quote
 import httpx2
 from pydantic import BaseModel, ValidationError
 
+from api.evaluation_table import TableFormat
 from api.views import (
     PREFIX,
     BestView,
@@ -25,8 +26,12 @@ from api.views import (
     JobView,
     PageView,
     ProblemView,
+    RankingRequest,
+    RankingView,
     StateView,
 )
+from api.views.convergence import ConvergenceView
+from api.views.recording import RecordingView
 from cli.jobs.event_stream import read_events
 from services.optimizer.errors import (
     Conflict,
@@ -36,8 +41,9 @@ from services.optimizer.errors import (
     NotFound,
     StoreUnavailable,
 )
-from services.optimizer.job import Command, JobState
+from services.optimizer.job import Command, JobOrder, JobState
 from services.optimizer.spec import Spec
+from sim.identification.recorded_walk import RecordedWalk
 
 V = TypeVar("V", bound=BaseModel)
 
@@ -72,9 +78,13 @@ class RemoteJobs:
         body = spec.model_dump_json()
         return self._ask(JobView, "POST", "/jobs", content=body, headers={**headers, **_IS_JSON})
 
-    def jobs(self, *, state: JobState | None, limit: int) -> Iterator[JobSummaryView]:
+    def jobs(
+        self, *, state: JobState | None, search: str, order: JobOrder, limit: int
+    ) -> Iterator[JobSummaryView]:
         """See `Jobs.jobs`."""
-        parameters = {} if state is None else {"state": state.value}
+        parameters = {"search": search, "order": order.value}
+        if state is not None:
+            parameters["state"] = state.value
         return islice(self._items(JobSummaryView, "/jobs", parameters), limit)
 
     def job(self, job_id: str) -> JobView:
@@ -84,6 +94,17 @@ class RemoteJobs:
     def command(self, job_id: str, command: Command) -> JobView:
         """See `Jobs.command`."""
         return self._ask(JobView, "POST", f"/jobs/{_path(job_id)}/{command.value}")
+
+    def extend(self, job_id: str, iterations: int) -> JobView:
+        """See `Jobs.extend`."""
+        path = f"/jobs/{_path(job_id)}/extend"
+        return self._ask(JobView, "POST", path, json={"iterations": iterations})
+
+    def ranking(self, job_id: str, request: RankingRequest) -> RankingView:
+        """See `Jobs.ranking`."""
+        path = f"/jobs/{_path(job_id)}/ranking"
+        body = request.model_dump_json()
+        return self._ask(RankingView, "POST", path, content=body, headers=_IS_JSON)
 
     def best(self, job_id: str) -> BestView:
         """See `Jobs.best`."""
@@ -119,6 +140,29 @@ class RemoteJobs:
                 if failures > _RECONNECTS:
                     raise
             time.sleep(_RECONNECT_SECONDS)
+
+    def record(self, walk: RecordedWalk) -> RecordingView:
+        """See `Jobs.record`."""
+        body = walk.model_dump_json()
+        return self._ask(RecordingView, "POST", "/recordings", content=body, headers=_IS_JSON)
+
+    def parameters(self, job_ids: Sequence[str]) -> ConvergenceView:
+        """See `Jobs.parameters`."""
+        first, *others = job_ids
+        path = f"/jobs/{_path(first)}/parameters"
+        return self._ask(ConvergenceView, "GET", path, params={"also": others})
+
+    def export(self, job_id: str, file_format: TableFormat) -> Iterator[bytes]:
+        """See `Jobs.export`."""
+        path = f"/jobs/{_path(job_id)}/export"
+        with (
+            self._reaching_the_server(),
+            self._client.stream("GET", path, params={"format": file_format}) as response,
+        ):
+            if response.is_error:
+                response.read()
+                raise _error(response)
+            yield from response.iter_bytes()
 
     def close(self) -> None:
         """See `Jobs.close`."""

@@ -8,6 +8,7 @@ Claimed                start        [Begin,] Evaluate              evaluating
 Evaluated              evaluating   Commit                         committing
 Committed(running)     committing   Evaluate                       evaluating
 Committed(any other)   committing   -                              ended
+Extended               committing   Commit                         committing
 EvaluatorLost          evaluating   Wait, or Release(failed)       waiting, or ended
 Waited                 waiting      Evaluate                       evaluating
 EvaluationFailed       evaluating   Release(failed)                ended
@@ -26,12 +27,15 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from services.optimizer.backoff import Backoff
 from services.optimizer.evaluator import EvaluationRequest
 from services.optimizer.job import Ask, Claim, CompletedIteration, Job, JobState
 from services.optimizer.optimizers.base import Optimizer
 from services.optimizer.optimizers.registry import create_optimizer
-from services.optimizer.spec import judge_outcomes
+from services.optimizer.spec import Spec, judge_outcomes
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import Outcome
 
@@ -78,6 +82,15 @@ class Committed:
 
 
 @dataclass(frozen=True, slots=True)
+class Extended:
+    """The iteration is not stored: the job has got another budget, and what follows is to be asked
+    under it.
+    """
+
+    job: Job
+
+
+@dataclass(frozen=True, slots=True)
 class PauseSeen:
     """A heartbeat saw that the job is to pause."""
 
@@ -99,6 +112,7 @@ Event = (
     | EvaluatorLost
     | Waited
     | Committed
+    | Extended
     | PauseSeen
     | StopRequested
     | LeaseWasLost
@@ -161,7 +175,7 @@ class Coordination:
     """Where one run of one job is. Never changed, only replaced.
 
     The optimizer is not kept: it is made from the stored ask whenever it is needed, so that going
-    on and resuming are one and the same path. following: the ask of a commit under way.
+    on and resuming are one and the same path. done, following: those of a commit under way.
     """
 
     backoff: Backoff = field(default_factory=Backoff)
@@ -169,6 +183,7 @@ class Coordination:
     job: Job | None = None
     recordings: Recordings = field(default_factory=dict)
     ask: Ask | None = None
+    done: CompletedIteration | None = None
     following: Ask | None = None
     failures: int = 0
 
@@ -200,6 +215,8 @@ def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Act
             return replace(state, phase=Phase.EVALUATING), (_evaluate(state),)
         case Phase.COMMITTING, Committed(state=stored):
             return _go_on(state, stored)
+        case Phase.COMMITTING, Extended(job=job):
+            return _ask_anew(state, job)
         case phase, _:
             raise ValueError(f"{type(event).__name__} makes no sense while {phase}")
 
@@ -214,7 +231,12 @@ def _start(state: Coordination, claim: Claim) -> tuple[Coordination, tuple[Actio
     )
     if claim.ask is not None:
         return state, (_evaluate(state),)
-    first = _ask(create_optimizer(claim.job.spec))
+    if claim.answered is not None:
+        first = _following(claim.job.spec, claim.answered.ask, claim.answered.fitness)
+    else:
+        first = _ask(create_optimizer(claim.job.spec))
+    if first is None:
+        raise ValueError(f"job {claim.job.id} has spent its budget")
     state = replace(state, ask=first)
     return state, (Begin(first), _evaluate(state))
 
@@ -222,10 +244,7 @@ def _start(state: Coordination, claim: Claim) -> tuple[Coordination, tuple[Actio
 def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
     job, ask = _current(state)
     fitness = judge_outcomes(job.spec, event.outcomes).fitness
-    optimizer = create_optimizer(job.spec)
-    optimizer.load(ask.state)
-    optimizer.tell(fitness)
-    following = _ask(optimizer) if optimizer.iteration < job.spec.iterations else None
+    following = _following(job.spec, ask, fitness)
     done = CompletedIteration(
         iteration=ask.iteration,
         designs=job.spec.design_space().designs(ask.positions),
@@ -233,14 +252,22 @@ def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tupl
         fitness=fitness,
         evaluate_seconds=event.seconds,
     )
-    state = replace(state, phase=Phase.COMMITTING, following=following, failures=0)
+    state = replace(state, phase=Phase.COMMITTING, done=done, following=following, failures=0)
     return state, (Commit(done, following),)
+
+
+def _ask_anew(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
+    _, ask = _current(state)
+    if state.done is None:
+        raise ValueError(f"nothing was evaluated, while {state.phase}")
+    following = _following(job.spec, ask, state.done.fitness)
+    return replace(state, job=job, following=following), (Commit(state.done, following),)
 
 
 def _go_on(state: Coordination, stored: JobState) -> tuple[Coordination, tuple[Action, ...]]:
     if stored is not JobState.RUNNING or state.following is None:
         return replace(state, phase=Phase.ENDED), ()
-    state = replace(state, phase=Phase.EVALUATING, ask=state.following, following=None)
+    state = replace(state, phase=Phase.EVALUATING, ask=state.following, following=None, done=None)
     return state, (_evaluate(state),)
 
 
@@ -272,6 +299,14 @@ def _evaluate(state: Coordination) -> Evaluate:
             designs=job.spec.design_space().designs(ask.positions),
         )
     )
+
+
+def _following(spec: Spec, ask: Ask, fitness: NDArray[np.float64]) -> Ask | None:
+    """The ask after one that was answered; None at the end of the budget."""
+    optimizer = create_optimizer(spec)
+    optimizer.load(ask.state)
+    optimizer.tell(fitness)
+    return _ask(optimizer) if optimizer.iteration < spec.iterations else None
 
 
 def _ask(optimizer: Optimizer) -> Ask:

@@ -4,6 +4,7 @@ GaitswarmError
 ├── InvalidRequest          what was asked makes no sense; names the field (HTTP 422)
 ├── NotFound                no job or iteration of that id (HTTP 404)
 ├── Conflict                not possible in the job's present state (HTTP 409)
+│   ├── BudgetChanged       the job was extended since it was claimed
 │   └── IdempotencyConflict the key was used before with another body
 ├── LeaseLost               another runner, or a cancellation, has taken the job
 ├── EvaluatorUnavailable    the workers cannot be reached now; try again later
@@ -34,6 +35,10 @@ class NotFound(GaitswarmError):
 
 class Conflict(GaitswarmError):
     """The job's present state does not allow it."""
+
+
+class BudgetChanged(Conflict):
+    """The job was extended since it was claimed: what follows is to be asked anew."""
 
 
 class IdempotencyConflict(Conflict):

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import Conflict
+from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.specs import AnySpec
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import Outcome
@@ -41,6 +41,17 @@ class Command(StrEnum):
     CANCEL = "cancel"
 
 
+class JobOrder(StrEnum):
+    """How a list of jobs is sorted."""
+
+    CREATED = "created"
+    """Newest first."""
+    FITNESS = "fitness"
+    """Best fitness first, jobs without one last."""
+    NAME = "name"
+    """By name whatever its case, jobs without one last."""
+
+
 TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
     (JobState.QUEUED, Command.PAUSE): JobState.PAUSED,
     (JobState.RUNNING, Command.PAUSE): JobState.PAUSING,
@@ -64,6 +75,27 @@ def commanded(state: JobState, command: Command) -> JobState:
         possible = [c.value for (s, c) in TRANSITIONS if s is state]
         hint = f"possible now: {', '.join(possible)}" if possible else "it has ended"
         raise Conflict(f"cannot {command} a job that is {state}; {hint}") from None
+
+
+LARGEST_BUDGET: Final = 1_000_000
+"""Iterations, as in a spec."""
+
+
+def extended(state: JobState, committed: int, iterations: int) -> JobState:
+    """The state of a job after it got another budget, of `iterations` in all.
+
+    committed: iterations that it has. Raises Conflict for a job that was cancelled, InvalidRequest
+    for a budget that is spent already.
+    """
+    if state is JobState.CANCELLED:
+        raise Conflict("cannot extend a job that is cancelled; submit its spec as a new one")
+    if not committed < iterations <= LARGEST_BUDGET:
+        raise InvalidRequest(
+            f"must be more than the {committed} that the job has committed, and at most"
+            f" {LARGEST_BUDGET}; it is the number in all, not of further ones",
+            field="iterations",
+        )
+    return JobState.QUEUED if state is JobState.SUCCEEDED else state
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +130,10 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A job as stored. `spec` is resolved: no preset is left to be looked up."""
+    """A job as stored.
+
+    spec: resolved, no preset is left to be looked up; its `iterations` are the present budget.
+    """
 
     id: str
     spec: AnySpec
@@ -143,6 +178,14 @@ class Ask:
     state: dict[str, Any]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Answered:
+    """A committed ask with its fitness (particles,), from which the next one follows."""
+
+    ask: Ask
+    fitness: NDArray[np.float64]
+
+
 @dataclass(frozen=True, slots=True)
 class CompletedIteration:
     """All that one transaction commits of an iteration.
@@ -161,7 +204,9 @@ class CompletedIteration:
 class Claim:
     """A lease on a job. `token` fences: a store refuses writes under an older one.
 
-    ask: the stored one to go on with; None for a job that has not begun.
+    ask: the stored one to go on with; None for a job that has not begun, or was extended after its
+        budget was spent.
+    answered: the last committed one, where there is no other to go on with.
     recordings: those that the job's spec names.
     """
 
@@ -170,3 +215,4 @@ class Claim:
     token: int
     ask: Ask | None
     recordings: Recordings = field(default_factory=dict)
+    answered: Answered | None = None

@@ -26,6 +26,7 @@ from services.optimizer.coordinator import (
     EvaluationFailed,
     EvaluatorLost,
     Event,
+    Extended,
     LeaseWasLost,
     PauseSeen,
     Phase,
@@ -36,6 +37,7 @@ from services.optimizer.coordinator import (
     handle,
 )
 from services.optimizer.errors import (
+    BudgetChanged,
     EvaluatorUnavailable,
     GaitswarmError,
     LeaseLost,
@@ -113,8 +115,10 @@ def _decide(state: Coordination, event: Event) -> tuple[Coordination, tuple[Acti
         return replace(state, phase=Phase.ENDED), (failed,)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Run:
+    """claim: that of the heartbeat, its job as it was when it was last read."""
+
     claim: Claim
     around: Surroundings
     heartbeat: Heartbeat
@@ -142,7 +146,11 @@ class _Run:
             case Evaluate(request=request):
                 return self._evaluate(request)
             case Commit(done=done, following=following):
-                state = self.around.store.commit(self.claim, done, following)
+                try:
+                    state = self.around.store.commit(self.claim, done, following)
+                except BudgetChanged:
+                    self.claim = replace(self.claim, job=self.around.store.job(self.claim.job.id))
+                    return Extended(self.claim.job)
                 if self.around.on_commit is not None:
                     self.around.on_commit(done, state)
                 return Committed(state)

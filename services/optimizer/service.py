@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Final
 
+from services.optimizer.convergence import Convergence, convergence
+from services.optimizer.cost import Cost, MeasuredRates, cost
 from services.optimizer.design_space import DesignSpace
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.job import Command, Evaluation, Iteration, Job, JobState
+from services.optimizer.distribution import Distribution, distribution
+from services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from services.optimizer.evaluation_columns import EvaluationColumns
+from services.optimizer.history_cache import HistoryCache
+from services.optimizer.job import Command, Evaluation, Iteration, Job, JobOrder, JobState
 from services.optimizer.job_spec import JobSpec
+from services.optimizer.optimizers.pso import PsoSettings
+from services.optimizer.preference import Preference
+from services.optimizer.ranking import Ranking, rank
 from services.optimizer.spec import Spec
 from services.optimizer.store.base import Page, Store
 from sim.controllers import CONTROLLERS
@@ -24,20 +32,39 @@ from sim.variables import Variable
 
 _PIECE: Final = 16
 
+_PIECE_ROWS: Final = 2000
+
+_EARLIER: Final = 50
+"""Newest jobs among which one like a new job is looked for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RankedJob:
+    """A job's designs by another preference. columns: those that the ranking's rows refer to."""
+
+    spec: JobSpec
+    columns: EvaluationColumns
+    ranking: Ranking
+
 
 @dataclass(frozen=True, slots=True)
 class JobService:
     """Jobs as their users see them. Thread-safe, as the store is."""
 
     store: Store
+    _histories: HistoryCache = field(init=False, repr=False, compare=False)
+    _rates: MeasuredRates = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_rates", MeasuredRates())
+        object.__setattr__(self, "_histories", HistoryCache(self.store))
 
     def submit(self, spec: Spec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
         """Check that the job can be simulated and queue it; (job, whether it is new).
 
         Raises InvalidRequest that names the field, IdempotencyConflict.
         """
-        check_can_be_simulated(spec)
-        self._check_recordings(spec)
+        self._check(spec)
         return self.store.create_job(spec.resolved(), idempotency_key=idempotency_key)
 
     def record(self, walk: RecordedWalk) -> str:
@@ -48,19 +75,40 @@ class JobService:
         """Raises NotFound."""
         return self.store.recordings([recording_id])[recording_id]
 
+    def cost(self, spec: Spec) -> Cost:
+        """What a job would cost, by the rate of jobs like it or a walk that is measured here.
+
+        Raises InvalidRequest as `submit` does.
+        """
+        self._check(spec)
+        trials = spec.trials(self.store.recordings(spec.recording_ids))
+        return cost(spec, trials, self.store.jobs(limit=_EARLIER).items, self._rates)
+
     def job(self, job_id: str) -> Job:
         """Raises NotFound."""
         return self.store.job(job_id)
 
     def jobs(
-        self, *, state: JobState | None = None, after: str | None = None, limit: int = 50
+        self,
+        *,
+        state: JobState | None = None,
+        search: str = "",
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
     ) -> Page[Job]:
-        """Newest first."""
-        return self.store.jobs(state=state, after=after, limit=limit)
+        """See `Store.jobs`."""
+        return self.store.jobs(state=state, search=search, order=order, after=after, limit=limit)
 
     def command(self, job_id: str, command: Command) -> Job:
         """Pause, resume or cancel. Raises NotFound, Conflict."""
         return self.store.command(job_id, command)
+
+    def extend(self, job_id: str, iterations: int) -> Job:
+        """Give a job another budget, of `iterations` in all. Raises NotFound, Conflict,
+        InvalidRequest.
+        """
+        return self.store.extend(job_id, iterations)
 
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100
@@ -95,6 +143,71 @@ class JobService:
                 after = last
             if page.next is None:
                 return
+
+    def columns(self, job: Job) -> EvaluationColumns:
+        """Every committed evaluation. Raises Conflict for a job too large to be held in memory."""
+        return self._histories.columns(job)
+
+    def column_pieces(self, job: Job) -> Iterator[EvaluationColumns]:
+        """As `columns`, piece by piece as they are consumed: for histories of any length."""
+        step = max(1, _PIECE_ROWS // job.spec.optimizer.particles)
+        for first in range(0, job.progress.iterations, step):
+            last = min(first + step, job.progress.iterations)
+            piece = self.store.evaluation_columns(job.id, first, last)
+            if piece is not None:
+                yield piece
+
+    def distribution(
+        self, job: Job, *, after: int | None = None, limit: int
+    ) -> tuple[Distribution, bool]:
+        """Spread of the swarm in up to `limit` iterations with index > after; whether more follow.
+
+        Raises as `columns`.
+        """
+        particles = job.spec.optimizer.particles
+        columns = self.columns(job).after(after)
+        page = columns.rows(slice(limit * particles))
+        spread = distribution(page, job.spec.design_space(), particles)
+        return spread, len(page) < len(columns)
+
+    def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
+        """All designs judged by another preference, from what is stored.
+
+        Raises InvalidRequest for a job that has no preference, and as `columns`.
+        """
+        if not isinstance(job.spec, JobSpec):
+            raise InvalidRequest(
+                f"job {job.id} fits parameters to recorded walks; only the designs of a job that"
+                " tunes a drive are judged by a preference",
+                field="preference",
+            )
+        columns = self.columns(job)
+        return RankedJob(job.spec, columns, rank(columns, preference, top=top))
+
+    def convergence(self, jobs: Sequence[Job]) -> Convergence:
+        """How the parameters of jobs that differ in seed and budget alone converge.
+
+        Raises InvalidRequest for jobs of different problems, Conflict while one of them has no
+        design that did not fail, and as `columns`.
+        """
+        first, *others = jobs
+        for other in others:
+            if _problem(other.spec) != _problem(first.spec):
+                raise InvalidRequest(
+                    f"job {other.id} is of another problem than job {first.id}; runs that are"
+                    " compared differ in name, seed, optimizer and iterations alone",
+                    field="also",
+                )
+        for job in jobs:
+            if job.progress.best_fitness is None:
+                raise Conflict(f"job {job.id} has no design yet that did not fail")
+        runs = [self.columns(job) for job in jobs]
+        return convergence(first.spec.design_space().variables, runs)
+
+    def _check(self, spec: Spec) -> None:
+        """Raise InvalidRequest for a job that cannot be run."""
+        check_can_be_simulated(spec)
+        self._check_recordings(spec)
 
     def _check_recordings(self, spec: Spec) -> None:
         """Each is there, of the robot's joints, and of a gait within the legs' reach."""
@@ -154,6 +267,13 @@ def _blamed(error: SimulationInputError, space: DesignSpace) -> InvalidRequest:
     culprit = str(error).partition(":")[0]
     field = "fixed" if culprit in dict(space.fixed) else "variables"
     return InvalidRequest(str(error), field=field)
+
+
+def _problem(spec: Spec) -> Spec:
+    """The spec without what may differ between runs of one problem."""
+    return spec.model_copy(
+        update={"name": "", "seed": 0, "iterations": 1, "optimizer": PsoSettings()}
+    )
 
 
 def _gait_of(design: Mapping[str, float]) -> dict[str, float]:

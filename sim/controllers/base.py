@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import FRACTION_BITS, descale
+from sim.controllers.mamdani import Mamdani
+from sim.controllers.quantisation import Axis
 from sim.variables import Variable
 
 Ints = NDArray[np.int64]
@@ -66,6 +68,33 @@ class Drive:
     integrated: Response | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Universe:
+    """An input or output of a fuzzy inference, of which the inference itself sees shares.
+
+    full_range: share 1 [unit]; counts: coded counts of one unit, as a table takes or gives them.
+    """
+
+    name: str
+    unit: str
+    full_range: float
+    counts: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inference:
+    """One output of a fuzzy controller: the inference, and the table that is shipped in its place.
+
+    inputs, axes: by the system's inputs, in their order.
+    """
+
+    output: Universe
+    inputs: Mapping[str, Universe]
+    system: Mamdani
+    axes: Mapping[str, Axis]
+    table: LookupTable
+
+
 class Controller(Protocol):
     """A family of controllers, parametrised by design variables."""
 
@@ -87,3 +116,9 @@ class Controller(Protocol):
 
     def compile(self, design: Mapping[str, float]) -> Drive:
         """Integers for the kernel. Raises SimulationInputError that names the variable."""
+
+    def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
+        """By output, the fuzzy inferences that its tables stand for; none if it is not fuzzy.
+
+        Raises SimulationInputError that names the variable.
+        """

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive, LookupTable
+from sim.controllers.base import Drive, Inference, LookupTable, Universe
 from sim.controllers.fixed_point import (
     FRACTION_BITS,
     integral_gain,
@@ -152,13 +152,22 @@ class FuzzyPi:
     def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> Drive:
         """The same controller with a table of other resolution."""
         p = _Parameters.of(design)
-        table = LookupTable(
-            values=quantised_table(*p.weights, p.shape, error, current)[:, :, np.newaxis],
-            output_gain=to_fixed(p.output_range / OUTPUT_SCALE, FRACTION_BITS),
-            error_gain=error.gain(p.error_range),
-            current_gain=current.gain(p.current_range),
+        return Drive(integral_gain=p.integral, direct=p.table(error, current))
+
+    def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
+        """See `Controller.inferences`."""
+        p = _Parameters.of(design)
+        fuzzy_p = Inference(
+            output=Universe("FO", "PWM counts", p.output_range, counts=1 << FRACTION_BITS),
+            inputs={
+                "error": Universe("error", "counts", p.error_range),
+                "current": Universe("current", "counts", p.current_range),
+            },
+            system=inference_system(*p.weights, p.shape),
+            axes={"error": ERROR, "current": CURRENT},
+            table=p.table(ERROR, CURRENT),
         )
-        return Drive(integral_gain=p.integral, direct=table)
+        return (fuzzy_p,)
 
     def without_table(self, design: Mapping[str, float]) -> Drive:
         """The same controller by full inference, for comparison (reference kernel only)."""
@@ -191,4 +200,13 @@ class _Parameters:
             output_range=required(design, "FOR", low=1.0, high=32767.0),
             weights=(fw1, fw23, fw4, fw56),
             shape=Shape(required_integer(design, "FOMF", low=1, high=3)),
+        )
+
+    def table(self, error: Axis, current: Axis) -> LookupTable:
+        """The proportional part as the microcontroller has it."""
+        return LookupTable(
+            values=quantised_table(*self.weights, self.shape, error, current)[:, :, np.newaxis],
+            output_gain=to_fixed(self.output_range / OUTPUT_SCALE, FRACTION_BITS),
+            error_gain=error.gain(self.error_range),
+            current_gain=current.gain(self.current_range),
         )

@@ -6,7 +6,7 @@ has two inputs; the integrated FzzI has three (thesis 3.3.2, fig. 3.5, table 3.4
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive, LookupTable
+from sim.controllers.base import Drive, Inference, LookupTable, Universe
 from sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     CURRENT_COUNTS,
@@ -35,6 +35,8 @@ COARSE_ERROR: Final = Axis(bits=6, centred=True)
 COARSE_CURRENT: Final = Axis(bits=4, centred=False)
 VELOCITY: Final = Axis(bits=6, centred=True)
 """A range of 30 000 counts/s is 60 counts a tick, so 6 bits resolve all that can be measured."""
+
+_INTEGRAL_AXES: Final = {"error": COARSE_ERROR, "current": COARSE_CURRENT, "velocity": VELOCITY}
 
 
 def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
@@ -68,8 +70,7 @@ def _voltage_table(w1: float, w34: float, w56: float, shape: Shape) -> NDArray[n
 
 @lru_cache(maxsize=256)
 def _integral_table(w1: float, w2: float, w78: float, shape: Shape) -> NDArray[np.int8]:
-    axes = {"error": COARSE_ERROR, "current": COARSE_CURRENT, "velocity": VELOCITY}
-    return quantised(integral_system(w1, w2, w78, shape), axes)
+    return quantised(integral_system(w1, w2, w78, shape), _INTEGRAL_AXES)
 
 
 class FuzzyPi3:
@@ -184,30 +185,70 @@ class FuzzyPi3:
 
     def compile(self, design: Mapping[str, float]) -> Drive:
         """See `Controller.compile`."""
+        voltage, rate = self.inferences(design)
+        return Drive(direct=voltage.table, integrated=rate.table)
+
+    def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
+        """See `Controller.inferences`."""
         error_range = required(design, "A_ERR", low=64.0, high=65535.0)
-        current_range = required(design, "I_MA", low=0.1, high=30.0) * CURRENT_COUNTS
-        # The kernel's change of error is over one tick.
-        change_range = required(design, "V_ERR", low=100.0, high=1e7) * CONTROL_PERIOD
-        voltage_range = required(design, "FzzP", low=1.0, high=32767.0)
-        rate_range = required(design, "FzzI", low=1.0, high=1e6)
+        current_range = required(design, "I_MA", low=0.1, high=30.0)
+        velocity_range = required(design, "V_ERR", low=100.0, high=1e7)
         weights = [
             required(design, w, low=0.0, high=1.0) for w in ("W1", "W2", "W34", "W56", "W78")
         ]
-        w1, w2, w34, w56, w78 = weights
-        voltage_shape = Shape(required_integer(design, "FzzP_MF", low=1, high=3))
-        rate_shape = Shape(required_integer(design, "FzzI_MF", low=1, high=3))
-        return Drive(
-            direct=LookupTable(
-                values=_voltage_table(w1, w34, w56, voltage_shape)[:, :, np.newaxis],
-                output_gain=to_fixed(voltage_range / OUTPUT_SCALE, FRACTION_BITS),
-                error_gain=ERROR.gain(error_range),
-                current_gain=CURRENT.gain(current_range),
-            ),
-            integrated=LookupTable(
-                values=_integral_table(w1, w2, w78, rate_shape),
-                output_gain=to_fixed(rate_range * CONTROL_PERIOD / OUTPUT_SCALE, INTEGRAL_BITS),
-                error_gain=COARSE_ERROR.gain(error_range),
-                current_gain=COARSE_CURRENT.gain(current_range),
-                velocity_gain=VELOCITY.gain(change_range),
-            ),
+        error = Universe("error", "counts", error_range)
+        current = Universe("current", "A", current_range, counts=CURRENT_COUNTS)
+        # The kernel's change of error is over one tick.
+        velocity = Universe("velocity", "counts/s", velocity_range, counts=CONTROL_PERIOD)
+        return (
+            _voltage(design, weights, error, current),
+            _integral(design, weights, error, current, velocity),
         )
+
+
+def _voltage(
+    design: Mapping[str, float], weights: Sequence[float], error: Universe, current: Universe
+) -> Inference:
+    """FzzP. weights: W1, W2, W34, W56, W78."""
+    w1, _, w34, w56, _ = weights
+    full_range = required(design, "FzzP", low=1.0, high=32767.0)
+    shape = Shape(required_integer(design, "FzzP_MF", low=1, high=3))
+    return Inference(
+        output=Universe("FzzP", "PWM counts", full_range, counts=1 << FRACTION_BITS),
+        inputs={"error": error, "current": current},
+        system=voltage_system(w1, w34, w56, shape),
+        axes={"error": ERROR, "current": CURRENT},
+        table=LookupTable(
+            values=_voltage_table(w1, w34, w56, shape)[:, :, np.newaxis],
+            output_gain=to_fixed(full_range / OUTPUT_SCALE, FRACTION_BITS),
+            error_gain=ERROR.gain(error.full_range),
+            current_gain=CURRENT.gain(current.full_range * current.counts),
+        ),
+    )
+
+
+def _integral(
+    design: Mapping[str, float],
+    weights: Sequence[float],
+    error: Universe,
+    current: Universe,
+    velocity: Universe,
+) -> Inference:
+    """FzzI. weights: W1, W2, W34, W56, W78."""
+    w1, w2, _, _, w78 = weights
+    full_range = required(design, "FzzI", low=1.0, high=1e6)
+    shape = Shape(required_integer(design, "FzzI_MF", low=1, high=3))
+    counts = CONTROL_PERIOD * (1 << INTEGRAL_BITS)
+    return Inference(
+        output=Universe("FzzI", "PWM counts/s", full_range, counts=counts),
+        inputs={"error": error, "current": current, "velocity": velocity},
+        system=integral_system(w1, w2, w78, shape),
+        axes=_INTEGRAL_AXES,
+        table=LookupTable(
+            values=_integral_table(w1, w2, w78, shape),
+            output_gain=to_fixed(full_range * CONTROL_PERIOD / OUTPUT_SCALE, INTEGRAL_BITS),
+            error_gain=COARSE_ERROR.gain(error.full_range),
+            current_gain=COARSE_CURRENT.gain(current.full_range * current.counts),
+            velocity_gain=VELOCITY.gain(velocity.full_range * velocity.counts),
+        ),
+    )

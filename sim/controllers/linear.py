@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from sim.controllers.base import Drive
+from sim.controllers.base import Drive, Inference
 from sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     FRACTION_BITS,
@@ -57,6 +57,11 @@ class LinearController:
             integral_gain=integral_gain(gains.get("I", 0.0)),
             derivative_gain=to_fixed(gains.get("D", 0.0) / CONTROL_PERIOD, FRACTION_BITS),
         )
+
+    def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
+        """See `Controller.inferences`."""
+        del design
+        return ()
 
 
 P: Final = LinearController(

@@ -102,8 +102,10 @@ def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescrip
                 drives[own] = drive.model_copy(update={"gearhead": own})
                 names[index] = own
         by_field = {field: f"{field}_{leg.name}" for field in _CONTACT}
-        contact = _changed(leg.contact or d.contact, by_field, values)
-        legs.append(leg.model_copy(update={"drives": tuple(names), "contact": contact}))
+        own_contact = leg.contact
+        if not values.keys().isdisjoint(by_field.values()):
+            own_contact = _changed(leg.contact or d.contact, by_field, values)
+        legs.append(leg.model_copy(update={"drives": tuple(names), "contact": own_contact}))
     return d.model_copy(update={"gearheads": gearheads, "drives": drives, "legs": tuple(legs)})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,25 @@ class WalkLog:
     load_torque: NDArray[np.float64]
     foot_force: NDArray[np.float64]
     supply: NDArray[np.float64]
+
+    def until_end(self) -> WalkLog:
+        """The ticks that were walked: all but those after an early end."""
+        columns = {column.name: getattr(self, column.name) for column in fields(self)}
+        walked = np.all(
+            [np.isfinite(c.reshape(len(c), -1)).all(axis=1) for c in columns.values()], axis=0
+        )
+        end = len(walked) if walked.all() else int(np.argmin(walked))
+        return WalkLog(**{name: column[:end] for name, column in columns.items()})
+
+    def body_acceleration(self) -> NDArray[np.float64]:
+        """(T, 3) acceleration of the body's origin in its own frame, without gravity [m/s2].
+
+        dv/dt + omega x v of the logged twist, dv/dt by central differences over 4 ms.
+        """
+        linear, angular = self.base_velocity[:, :3], self.base_velocity[:, 3:]
+        # One tick alone is the first, at rest.
+        rate = np.gradient(linear, self.time, axis=0) if len(linear) > 1 else np.zeros_like(linear)
+        return np.asarray(rate + np.cross(angular, linear))
 
 
 def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> WalkLog:

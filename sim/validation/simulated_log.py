@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.errors import SimulationInputError
 from sim.kernel.observation import WalkLog
 from sim.kernel.parameters import GRAVITY
 from sim.robot import Robot
 from sim.validation.measured_log import ORIGIN, MeasuredLog
-
-Floats = NDArray[np.float64]
 
 
 def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
@@ -35,16 +32,6 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
         supply=np.repeat(walk.supply[:, None], len(legs), axis=1),
         potentiometer_joints=joints,
         potentiometer=walk.joint_angle,
-        body_acceleration=body_acceleration(walk),
+        body_acceleration=walk.body_acceleration() / GRAVITY,
         metadata={ORIGIN: "simulated", "robot": robot.description.name},
     )
-
-
-def body_acceleration(walk: WalkLog) -> Floats:
-    """(T, 3) acceleration of the body's origin in its own frame, without gravity [g].
-
-    dv/dt + omega x v of the logged twist, dv/dt by central differences over 4 ms.
-    """
-    linear, angular = walk.base_velocity[:, :3], walk.base_velocity[:, 3:]
-    rate = np.gradient(linear, walk.time, axis=0)
-    return (rate + np.cross(angular, linear)) / GRAVITY

@@ -12,10 +12,11 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
+from sim.identification.parameters import with_parameters
 from sim.outcome import Status
 from sim.robot import Robot
 from sim.robot.description import Contact
@@ -23,6 +24,7 @@ from sim.scenario import Scenario
 from sim.simulate import simulate
 from sim.validation.measured_log import ORIGIN, SYNTHETIC, MeasuredLog, Quantity
 from sim.validation.simulated_log import simulated_log
+from sim.variables import VariableName
 
 Floats = NDArray[np.float64]
 
@@ -51,6 +53,25 @@ class Perturbation(BaseModel):
     body_mass: float | None = Field(
         default=None, gt=0.0, description="in place of the described one [kg]"
     )
+    parameters: dict[VariableName, FiniteFloat] = Field(
+        default_factory=dict,
+        description="Values of single parameters (`identifiable_variables`), after the factors",
+    )
+
+    @classmethod
+    def of(cls, parameters: Mapping[str, float]) -> Perturbation:
+        """A twin that differs in these parameters alone, and has no gearlash."""
+        return cls(
+            supply_voltage=1.0,
+            supply_resistance=1.0,
+            efficiency=1.0,
+            motor_friction=1.0,
+            ground_friction=1.0,
+            stiffness=1.0,
+            damping=1.0,
+            gearlash=0.0,
+            parameters=dict(parameters),
+        )
 
 
 class Instruments(BaseModel):
@@ -93,7 +114,8 @@ def synthetic_log(
     change = perturbation or Perturbation()
     twin = perturbed(robot, change)
     values = np.array([list(design.values())], dtype=np.float64)
-    walk = simulate(scenario, controller, list(design), values, robot=twin, log=True)
+    # Its controller plans for the robot as described: it knows nothing of the truth.
+    walk = simulate(scenario, controller, list(design), values, robot=twin, planner=robot, log=True)
     status, log = Status(int(walk.outcome.statuses[0])), walk.logs[0]
     if status not in (Status.OK, Status.STALLED) or log is None:
         raise SimulationInputError(f"the perturbed twin did not walk to the end: {status.phrase}")
@@ -158,7 +180,7 @@ def perturbed(robot: Robot, change: Perturbation) -> Robot:
             ),
         }
     )
-    return replace(robot, description=description)
+    return with_parameters(replace(robot, description=description), change.parameters)
 
 
 def _listed(values: BaseModel) -> str:

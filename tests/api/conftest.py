@@ -58,11 +58,16 @@ def service(store: SqlStore) -> JobService:
 
 
 class Server:
-    """A server in a thread, on a free port, and a client of it."""
+    """A server in a thread, on a free port, and a client of it.
 
-    def __init__(self, service: JobService | None, **settings: Any) -> None:
-        values = {"event_poll_seconds": 0.02, **settings}
-        self.app = create_app(cast(JobService, service), settings=ApiSettings(**values))
+    page_folder: of the built page; by default there is none, whether one was built here or not.
+    """
+
+    def __init__(
+        self, service: JobService | None, *, page_folder: Path = Path("none"), **settings: Any
+    ) -> None:
+        values = ApiSettings(**{"event_poll_seconds": 0.02, **settings})
+        self.app = create_app(cast(JobService, service), settings=values, page_folder=page_folder)
         self._server = ApiServer(self.app, host="127.0.0.1", port=0, log_level="critical")
         self._thread = threading.Thread(target=self._server.run)
         self._thread.start()

@@ -196,6 +196,64 @@ def test_links_lead_to_the_jobs_resources_and_allowed_commands(
 ) -> None:
     links = client.get(f"/v1/jobs/{job.id}").json()["links"]
 
-    assert set(links) == {"self", "best", "iterations", "events", "pause", "cancel"}
-    assert client.get(links["iterations"]).status_code == 200
+    resources = {"best", "iterations", "events", "distribution", "particles", "export", "ranking"}
+    assert set(links) == {"self", *resources, "pause", "cancel", "extend"}
+    for name in resources - {"best", "events", "ranking"}:
+        assert client.get(links[name]).status_code == 200
     assert client.post(links["pause"]).status_code == 202
+
+
+def test_a_summary_says_what_the_job_is(client: httpx2.Client, job: Job) -> None:
+    (item,) = client.get("/v1/jobs").json()["items"]
+
+    assert (item["kind"], item["controller"], item["particles"]) == ("tuning", "fuzzy-pi", 4)
+    assert item["scenarios"] == ["normal-fast", "turn-right-fast"]
+
+
+def test_the_list_is_searched_and_sorted(client: httpx2.Client) -> None:
+    for name in ("b walk", "other", "A Walk"):
+        client.post("/v1/jobs", json={**SPEC, "name": name})
+
+    def names(**parameters: str) -> list[str]:
+        return [j["name"] for j in client.get("/v1/jobs", params=parameters).json()["items"]]
+
+    assert names(search="WALK") == ["A Walk", "b walk"]
+    assert names(order="name") == ["A Walk", "b walk", "other"]
+    refused = client.get("/v1/jobs", params={"order": "age"})
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "order"
+
+
+def test_a_job_that_succeeded_is_extended_and_queued_again(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    commit(job, 3)
+    link = client.get(f"/v1/jobs/{job.id}").json()["links"]["extend"]
+
+    answer = client.post(link, json={"iterations": 5})
+
+    assert answer.status_code == 202
+    view = answer.json()
+    assert (view["state"], view["iterations"], view["iterations_planned"]) == ("queued", 3, 5)
+    assert view["finished_at"] is None
+
+
+@pytest.mark.parametrize("iterations", [0, 3, 1_000_001, "many"])
+def test_a_budget_that_makes_no_sense_is_refused_by_name(
+    client: httpx2.Client, job: Job, commit, iterations: object
+) -> None:
+    commit(job, 3)
+
+    answer = client.post(f"/v1/jobs/{job.id}/extend", json={"iterations": iterations})
+
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "iterations"
+
+
+def test_a_cancelled_job_cannot_be_extended(client: httpx2.Client, job: Job) -> None:
+    view = client.post(f"/v1/jobs/{job.id}/cancel").json()
+
+    assert "extend" not in view["links"]
+    answer = client.post(f"/v1/jobs/{job.id}/extend", json={"iterations": 9})
+    assert answer.status_code == 409
+    assert "cancelled" in answer.json()["detail"]

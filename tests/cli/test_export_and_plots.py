@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,16 @@ def expected(finished: Finished) -> list[dict[str, Any]]:
     return rows
 
 
+@pytest.mark.slow
 def test_parquet_holds_every_evaluation_exactly(
-    gaitswarm: Gaitswarm, finished: Finished, expected: list[dict[str, Any]], tmp_path: Path
+    gaitswarm: Gaitswarm,
+    finished: Finished,
+    expected: list[dict[str, Any]],
+    place: Callable[[Path], list[str]],
+    tmp_path: Path,
 ) -> None:
     path = tmp_path / "job.parquet"
-    result = gaitswarm("export", finished.id, "-o", path, "--db", finished.db)
+    result = gaitswarm("export", finished.id, "-o", path, *place(finished.db))
     assert result.code == 0, result.err
     assert "6 evaluations" in result.err
     table = pq.read_table(path)

@@ -184,3 +184,66 @@ def test_a_job_is_on_a_server_or_in_a_database_not_both(gaitswarm: Gaitswarm, db
     result = gaitswarm("list", "--db", db, "--server", "http://127.0.0.1:9")
     assert result.code == 2
     assert "--server, --db" in result.err
+
+
+def test_a_job_that_succeeded_is_extended_and_queued(
+    gaitswarm: Gaitswarm, finished: Finished, place: Place, tmp_path: Path
+) -> None:
+    db = tmp_path / "copy.db"
+    db.write_bytes(finished.db.read_bytes())
+    where = place(db)
+    extended = gaitswarm("extend", finished.id, "--iterations", "4", *where)
+    assert extended.out == f"job {finished.id} is queued, with 2 of 4 iterations\n"
+    assert gaitswarm("status", finished.id, *where, "--json").json["iterations_planned"] == 4
+    refused = gaitswarm("extend", finished.id, "--iterations", "2", *where)
+    assert refused.code == 2
+    assert "iterations: must be more than the 2" in refused.err
+    done = gaitswarm(
+        *("optimize", "--resume", finished.id, "--db", db, "--evaluator", "in-process", "--json")
+    ).json
+    assert (done["state"], done["iterations"]) == ("succeeded", 4)
+
+
+def test_the_list_can_be_searched_and_sorted(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, place: Place, queued: str
+) -> None:
+    where = place(db)
+    gaitswarm("submit", "--spec", small_spec, "--name", "Another", *where)
+    names = [job["name"] for job in gaitswarm("list", "--order", "name", *where, "--json").json]
+    assert names == ["Another", "small"]
+    found = gaitswarm("list", "--search", "SMA", *where, "--json").json
+    assert [job["id"] for job in found] == [queued]
+    refused = gaitswarm("list", "--order", "age", *where)
+    assert refused.code == 2
+    assert "created, fitness, name" in refused.err
+
+
+def test_designs_are_ranked_by_another_preference(
+    gaitswarm: Gaitswarm, finished: Finished, place: Place
+) -> None:
+    where = place(finished.db)
+    own = '{"bias": [0, 0, 0, 0, 0], "exponent": [1, 0, 0, 0, 0]}'
+    ranking = gaitswarm("rank", finished.id, "--preference", own, *where, "--json").json
+    torques = [d["scenarios"]["short"]["objectives"]["torque"] for d in ranking["top"]]
+    assert torques == sorted(torques) and len(torques) == ranking["evaluations"] == 6
+    assert [d["fitness"] for d in ranking["top"]] == pytest.approx(torques)
+    table = gaitswarm("rank", finished.id, "--preference", "B", "--top", "2", *where).out
+    assert "of 6 designs" in table and "rank correlation" in table
+    assert len(table.splitlines()) == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        (("--preference", "D"), "preference"),
+        (("--preference", "{"), "preference: not JSON"),
+        (("--preference", '{"bias": [0, 0, 0, 0, 0]}'), "preference.exponent"),
+        (("--preference", "A", "--top", "0"), "top"),
+    ],
+)
+def test_a_ranking_that_makes_no_sense_is_refused_by_name(
+    gaitswarm: Gaitswarm, finished: Finished, options: tuple[str, ...], field: str
+) -> None:
+    refused = gaitswarm("rank", finished.id, *options, "--db", finished.db)
+    assert refused.code == 2
+    assert field in refused.err

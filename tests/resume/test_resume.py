@@ -133,6 +133,26 @@ def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: 
     assert history(store, job_id) == history(store, whole)
 
 
+def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
+    store: Store, url: str, evaluator: Evaluator
+) -> None:
+    whole, killed = (run_alone(store, evaluator) for _ in range(2))
+    for job_id in (whole, killed):
+        store.extend(job_id, SPEC.iterations + 3)
+    process = start(url, killed)
+    assert process.stdout is not None
+    process.stdout.readline()
+    kill_group(process)
+    assert store.job(killed).progress.iterations > SPEC.iterations
+    last = start(url, killed)
+    last.communicate(timeout=120)
+
+    assert last.returncode == 0
+    assert run_embedded(store, evaluator, whole).state is JobState.SUCCEEDED
+    assert store.job(killed).progress.iterations == SPEC.iterations + 3
+    assert history(store, killed) == history(store, whole)
+
+
 def test_a_job_resumed_on_ray_equals_one_run_in_threads(
     store: Store, url: str, evaluator: Evaluator
 ) -> None:

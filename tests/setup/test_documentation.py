@@ -10,8 +10,8 @@ import pytest
 
 from api.app import create_app
 from api.settings import ApiSettings
-from services.optimizer.job_spec import JobSpec
 from services.optimizer.service import JobService
+from services.optimizer.specs import SPECS
 from sim.scenario import SCENARIOS
 from tests.setup import command_line, settings_classes
 from tests.setup.documents import ROOT, blocks, documentation, shell_commands
@@ -63,4 +63,4 @@ def test_every_job_spec_that_is_shown_is_valid() -> None:
     specs = [example for example in shown if {"iterations", "scenarios"} & set(example)]
     assert specs
     for spec in specs:
-        JobSpec.model_validate(spec)
+        SPECS.validate_python(spec)

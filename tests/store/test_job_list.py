@@ -7,9 +7,9 @@ from datetime import UTC
 import pytest
 
 from services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
-from services.optimizer.job import Command, JobState
+from services.optimizer.job import Command, Job, JobOrder, JobState
 from services.optimizer.store.sql_store import SqlStore
-from tests.store.examples import Clock, spec
+from tests.store.examples import LEASE, Clock, ask, completed, spec
 
 
 def test_a_new_job_is_queued_and_reads_back_as_it_was_returned(
@@ -122,6 +122,121 @@ def test_the_list_can_be_filtered_by_state(store: SqlStore, clock: Clock) -> Non
     store.command(paused.id, Command.PAUSE)
     assert [job.id for job in store.jobs(state=JobState.QUEUED).items] == [kept.id]
     assert [job.id for job in store.jobs(state=JobState.PAUSED).items] == [paused.id]
+
+
+def listed(store: SqlStore, **question: object) -> list[str]:
+    """Names of all jobs that are asked for, read in pages of two."""
+    names, after = [], None
+    while True:
+        page = store.jobs(limit=2, after=after, **question)  # type: ignore[arg-type]
+        names += [job.spec.name for job in page.items]
+        after = page.next
+        if after is None:
+            return names
+
+
+def named(store: SqlStore, clock: Clock, *names: str) -> list[Job]:
+    made = []
+    for name in names:
+        made.append(store.create_job(spec(name=name))[0])
+        clock.advance(1.0)
+    return made
+
+
+def with_fitness(store: SqlStore, job: Job, fitness: float) -> None:
+    claim = store.claim("runner", lease_seconds=LEASE, job_id=job.id)
+    assert claim is not None
+    store.begin(claim, ask(0))
+    store.commit(claim, completed(0, (fitness, fitness + 1.0)), ask(1))
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("slow", ["Slow walk", "a SLOW one"]),
+        ("GRÖẞE", ["größe"]),
+        ("%", ["100%"]),
+        ("_", []),
+        ("nothing like it", []),
+        ("", ["100%", "größe", "Slow walk", "a SLOW one"]),
+    ],
+)
+def test_the_list_can_be_searched_by_name_whatever_its_case(
+    store: SqlStore, clock: Clock, text: str, found: list[str]
+) -> None:
+    named(store, clock, "a SLOW one", "Slow walk", "größe", "100%")
+    assert listed(store, search=text) == found
+
+
+def test_the_list_can_be_searched_by_a_part_of_the_id(store: SqlStore, clock: Clock) -> None:
+    wanted, _ = named(store, clock, "one", "two")
+    assert [job.id for job in store.jobs(search=wanted.id[2:].upper()).items] == [wanted.id]
+
+
+def test_the_list_can_be_sorted_by_name_and_those_without_come_last(
+    store: SqlStore, clock: Clock
+) -> None:
+    named(store, clock, "b", "", "A", "ç" * 200, "a")
+    names = listed(store, order=JobOrder.NAME)
+    assert sorted(names[:2]) == ["A", "a"]
+    assert names[2:] == ["b", "ç" * 200, ""]
+
+
+def test_the_list_can_be_sorted_by_fitness_and_those_without_come_last(
+    store: SqlStore, clock: Clock
+) -> None:
+    third, _, first, second, _ = named(store, clock, "third", "none", "first", "second", "none")
+    with_fitness(store, third, 1e22)
+    with_fitness(store, first, 0.1)
+    with_fitness(store, second, 0.1 + 2.0**-52)
+    assert listed(store, order=JobOrder.FITNESS) == ["first", "second", "third", "none", "none"]
+
+
+def test_search_order_and_state_go_together(store: SqlStore, clock: Clock) -> None:
+    jobs = named(store, clock, "walk b", "walk a", "other", "walk c")
+    store.command(jobs[0].id, Command.PAUSE)
+    found = listed(store, order=JobOrder.NAME, search="walk", state=JobState.QUEUED)
+    assert found == ["walk a", "walk c"]
+
+
+@pytest.mark.parametrize("order", list(JobOrder))
+def test_jobs_made_between_two_pages_repeat_nothing(
+    store: SqlStore, clock: Clock, order: JobOrder
+) -> None:
+    made = {job.id for job in named(store, clock, "m", "n", "", "m")}
+    first = store.jobs(limit=2, order=order, search="")
+    named(store, clock, "a", "z")
+    rest = store.jobs(limit=10, order=order, after=first.next)
+    ids = [job.id for job in (*first.items, *rest.items)]
+    assert len(set(ids)) == len(ids) and made <= set(ids)
+
+
+@pytest.mark.parametrize("order", list(JobOrder))
+def test_a_cursor_belongs_to_its_order(store: SqlStore, clock: Clock, order: JobOrder) -> None:
+    named(store, clock, "a", "b", "c")
+    for other in set(JobOrder) - {order}:
+        cursor = store.jobs(limit=1, order=other).next
+        with pytest.raises(InvalidRequest) as refused:
+            store.jobs(order=order, after=cursor)
+        assert refused.value.field == "after"
+
+
+@pytest.mark.parametrize(
+    ("order", "after"),
+    [
+        (JobOrder.NAME, "name:bcdfghjkmnpq"),
+        (JobOrder.NAME, "\0"),
+        (JobOrder.FITNESS, "fitness:1e:bcdfghjkmnpq"),
+        (JobOrder.FITNESS, "fitness:nan:bcdfghjkmnpq"),
+        (JobOrder.FITNESS, ""),
+    ],
+)
+def test_what_is_not_a_cursor_of_another_order_is_refused_by_name(
+    store: SqlStore, order: JobOrder, after: str
+) -> None:
+    with pytest.raises(InvalidRequest) as refused:
+        store.jobs(order=order, after=after)
+    assert refused.value.field == "after"
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from services.optimizer.job import (
     Evaluation,
     Iteration,
     Job,
+    JobOrder,
     JobState,
 )
 from services.optimizer.spec import Spec
@@ -49,14 +50,30 @@ class Store(Protocol):
         """One job with its progress."""
 
     def jobs(
-        self, *, state: JobState | None = None, after: str | None = None, limit: int = 50
+        self,
+        *,
+        state: JobState | None = None,
+        search: str = "",
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
     ) -> Page[Job]:
-        """Newest first. Raises InvalidRequest (field `after`) for a cursor that is not one."""
+        """Jobs in a state whose name or id contains a text, whatever its case.
+
+        Raises InvalidRequest (field `after`) for a cursor that is none of this order.
+        """
 
     def command(self, job_id: str, command: Command) -> Job:
         """Apply `commanded`; Conflict if the state does not allow it.
 
         Cancelling clears the lease, so a runner's next write is refused.
+        """
+
+    def extend(self, job_id: str, iterations: int) -> Job:
+        """Give a job another budget, of `iterations` in all; see `extended` for what it may be.
+
+        What is committed stays, as does the iteration under way; what is asked after it is asked
+        under the new budget. A job that has succeeded is queued again.
         """
 
     def add_recording(self, walk: RecordedWalk) -> str:
@@ -87,7 +104,8 @@ class Store(Protocol):
         following: None at the end of the budget; the job is then succeeded. A pausing job becomes
         paused and gives up its lease. Returns the state after. Unique on (job, iteration): a
         commit whose answer was lost may be repeated, and changes nothing the second time. Raises
-        Conflict for an iteration that was not asked.
+        Conflict for an iteration that was not asked, and BudgetChanged, and stores nothing, if the
+        job has another budget than the claim's: `following` would be another ask.
         """
 
     def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
@@ -112,7 +130,7 @@ class Store(Protocol):
         """
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
-        """As `evaluations_between`, as columns and a dozen times as fast; None if there is none."""
+        """As `evaluations_between`, as columns, for many at once; None if there is none."""
 
     def best(self, job_id: str) -> Evaluation | None:
         """The evaluation of least fitness, the earliest of equals; None if none is finite."""

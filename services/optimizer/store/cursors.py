@@ -13,6 +13,8 @@ from services.optimizer.errors import InvalidRequest
 _ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
 _ID: Final = re.compile(rf"[{_ALPHABET}]{{12}}")
 _CURSOR: Final = re.compile(rf"([0-9]{{1,18}})\.([{_ALPHABET}]{{12}})", re.ASCII)
+_FITNESS_CURSOR: Final = re.compile(rf"fitness:([0-9.e+-]*):([{_ALPHABET}]{{12}})", re.ASCII)
+_NAME_CURSOR: Final = re.compile(rf"name:([{_ALPHABET}]{{12}})", re.ASCII)
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -39,6 +41,41 @@ def from_cursor(text: str) -> tuple[datetime, str]:
             return _EPOCH + timedelta(microseconds=int(match[1])), match[2]
     except OverflowError:
         pass
-    raise InvalidRequest(
-        "not a cursor of the job list; pass the `next` of the page before", field="after"
+    raise no_cursor()
+
+
+def to_fitness_cursor(fitness: float | None, job_id: str) -> str:
+    """Place of a job in the list by fitness; a job without one is among the last."""
+    return f"fitness:{'' if fitness is None else repr(fitness)}:{job_id}"
+
+
+def from_fitness_cursor(text: str) -> tuple[float | None, str]:
+    """Inverse of `to_fitness_cursor`; InvalidRequest (field `after`) for anything else."""
+    match = _FITNESS_CURSOR.fullmatch(text)
+    try:
+        if match is not None:
+            return float(match[1]) if match[1] else None, match[2]
+    except ValueError:
+        pass
+    raise no_cursor()
+
+
+def to_name_cursor(job_id: str) -> str:
+    """Place of a job in the list by name; a name may be long, and never changes."""
+    return f"name:{job_id}"
+
+
+def from_name_cursor(text: str) -> str:
+    """Inverse of `to_name_cursor`; InvalidRequest (field `after`) for anything else."""
+    match = _NAME_CURSOR.fullmatch(text)
+    if match is None:
+        raise no_cursor()
+    return match[1]
+
+
+def no_cursor() -> InvalidRequest:
+    """For whoever passes what no page ended with."""
+    return InvalidRequest(
+        "not a cursor of the job list in this order; pass the `next` of the page before",
+        field="after",
     )

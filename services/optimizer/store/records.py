@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
+import numpy as np
 from sqlalchemy import Connection, insert, select, update
 
 from services.optimizer.errors import Conflict, NotFound
-from services.optimizer.job import Ask, CompletedIteration, Job, JobState
+from services.optimizer.job import Answered, Ask, CompletedIteration, Job, JobState
 from services.optimizer.spec import Spec
+from services.optimizer.specs import AnySpec
 from services.optimizer.store.cursors import is_job_id, new_job_id
 from services.optimizer.store.rows import (
     Row,
@@ -18,6 +21,7 @@ from services.optimizer.store.rows import (
     evaluation_rows,
     iteration_summary,
     spec_document,
+    submitted_spec,
     to_ask,
     to_job,
 )
@@ -38,13 +42,16 @@ def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
     raise NotFound(f"there is no job {job_id!r}")
 
 
-def job_of_key(connection: Connection, idempotency_key: str | None) -> Job | None:
-    """The job that was made with a key; None if there is none, or no key."""
+def job_of_key(connection: Connection, idempotency_key: str | None) -> tuple[Job, AnySpec] | None:
+    """The job that was made with a key, and the spec that it was submitted with.
+
+    None if there is none, or no key.
+    """
     if idempotency_key is None:
         return None
     query = select(jobs).where(jobs.c.idempotency_key == idempotency_key)
     row = connection.execute(query).mappings().first()
-    return to_job(row) if row is not None else None
+    return (to_job(row), submitted_spec(row)) if row is not None else None
 
 
 def insert_job(
@@ -81,6 +88,24 @@ def outstanding_ask(connection: Connection, job: Row) -> Ask | None:
     )
     row = connection.execute(query).mappings().first()
     return to_ask(row) if row is not None else None
+
+
+def answered_ask(connection: Connection, job: Row) -> Answered | None:
+    """The last committed ask; None for a job that has committed nothing."""
+    last = job["iterations"] - 1
+    query = select(iterations).where(
+        iterations.c.job_id == job["id"], iterations.c.iteration == last
+    )
+    row = connection.execute(query).mappings().first()
+    if row is None:
+        return None
+    of_swarm = (
+        select(evaluations.c.fitness)
+        .where(evaluations.c.job_id == job["id"], evaluations.c.iteration == last)
+        .order_by(evaluations.c.particle)
+    )
+    fitness = [math.inf if f is None else f for f in connection.execute(of_swarm).scalars()]
+    return Answered(to_ask(row), np.array(fitness, dtype=np.float64))
 
 
 def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now: datetime) -> None:

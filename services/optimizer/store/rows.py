@@ -25,7 +25,7 @@ from services.optimizer.job import (
     Progress,
 )
 from services.optimizer.spec import Spec
-from services.optimizer.specs import SPECS
+from services.optimizer.specs import SPECS, AnySpec
 from sim.outcome import Status
 
 Row = Mapping[Any, Any]
@@ -33,13 +33,10 @@ Row = Mapping[Any, Any]
 
 
 def to_job(row: Row) -> Job:
-    """A row of `jobs`. Raises StoreUnavailable for a spec that this version cannot read."""
-    try:
-        spec = SPECS.validate_python(row["spec"])
-    except ValidationError as error:
-        raise StoreUnavailable(
-            f"job {row['id']} was stored with a spec that this version cannot read: {error}"
-        ) from error
+    """A row of `jobs`. Raises as `submitted_spec`."""
+    spec = submitted_spec(row)
+    if row["budget"] is not None:
+        spec = spec.model_copy(update={"iterations": row["budget"]})
     return Job(
         id=row["id"],
         spec=spec,
@@ -58,6 +55,24 @@ def to_job(row: Row) -> Job:
             compute_seconds=row["compute_seconds"],
         ),
     )
+
+
+def submitted_spec(row: Row) -> AnySpec:
+    """Spec of a row of `jobs`, with the budget that it was submitted with.
+
+    Raises StoreUnavailable for a spec that this version cannot read.
+    """
+    try:
+        return SPECS.validate_python(row["spec"])
+    except ValidationError as error:
+        raise StoreUnavailable(
+            f"job {row['id']} was stored with a spec that this version cannot read: {error}"
+        ) from error
+
+
+def budget(row: Row) -> int:
+    """Iterations that the job of a row of `jobs` is to run."""
+    return int(row["spec"]["iterations"] if row["budget"] is None else row["budget"])
 
 
 def spec_document(spec: Spec) -> dict[str, Any]:

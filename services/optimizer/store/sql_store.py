@@ -9,7 +9,7 @@ from typing import Final
 from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
+from services.optimizer.errors import BudgetChanged, IdempotencyConflict, InvalidRequest, NotFound
 from services.optimizer.evaluation_columns import EvaluationColumns
 from services.optimizer.job import (
     Ask,
@@ -19,14 +19,17 @@ from services.optimizer.job import (
     Evaluation,
     Iteration,
     Job,
+    JobOrder,
     JobState,
     commanded,
+    extended,
 )
 from services.optimizer.spec import Spec
 from services.optimizer.store.base import Page
 from services.optimizer.store.cursors import from_cursor, to_cursor
 from services.optimizer.store.engine import Database, connect, parse_url
 from services.optimizer.store.evaluation_columns import select_columns
+from services.optimizer.store.job_list import cursor_of, job_rows, sort_jobs
 from services.optimizer.store.leases import claimable, held, lease_is_live
 from services.optimizer.store.migrate import check_revision, migrate
 from services.optimizer.store.recordings import (
@@ -35,6 +38,7 @@ from services.optimizer.store.recordings import (
     recording_id,
 )
 from services.optimizer.store.records import (
+    answered_ask,
     complete_iteration,
     insert_ask,
     insert_job,
@@ -43,7 +47,7 @@ from services.optimizer.store.records import (
     outstanding_ask,
     update_job,
 )
-from services.optimizer.store.rows import to_evaluation, to_iteration, to_job
+from services.optimizer.store.rows import budget, to_evaluation, to_iteration, to_job
 from services.optimizer.store.tables import evaluations, iterations, jobs
 from services.optimizer.store.transitions import (
     entering,
@@ -94,12 +98,13 @@ class SqlStore:
                 earlier = job_of_key(connection, idempotency_key)
             if earlier is None:
                 raise
-        if earlier.spec != resolved:
+        job, submitted = earlier
+        if submitted != resolved:
             raise IdempotencyConflict(
                 f"idempotency key {idempotency_key!r} was used before, for the different job"
-                f" {earlier.id}; use a new key for a new job"
+                f" {job.id}; use a new key for a new job"
             )
-        return earlier, False
+        return job, False
 
     def job(self, job_id: str) -> Job:
         """See `Store.job`."""
@@ -107,10 +112,27 @@ class SqlStore:
             return to_job(job_row(connection, job_id))
 
     def jobs(
-        self, *, state: JobState | None = None, after: str | None = None, limit: int = 50
+        self,
+        *,
+        state: JobState | None = None,
+        search: str = "",
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
     ) -> Page[Job]:
         """See `Store.jobs`."""
         limit = _checked_limit(limit)
+        if not search and order is JobOrder.CREATED:
+            return self._newest_jobs(state, after, limit)
+        with self._database.transaction(write=False) as connection:
+            found = sort_jobs(connection, state=state, search=search, order=order, after=after)
+            ids, more = found[:limit], len(found) > limit
+            rows = job_rows(connection, ids)
+        following = cursor_of(rows[-1], order) if more else None
+        return Page(tuple(map(to_job, rows)), following)
+
+    def _newest_jobs(self, state: JobState | None, after: str | None, limit: int) -> Page[Job]:
+        """The list as most ask for it: one query, which reads no more than the page."""
         query = select(jobs).order_by(jobs.c.created_at.desc(), jobs.c.id.desc()).limit(limit + 1)
         if state is not None:
             query = query.where(jobs.c.state == state)
@@ -138,6 +160,16 @@ class SqlStore:
             if command is Command.RESUME:
                 changes["error"] = None
             return to_job(update_job(connection, row, changes))
+
+    def extend(self, job_id: str, iterations: int) -> Job:
+        """See `Store.extend`."""
+        with self._database.transaction(write=True) as connection:
+            row = job_row(connection, job_id, lock=True)
+            state = JobState(row["state"])
+            after = extended(state, row["iterations"], iterations)
+            # Whoever runs the job notices when it commits; until then nothing changes for it.
+            changes = entering(after, self._clock()) if after is not state else {}
+            return to_job(update_job(connection, row, changes | {"budget": iterations}))
 
     # recorded walks
 
@@ -179,7 +211,9 @@ class SqlStore:
                 }
                 job = to_job(update_job(connection, row, changes))
                 walks = load_recordings(connection, job.spec.recording_ids)
-                return Claim(job, runner, token, outstanding_ask(connection, row), walks)
+                ask = outstanding_ask(connection, row)
+                answered = answered_ask(connection, row) if ask is None else None
+                return Claim(job, runner, token, ask, walks, answered)
         return None
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
@@ -204,6 +238,8 @@ class SqlStore:
             row = held(connection, claim)
             if done.iteration < row["iterations"]:
                 return JobState(row["state"])
+            if budget(row) != claim.job.spec.iterations:
+                raise BudgetChanged(f"job {row['id']} is to run {budget(row)} iterations now")
             complete_iteration(connection, row, done, now)
             if following is not None:
                 insert_ask(connection, row, following, expected=done.iteration + 1, now=now)

@@ -87,6 +87,8 @@ jobs: Final = Table(
     Column("best_iteration", Integer),
     Column("best_particle", Integer),
     Column("compute_seconds", Double, nullable=False),
+    # Iterations to run, where the job was extended; the spec stays what was submitted.
+    Column("budget", Integer),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

@@ -1,0 +1,127 @@
+"""Questions about all evaluations of a job at once: spread, particles, another preference."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Query, Response
+
+from api.context import ExistingJob, JobIdText, Service
+from api.openapi import problems
+from api.views import (
+    PREFIX,
+    DistributionView,
+    RankingRequest,
+    RankingView,
+    View,
+    encoded_particles,
+)
+from api.views.convergence import ConvergenceView
+from api.views.framing import MEDIA_TYPE
+
+router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
+
+_LARGEST: Final = 2**31 - 1
+
+_NUMBERS: Final[dict[str, Any]] = {
+    "description": "Length of the header (uint32), header (JSON, padded with spaces), then every"
+    " column's numbers (float32), all little-endian.",
+    "content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}},
+}
+
+
+@router.get(
+    "/distribution",
+    operation_id="get_distribution",
+    summary="See how the swarm is spread",
+    response_model=DistributionView,
+    responses=problems(404, 409, 422),
+)
+def get_distribution(
+    job: ExistingJob,
+    service: Service,
+    after: Annotated[
+        int | None,
+        Query(ge=0, le=_LARGEST, description="Only iterations with a greater index."),
+    ] = None,
+    limit: Annotated[int, Query(ge=1, le=10_000, description="Most iterations on a page.")] = 1000,
+) -> Response:
+    """Quantiles of the swarm's fitness and the diversity of its designs, iteration by iteration."""
+    found, more = service.distribution(job, after=after, limit=limit)
+    return _json(DistributionView.from_distribution(found, more=more))
+
+
+@router.get(
+    "/particles",
+    operation_id="get_particles",
+    summary="Take every particle as numbers",
+    response_class=Response,
+    responses={200: _NUMBERS, **problems(404, 409, 422)},
+)
+def get_particles(
+    job: ExistingJob,
+    service: Service,
+    after_iteration: Annotated[
+        int | None,
+        Query(ge=0, le=_LARGEST, description="Only iterations with a greater index."),
+    ] = None,
+    max_points: Annotated[
+        int,
+        Query(
+            ge=1,
+            le=1_000_000,
+            description="Most particles; more are thinned evenly in iterations, the best is kept.",
+        ),
+    ] = 100_000,
+) -> Response:
+    """One row per design, by column, in binary: iteration, particle, fitness, the searched
+    variables, and the utility in each scenario; NaN for what does not exist.
+
+    The header is a ParticlesHeaderView: it names the columns in order, with units and bounds.
+    """
+    body = encoded_particles(job, service.columns(job), after=after_iteration, most=max_points)
+    return Response(body, media_type=MEDIA_TYPE)
+
+
+@router.post(
+    "/ranking",
+    operation_id="rank_designs",
+    summary="Judge by another preference",
+    response_model=RankingView,
+    responses=problems(400, 404, 409, 413, 422),
+)
+def rank_designs(request: RankingRequest, job: ExistingJob, service: Service) -> Response:
+    """All designs of a job, ranked anew from their stored objectives: no walk is simulated.
+
+    For jobs that tune a drive; a job that identifies parameters has no preference.
+    """
+    ranked = service.rank(job, request.resolved_preference(), top=request.top)
+    return _json(RankingView.from_ranked_job(request, ranked))
+
+
+def _json(view: View) -> Response:
+    """Serialized here: thousands of items are not validated once more on their way out."""
+    return Response(view.model_dump_json(), media_type="application/json")
+
+
+@router.get(
+    "/parameters",
+    operation_id="get_parameters",
+    summary="See which parameters can be trusted",
+    responses=problems(404, 409, 422),
+)
+def get_parameters(
+    job: ExistingJob,
+    service: Service,
+    also: Annotated[
+        list[JobIdText] | None,
+        Query(max_length=31, description="Further runs of the same problem, of other seeds."),
+    ] = None,
+) -> ConvergenceView:
+    """The interval of every variable among designs within twelve thresholds of the best.
+
+    For jobs of kind `identification` above all. A single run always narrows down; only runs of
+    different seeds that narrow down to the same values show that a parameter can be trusted.
+    """
+    jobs = [job, *(service.job(other) for other in also or ())]
+    return ConvergenceView.from_convergence([j.id for j in jobs], service.convergence(jobs))

@@ -1,0 +1,172 @@
+"""`gaitswarm record`, `identify`, `parameters`: a robot's parameters from measured walks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.measured_walk import (
+    CyclesOption,
+    DesignOption,
+    ScenarioOption,
+    TrajectoryOption,
+    WalkController,
+)
+from cli.options import Cpus, Db, EvaluatorOption, JobName, Json, RayAddress, RobotOption, Server
+
+Truth = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.json",
+        help="True values by name, as `synthesize --parameters` takes them: shown beside.",
+    ),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(record)
+    app.command()(identify)
+    app.command()(parameters)
+
+
+def record(
+    measured: Annotated[
+        Path,
+        typer.Argument(metavar="MEASURED.csv", help="Log in the format of docs/validation.md."),
+    ],
+    design: DesignOption,
+    scenario: ScenarioOption,
+    controller: WalkController = "fuzzy-pi",
+    trajectory: TrajectoryOption = None,
+    cycles: CyclesOption = None,
+    robot: RobotOption = None,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """Keep a measured walk where jobs can fit a robot to it; prints the recording's id."""
+    from cli.jobs.open import open_jobs
+    from cli.measured_walk import read_measured, read_walk, simulated_walk, synchronised
+    from cli.output import note, print_json, stdout_console
+    from sim.identification.record import record as recorded
+
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
+    log = read_measured(measured, walk.robot)
+    pair = synchronised(measured, log, simulated_walk(walk), walk)
+    taken = recorded(pair, walk.scenario, walk.controller, walk.design)
+    with open_jobs(server, db, create=True) as jobs:
+        kept = jobs.record(taken)
+    if as_json:
+        print_json(kept)
+        return
+    stdout_console().print(kept.id, markup=False)
+    note(
+        f"{'SYNTHETIC ' if kept.synthetic else ''}recording of {kept.joints} currents over"
+        f" {kept.seconds:g} s, {pair.cycles} cycles of {kept.scenario}"
+    )
+
+
+def identify(
+    recordings: Annotated[
+        list[str], typer.Argument(metavar="RECORDING...", help="Ids that `record` printed.")
+    ],
+    variables: Annotated[
+        str | None,
+        typer.Option(help="Parameters to fit, separated by commas. Default: all of table 2.7."),
+    ] = None,
+    links: Annotated[
+        str, typer.Option(help="Links whose currents are compared, separated by commas.")
+    ] = "1,2,3",
+    robot: RobotOption = None,
+    runs: Annotated[
+        int,
+        typer.Option(
+            min=1, max=32, help="Jobs that differ in their seed: one alone shows no trust."
+        ),
+    ] = 3,
+    iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 120,
+    particles: Annotated[int, typer.Option(help="Size of each swarm.")] = 48,
+    seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
+    name: JobName = None,
+    truth: Truth = None,
+    db: Db = None,
+    evaluator: EvaluatorOption = "ray",
+    cpus: Cpus = None,
+    ray_address: RayAddress = None,
+    as_json: Json = False,
+) -> None:
+    """Fit parameters of a robot to recorded walks, here and now, and say which can be trusted."""
+    from contextlib import closing
+
+    from cli.embedded import Embedded
+    from cli.jobs.local import LocalJobs
+    from cli.jobs.open import database_url
+    from cli.options import evaluator_kind
+    from cli.output import note
+    from cli.parameters_table import read_truth, show_parameters
+    from cli.robots import chosen_robot
+    from cli.spec_file import parse_spec
+    from services.optimizer.job import JobState
+    from services.optimizer.service import JobService
+    from services.runtime import open_store
+
+    known = read_truth(truth)
+    document = {
+        "kind": "identification",
+        "name": name or "identification",
+        "robot": chosen_robot(robot),
+        "recordings": recordings,
+        "variables": None if variables is None else variables.split(","),
+        "links": [int(link) if link.isdecimal() else link for link in links.split(",")],
+        # Wide at first and narrow at last: there are many parameters, and one valley.
+        "optimizer": {"particles": particles, "inertia_start": 0.9, "inertia_end": 0.4},
+        "iterations": iterations,
+    }
+    specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
+    workers = Embedded(evaluator_kind(evaluator), ray_address=ray_address, cpus=cpus)
+    url = database_url(db)
+    with closing(open_store(url)) as store:
+        service = JobService(store)
+        submitted = [service.submit(spec)[0] for spec in specs]
+        for number, job in enumerate(submitted, start=1):
+            note(f"run {number} of {runs}: job {job.id} in database {url}")
+            if workers.run(store, job):
+                note(f"stopped; go on with gaitswarm optimize --resume {job.id}")
+                raise KeyboardInterrupt
+            ended = store.job(job.id)
+            if ended.state is not JobState.SUCCEEDED:
+                note(f"job {job.id} is {ended.state}: {ended.error or 'no reason was given'}")
+        jobs = LocalJobs(service, url)
+        show_parameters(jobs.parameters([job.id for job in submitted]), known, as_json=as_json)
+
+
+def parameters(
+    job_ids: Annotated[
+        list[str],
+        typer.Argument(metavar="ID...", help="Jobs of one problem that differ in their seed."),
+    ],
+    truth: Truth = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Draw the intervals: .png, .svg."),
+    ] = None,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """Say which fitted parameters can be trusted: intervals at twelve fitness thresholds."""
+    from cli.jobs.open import open_jobs
+    from cli.output import note
+    from cli.parameters_table import draw_parameters, read_truth, show_parameters
+    from cli.plots import save
+
+    known = read_truth(truth)
+    with open_jobs(server, db) as jobs:
+        found = jobs.parameters(job_ids)
+    show_parameters(found, known, as_json=as_json)
+    if output is not None:
+        save(draw_parameters(found, known), output)
+        note(f"picture written to {output}")

@@ -1,0 +1,81 @@
+"""`gaitswarm rank`: what if another preference had judged."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Db, JobId, Json, Server
+
+if TYPE_CHECKING:
+    from api.views import RankingRequest, RankingView
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(rank)
+
+
+def rank(
+    job_id: JobId,
+    preference: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|JSON",
+            help='A, B or C, or your own: {"bias": [five numbers], "exponent": [five numbers]}.',
+        ),
+    ],
+    top: Annotated[int, typer.Option(help="How many of the best designs to show.")] = 20,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """Rank all designs of a job by another preference, from what is stored: no walk is run."""
+    from cli.jobs.open import open_jobs
+    from cli.output import print_json
+
+    request = _request(preference, top)
+    with open_jobs(server, db) as jobs:
+        ranking = jobs.ranking(job_id, request)
+    if as_json:
+        print_json(ranking)
+    else:
+        _print(ranking)
+
+
+def _request(preference: str, top: int) -> RankingRequest:
+    """Raises InvalidRequest that names the field."""
+    import json
+
+    from pydantic import ValidationError
+
+    from api.views import RankingRequest
+    from cli.spec_file import invalid_request
+    from services.optimizer.errors import InvalidRequest
+
+    chosen: object = preference
+    if preference.lstrip().startswith("{"):
+        try:
+            chosen = json.loads(preference)
+        except ValueError as error:
+            raise InvalidRequest(f"not JSON: {error}", field="preference") from error
+    data = {"preference": chosen, "top": top}
+    try:
+        return RankingRequest.model_validate(data)
+    except ValidationError as error:
+        raise invalid_request(error, data) from error
+
+
+def _print(ranking: RankingView) -> None:
+    from cli.output import stdout_console
+    from cli.tables import MISSING, number, ranking_table
+
+    console = stdout_console()
+    console.print(ranking_table(ranking))
+    agreement = MISSING if ranking.correlation is None else f"{ranking.correlation:.3f}"
+    console.print(
+        f"of {ranking.evaluations} designs; the job's own best:"
+        f" {number(ranking.fitness_of_present_best)}; rank correlation: {agreement}",
+        markup=False,
+    )

@@ -1,0 +1,117 @@
+"""The job list in other orders than by time, and searched.
+
+Names are compared in Python: case folding is then the same on every database, and right for more
+than ASCII. Of every job only what is compared is read, some microseconds each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+
+from sqlalchemy import Connection, select
+
+from services.optimizer.errors import NotFound
+from services.optimizer.job import JobOrder, JobState
+from services.optimizer.store.cursors import (
+    from_cursor,
+    from_fitness_cursor,
+    from_name_cursor,
+    no_cursor,
+    to_cursor,
+    to_fitness_cursor,
+    to_name_cursor,
+)
+from services.optimizer.store.records import job_row
+from services.optimizer.store.rows import Row
+from services.optimizer.store.tables import jobs
+
+
+class _Entry(NamedTuple):
+    """What a job is found and sorted by."""
+
+    id: str
+    created_at: datetime
+    name: str
+    best_fitness: float | None
+
+
+def sort_jobs(
+    connection: Connection,
+    *,
+    state: JobState | None,
+    search: str,
+    order: JobOrder,
+    after: str | None,
+) -> list[str]:
+    """Ids of all jobs that are asked for, in order, after a cursor.
+
+    Raises InvalidRequest (field `after`) for a cursor that is none of this order.
+    """
+    name = jobs.c.spec["name"].as_string()
+    query = select(jobs.c.id, jobs.c.created_at, name, jobs.c.best_fitness)
+    if state is not None:
+        query = query.where(jobs.c.state == state)
+    wanted = search.casefold()
+    found = [
+        entry
+        for entry in map(_Entry._make, connection.execute(query))
+        if wanted in entry.name.casefold() or wanted in entry.id
+    ]
+    newest_first = order is JobOrder.CREATED
+    places = sorted(((_place(entry, order), entry.id) for entry in found), reverse=newest_first)
+    if after is not None:
+        last = _place(_entry_before(connection, after, order), order)
+        places = [p for p in places if (p[0] < last if newest_first else p[0] > last)]
+    return [job_id for _, job_id in places]
+
+
+def job_rows(connection: Connection, ids: Sequence[str]) -> list[Row]:
+    """Rows of jobs, in the order of their ids."""
+    query = select(jobs).where(jobs.c.id.in_(ids))
+    rows = {row["id"]: row for row in connection.execute(query).mappings()}
+    return [rows[job_id] for job_id in ids]
+
+
+def cursor_of(row: Row, order: JobOrder) -> str:
+    """Place of a job in the list."""
+    match order:
+        case JobOrder.CREATED:
+            return to_cursor(row["created_at"], row["id"])
+        case JobOrder.FITNESS:
+            return to_fitness_cursor(row["best_fitness"], row["id"])
+        case JobOrder.NAME:
+            return to_name_cursor(row["id"])
+
+
+def _place(entry: _Entry, order: JobOrder) -> tuple[Any, ...]:
+    """What the list is sorted by; equals are told apart by their ids."""
+    match order:
+        case JobOrder.CREATED:
+            return (entry.created_at, entry.id)
+        case JobOrder.FITNESS:
+            fitness = math.inf if entry.best_fitness is None else entry.best_fitness
+            return (fitness, entry.id)
+        case JobOrder.NAME:
+            return (not entry.name, entry.name.casefold(), entry.id)
+
+
+def _entry_before(connection: Connection, cursor: str, order: JobOrder) -> _Entry:
+    """The job that a page ended with, as it was then; only its place counts."""
+    nowhen = datetime.max.replace(tzinfo=UTC)
+    match order:
+        case JobOrder.CREATED:
+            created_at, job_id = from_cursor(cursor)
+            return _Entry(job_id, created_at, "", None)
+        case JobOrder.FITNESS:
+            fitness, job_id = from_fitness_cursor(cursor)
+            return _Entry(job_id, nowhen, "", fitness)
+        case JobOrder.NAME:
+            job_id = from_name_cursor(cursor)
+            try:
+                row = job_row(connection, job_id)
+            except NotFound:
+                raise no_cursor() from None
+            return _Entry(job_id, nowhen, row["spec"]["name"], None)

@@ -1,0 +1,140 @@
+"""A walk to look at again: where every link was, at a rate for the eye."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.kernel.observation import WalkLog
+from sim.robot import Robot
+from sim.robot.shapes import VisibleLink, visible_links
+
+Floats = NDArray[np.float64]
+
+CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)
+"""Ticks of a log per second [Hz], and so the highest rate of a replay."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replay:
+    """A walk up to its end, F frames of B links, J joints, L legs; arrays by frame.
+
+    duration: walked [s]; links: in the order of `link_pose`. time (F,) [s], exact;
+    link_pose (F, B, 7) in the world: position [m], quaternion x y z w, whose sign never jumps;
+    foot_position (F, L, 3): the tibia's end, a sole's length above the ground where it stands [m];
+    foot_force (F, L, 3) in the world [N]; by joint (F, J): joint_angle, desired_angle, motor_angle
+    [rad], current [A], voltage [V], load_torque [N m]; in the body's frame: body_acceleration
+    (F, 3) [m/s2], body_velocity (F, 6) linear [m/s] and angular [rad/s]; supply (F,) [V].
+    """
+
+    duration: float
+    links: tuple[VisibleLink, ...]
+    time: Floats
+    link_pose: Floats
+    foot_position: Floats
+    foot_force: Floats
+    joint_angle: Floats
+    desired_angle: Floats
+    motor_angle: Floats
+    current: Floats
+    voltage: Floats
+    load_torque: Floats
+    body_acceleration: Floats
+    body_velocity: Floats
+    supply: Floats
+
+
+def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Replay:
+    """The ticks of a walk nearest to a rate [Hz] of at most `CONTROL_RATE`.
+
+    load: mass carried on the body [kg], to be seen.
+    """
+    walked = log.until_end()
+    ticks = ticks_at(rate, len(walked.time))
+    links = visible_links(robot, load)
+    poses, feet = _placements(
+        robot,
+        tuple(link.name for link in links),
+        np.concatenate(
+            [
+                walked.base_position[ticks],
+                walked.base_orientation[ticks],
+                walked.joint_angle[ticks],
+            ],
+            axis=1,
+        ),
+    )
+    return Replay(
+        duration=len(walked.time) * CONTROL_PERIOD,
+        links=links,
+        time=walked.time[ticks],
+        link_pose=poses,
+        foot_position=feet,
+        foot_force=walked.foot_force[ticks],
+        joint_angle=walked.joint_angle[ticks],
+        desired_angle=walked.desired_angle[ticks],
+        motor_angle=walked.motor_angle[ticks],
+        current=walked.current[ticks],
+        voltage=walked.voltage[ticks],
+        load_torque=walked.load_torque[ticks],
+        body_acceleration=walked.body_acceleration()[ticks],
+        body_velocity=walked.base_velocity[ticks],
+        supply=walked.supply[ticks],
+    )
+
+
+def ticks_at(rate: float, ticks: int) -> NDArray[np.int64]:
+    """Control ticks before `ticks` that are nearest to multiples of 1 / rate, from 0 on."""
+    frames = np.rint(np.arange(ticks * rate / CONTROL_RATE + 1.0) * (CONTROL_RATE / rate))
+    nearest: NDArray[np.int64] = frames[frames < ticks].astype(np.int64)
+    return nearest
+
+
+def _placements(
+    robot: Robot, links: tuple[str, ...], configurations: Floats
+) -> tuple[Floats, Floats]:
+    """Forward kinematics: poses of links (F, B, 7) and positions of feet (F, L, 3) in the world.
+
+    configurations: (F, 7+J) position, quaternion x y z w, joints in the robot's order.
+    """
+    # As slow to import as it is for the kernel, which may come from the cache.
+    import pinocchio as pin  # noqa: PLC0415
+
+    model = _model(robot)
+    data = model.createData()
+    order = [model.joints[model.getJointId(name)].idx_q for name in robot.joint_names]
+    q = np.empty((len(configurations), model.nq))
+    q[:, :7], q[:, order] = configurations[:, :7], configurations[:, 7:]
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+    bodies = [model.getFrameId(name, pin.FrameType.BODY) for name in links]
+    feet = [model.getFrameId(leg.foot) for leg in robot.description.legs]
+    poses = np.empty((len(q), len(bodies), 7))
+    positions = np.empty((len(q), len(feet), 3))
+    for frame, configuration in enumerate(q):
+        pin.framesForwardKinematics(model, data, configuration)
+        for k, body in enumerate(bodies):
+            poses[frame, k] = pin.SE3ToXYZQUAT(data.oMf[body])
+        for k, foot in enumerate(feet):
+            positions[frame, k] = data.oMf[foot].translation
+    return _without_jumps(poses), positions
+
+
+@lru_cache(maxsize=8)
+def _model(robot: Robot) -> Any:
+    """Read by many threads at once; what they compute is in data of their own."""
+    import pinocchio as pin  # noqa: PLC0415
+
+    return pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+
+
+def _without_jumps(poses: Floats) -> Floats:
+    """Of the two quaternions of an attitude, the one nearer to the frame before."""
+    turns = poses[:, :, 3:]
+    flips = np.sum(turns[1:] * turns[:-1], axis=-1) < 0.0
+    turns[1:] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=0)[:, :, np.newaxis]
+    return poses

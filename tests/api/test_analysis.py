@@ -1,0 +1,230 @@
+"""Questions about all evaluations of a job at once, over HTTP."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from services.optimizer.identification_spec import IdentificationSpec
+from services.optimizer.job import Job
+from services.optimizer.preference import PREFERENCES
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import PARTICLES
+
+pytestmark = pytest.mark.slow
+
+
+def distribution(client: httpx2.Client, job: Job, **parameters: int) -> Any:
+    answer = client.get(f"/v1/jobs/{job.id}/distribution", params=parameters)
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def ranking(client: httpx2.Client, job: Job, **body: Any) -> Any:
+    answer = client.post(f"/v1/jobs/{job.id}/ranking", json=body)
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def particles(
+    client: httpx2.Client, job: Job, **parameters: int
+) -> tuple[Any, dict[str, NDArray[np.float32]]]:
+    answer = client.get(f"/v1/jobs/{job.id}/particles", params=parameters)
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"] == "application/octet-stream"
+    (length,) = struct.unpack_from("<I", answer.content)
+    assert length % 4 == 0
+    header = json.loads(answer.content[4 : 4 + length])
+    numbers = np.frombuffer(answer.content, "<f4", offset=4 + length)
+    names = [column["name"] for column in header["columns"]]
+    return header, dict(zip(names, numbers.reshape(len(names), header["rows"]), strict=True))
+
+
+def test_the_distribution_leaves_out_designs_that_failed(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    commit(job, 2)
+    found = distribution(client, job)
+    assert found["quantiles"] == [0, 0.05, 0.25, 0.5, 0.75, 0.95, 1]
+    second = found["items"][1]
+    assert (second["index"], second["failed"], second["mean"]) == (1, 1, 101.0)
+    assert second["fitness"] == pytest.approx([100, 100.1, 100.5, 101, 101.5, 101.9, 102])
+    assert 0.0 < second["diversity"] < 0.6
+    assert found["next"] is None
+
+
+def test_the_distribution_comes_in_pages(client: httpx2.Client, job: Job, commit) -> None:
+    commit(job, 3)
+    first = distribution(client, job, limit=2)
+    second = distribution(client, job, limit=2, after=first["next"])
+    assert [item["index"] for item in first["items"] + second["items"]] == [0, 1, 2]
+    assert (first["next"], second["next"]) == ("1", None)
+
+
+def test_a_swarm_that_failed_wholly_has_nulls(client: httpx2.Client, job: Job, commit) -> None:
+    commit(job, 1, failed=True)
+    (item,) = distribution(client, job)["items"]
+    assert item["fitness"] == [None] * 7
+    assert (item["mean"], item["failed"]) == (None, PARTICLES)
+
+
+def test_the_distribution_follows_a_running_job(client: httpx2.Client, job: Job, commit) -> None:
+    assert distribution(client, job) == {**distribution(client, job), "items": [], "next": None}
+    claim = commit(job, 1)
+    assert len(distribution(client, job)["items"]) == 1
+    commit(job, 1, claim=claim)
+    assert len(distribution(client, job, after=0)["items"]) == 1
+
+
+def test_particles_are_columns_of_floats_with_units_and_bounds(
+    client: httpx2.Client, store: SqlStore, job: Job, commit
+) -> None:
+    commit(job, 3)
+    header, columns = particles(client, job)
+    rows = store.evaluations_between(job.id, 0, 3)
+    assert (header["job_id"], header["rows"], header["total"]) == (job.id, 12, 12)
+    assert header["iterations"] == [0, 2]
+    space = job.spec.design_space()
+    assert list(columns) == [
+        *("iteration", "particle", "fitness"),
+        *(variable.name for variable in space.variables),
+        *("utility:normal-fast", "utility:turn-right-fast"),
+    ]
+    described = header["columns"][4]
+    second = space.variables[1]
+    assert described == {
+        "name": second.name,
+        "unit": second.unit,
+        "low": second.low,
+        "high": second.high,
+        "kind": second.kind,
+    }
+    assert columns["iteration"].tolist() == [row.iteration for row in rows]
+    assert columns["particle"].tolist() == [row.particle for row in rows]
+    expected = np.array([row.fitness for row in rows], dtype=np.float32)
+    expected[np.isinf(expected)] = np.nan
+    np.testing.assert_array_equal(columns["fitness"], expected)
+    np.testing.assert_array_equal(
+        columns[second.name], np.array([row.design[1] for row in rows], dtype=np.float32)
+    )
+    bias, exponent = PREFERENCES["A"].bias, PREFERENCES["A"].exponent
+    utility = math.prod((b + 11.0) ** e for b, e in zip(bias, exponent, strict=True))
+    assert columns["utility:normal-fast"][1] == np.float32(utility)
+    assert np.isnan(columns["utility:turn-right-fast"][0])
+
+
+def test_particles_after_an_iteration_are_the_later_ones(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    assert particles(client, job)[0]["iterations"] is None
+    commit(job, 3)
+    header, columns = particles(client, job, after_iteration=0)
+    assert (header["rows"], header["total"], header["iterations"]) == (8, 8, [1, 2])
+    assert set(columns["iteration"]) == {1, 2}
+
+
+def test_too_many_particles_are_thinned_and_the_best_is_kept(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    commit(job, 3)
+    header, columns = particles(client, job, max_points=6)
+    assert (header["rows"], header["total"]) == (5, 12)
+    assert np.nanmin(columns["fitness"]) == 99.0
+
+
+def test_a_ranking_by_another_preference_lists_both_places(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    commit(job, 3)
+    found = ranking(client, job, preference="B", top=3)
+    assert (found["preference"], found["evaluations"]) == ("B", 12)
+    # The store's fitnesses are made up; objectives grow with the particle's number.
+    assert [(d["rank"], d["iteration"], d["particle"]) for d in found["top"]] == [
+        *((1, 0, 1), (2, 1, 1), (3, 2, 1))
+    ]
+    assert [d["rank_before"] for d in found["top"]] == [4, 2, 1]
+    first = found["top"][0]
+    assert first["fitness_before"] == 101.0
+    bias, exponent = PREFERENCES["B"].bias, PREFERENCES["B"].exponent
+    expected = math.prod((b + 11.0) ** e for b, e in zip(bias, exponent, strict=True))
+    assert first["fitness"] == pytest.approx(expected, rel=1e-12)
+    walk = first["scenarios"]["normal-fast"]
+    assert walk["utility"] == pytest.approx(expected, rel=1e-12)
+    assert walk["objectives"]["energy"] == 11.0
+    assert list(first["design"]) == list(job.spec.design_space().names)
+    assert found["fitness_of_present_best"] == pytest.approx(expected, rel=1e-12)
+    assert [entry["index"] for entry in found["best_so_far"]] == [0, 1, 2]
+    assert -1.0 <= found["correlation"] <= 1.0
+
+
+def test_a_preference_of_ones_own_is_taken_and_given_back(
+    client: httpx2.Client, job: Job, commit
+) -> None:
+    commit(job, 1)
+    own = {"bias": [0.0] * 5, "exponent": [1.0, 0.0, 0.0, 0.0, 0.0]}
+    found = ranking(client, job, preference=own)
+    assert found["preference"] == own
+    assert found["top"][0]["fitness"] == pytest.approx(11.0)
+    assert len(found["top"]) == 3
+
+
+def test_a_job_that_has_committed_nothing_has_an_empty_ranking(
+    client: httpx2.Client, job: Job
+) -> None:
+    found = ranking(client, job, preference="A")
+    assert (found["top"], found["best_so_far"], found["evaluations"]) == ([], [], 0)
+    assert found["correlation"] is found["fitness_of_present_best"] is None
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"preference": "D"}, "preference"),
+        ({"preference": {"bias": [0] * 5, "exponent": [0] * 5}}, "preference"),
+        ({"preference": "A", "top": 0}, "top"),
+        ({}, "preference"),
+    ],
+)
+def test_a_ranking_that_makes_no_sense_is_refused(
+    client: httpx2.Client, job: Job, body: Any, field: str
+) -> None:
+    answer = client.post(f"/v1/jobs/{job.id}/ranking", json=body)
+    assert answer.status_code == 422
+    assert any(error["field"].startswith(field) for error in answer.json()["errors"])
+
+
+def test_a_job_without_a_preference_cannot_be_ranked(
+    client: httpx2.Client, store: SqlStore, identification: Job
+) -> None:
+    answer = client.post(f"/v1/jobs/{identification.id}/ranking", json={"preference": "A"})
+    assert answer.status_code == 422
+    assert "tunes a drive" in answer.json()["detail"]
+
+
+def test_particles_of_an_identification_have_currents_as_utility(
+    client: httpx2.Client, identification: Job
+) -> None:
+    header, columns = particles(client, identification)
+    assert header["rows"] == 0
+    assert [c["unit"] for c in header["columns"] if c["kind"] == "utility"] == ["A"]
+    assert list(columns)[2] == "fitness"
+
+
+@pytest.mark.parametrize("what", ["distribution", "particles"])
+def test_an_unknown_job_has_nothing_to_look_at(client: httpx2.Client, what: str) -> None:
+    assert client.get(f"/v1/jobs/bcdfghjkmnpq/{what}").status_code == 404
+
+
+@pytest.fixture
+def identification(store: SqlStore) -> Job:
+    spec = IdentificationSpec(
+        kind="identification", recordings=("0" * 32,), variables=("battery_voltage",)
+    )
+    return store.create_job(spec)[0]

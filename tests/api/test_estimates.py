@@ -1,0 +1,53 @@
+"""What a job would cost, over HTTP."""
+
+from __future__ import annotations
+
+import httpx2
+import pytest
+
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.store.sql_store import SqlStore
+
+pytestmark = pytest.mark.slow
+
+SHORT = {"name": "short", "cycle_time": 0.6, "radius": 0.16, "withers": 0.15, "cycles": 1.0}
+
+
+def test_an_estimate_counts_walks_and_stores_nothing(
+    client: httpx2.Client, store: SqlStore
+) -> None:
+    spec = {"scenarios": [SHORT], "optimizer": {"particles": 3}, "iterations": 2}
+    answer = client.post("/v1/estimates", json=spec)
+    assert answer.status_code == 200
+    found = answer.json()
+    assert (found["evaluations"], found["walks"]) == (6, 6)
+    assert found["simulated_seconds"] == pytest.approx(3.6)
+    assert found["seconds"] > 0.0
+    assert "measured" in found["basis"]
+    assert store.jobs().items == ()
+
+
+def test_earlier_jobs_tell_the_rate(client: httpx2.Client, job, commit, spec: JobSpec) -> None:
+    commit(job, 2)
+    found = client.post("/v1/estimates", json=spec.model_dump(mode="json")).json()
+    # Two iterations took a second together, and the same job has three.
+    assert found["seconds"] == pytest.approx(1.5)
+    assert "1 earlier job" in found["basis"]
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"iterations": 0}, "iterations"),
+        ({"variables": [{"name": "I", "low": -5.0, "high": -1.0}], "fixed": {}}, "variables"),
+        ({"scenarios": [{**SHORT, "withers": 0.5}]}, "scenarios.0"),
+    ],
+)
+def test_a_job_that_cannot_be_submitted_cannot_be_estimated(
+    client: httpx2.Client, change: dict[str, object], field: str
+) -> None:
+    answers = [client.post(path, json=change) for path in ("/v1/estimates", "/v1/jobs")]
+    assert [answer.status_code for answer in answers] == [422, 422]
+    problems = [answer.json() for answer in answers]
+    assert problems[0]["errors"] == problems[1]["errors"]
+    assert problems[0]["errors"][0]["field"].startswith(field.partition(".")[0])

@@ -1,0 +1,104 @@
+"""The error that a fit minimizes, and walks as they are recorded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from sim.controllers import CONTROLLERS
+from sim.errors import SimulationInputError
+from sim.identification.current_fit import CurrentFit, motor_currents
+from sim.identification.parameters import nominal_values, with_parameters
+from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.walk import Coding
+from sim.outcome import Status
+from sim.robot import RobotVariant, load_robot
+from sim.simulate import control_steps, course_of, kernel_of, simulate
+from tests.identification.conftest import DESIGN, SCENARIO, TRUTH, Twin
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "source", ["szabadka2", RobotVariant(gearlash=(2.5, 1.0, 1.0))], ids=["rigid", "gearlash"]
+)
+def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
+    robot = load_robot(source)
+    kernel, (substeps, timestep) = kernel_of(robot), control_steps(robot)
+    course = course_of(robot, kernel, SCENARIO, timestep)
+    assert course is not None
+    setup = course(CONTROLLERS["fuzzy-pi"].compile(DESIGN))
+    (result,) = kernel.walk([setup], Coding.of(robot, substeps), log=True)
+    values = np.array([list(DESIGN.values())])
+    (log,) = simulate(SCENARIO, "fuzzy-pi", list(DESIGN), values, robot=robot, log=True).logs
+    assert result.states is not None and log is not None
+    np.testing.assert_allclose(motor_currents(robot, result.states), log.current, atol=1e-10)
+
+
+def test_the_truth_leaves_nothing_but_the_instruments_errors(twin: Twin) -> None:
+    fit = CurrentFit("a walk", "szabadka2", twin.recording, tuple(TRUTH))
+    nominal = nominal_values(twin.robot) | {"body_mass": 3.2}
+    designs = np.array([list(TRUTH.values()), [nominal[name] for name in TRUTH]])
+    outcome = fit.run(designs)
+    assert outcome.statuses.tolist() == [Status.OK, Status.OK]
+    # Noise of 0.02 A has a mean size of 0.016 A; absolute values near zero take some of it away.
+    assert (outcome.objectives[0] < 0.017).all()
+    assert outcome.objectives[1].mean() > 1.5 * outcome.objectives[0].mean()
+
+
+def test_every_link_has_its_own_error(twin: Twin) -> None:
+    fit = CurrentFit("a walk", "szabadka2", twin.recording, ("efficiency_left_front_coxa",))
+    worse, described = fit.run(np.array([[0.98], [0.6]])).objectives
+    assert worse[0] != pytest.approx(described[0], rel=0.01)
+    assert worse[2] == pytest.approx(described[2], rel=0.2)
+
+
+def test_desired_angles_are_those_of_the_described_robot(twin: Twin) -> None:
+    long_soles = {f"sole_{leg.name}": 0.016 for leg in twin.robot.legs}
+    values = np.array([list(DESIGN.values())])
+    changed = with_parameters(twin.robot, long_soles)
+    arguments = (SCENARIO, "fuzzy-pi", list(DESIGN), values)
+    (own,) = simulate(*arguments, robot=changed, log=True).logs
+    (planned,) = simulate(*arguments, robot=changed, planner=twin.robot, log=True).logs
+    (described,) = simulate(*arguments, log=True).logs
+    assert own is not None and planned is not None and described is not None
+    np.testing.assert_array_equal(planned.desired_angle, described.desired_angle)
+    assert not np.array_equal(own.desired_angle, described.desired_angle)
+
+
+def test_a_recording_begins_where_the_logs_whole_cycles_do(twin: Twin) -> None:
+    # The log starts 0.124 s before the walk; its last two whole cycles are all of the walk.
+    assert twin.recording.first_tick == 0
+    assert len(twin.recording.current) == 1000
+    assert twin.recording.synthetic
+
+
+def test_a_design_that_does_not_walk_to_the_end_has_failed(twin: Twin) -> None:
+    soft = tuple(f"stiffness_{leg.name}" for leg in twin.robot.legs)
+    fit = CurrentFit("a walk", "szabadka2", twin.recording, soft)
+    outcome = fit.run(np.array([[1.0] * 6, [10_000.0] * 6]))
+    assert outcome.statuses.tolist() == [Status.FELL, Status.OK]
+    assert np.isnan(outcome.objectives[0]).all()
+
+
+def test_a_recording_of_other_joints_is_refused(twin: Twin) -> None:
+    other = twin.recording.model_copy(update={"joints": twin.recording.joints[::-1]})
+    with pytest.raises(SimulationInputError, match="a walk: recorded on other joints"):
+        CurrentFit("a walk", "szabadka2", other, ("body_mass",)).run(np.array([[4.0]]))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"current": [[0.1] * 17]}, "current.0: 17 numbers for 18 joints"),
+        ({"current": [[-0.1] * 18]}, "greater than or equal to 0"),
+        ({"design": {"I": 0.1}}, "design: .*FI1R.* missing"),
+        ({"first_tick": 10}, "behind the walk's end after 2 s"),
+    ],
+)
+def test_a_recording_that_makes_no_sense_is_refused(
+    twin: Twin, change: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ValidationError, match=message):
+        RecordedWalk.model_validate(twin.recording.model_dump() | change)

@@ -1,0 +1,142 @@
+"""Identification by the machinery of every job: queue, swarm, store, resume."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from services.optimizer.errors import Conflict, InvalidRequest
+from services.optimizer.identification_spec import IdentificationSpec
+from services.optimizer.job import JobState
+from services.optimizer.judgement import Judgement
+from services.optimizer.optimizers.pso import PsoSettings
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore, open_store
+from services.runtime import open_evaluator, run_embedded
+from tests.identification.conftest import TRUTH, Twin
+
+VARIABLES = ("battery_voltage", "body_mass", "efficiency_right_front_coxa")
+
+
+def spec(recording: str, **changes: object) -> IdentificationSpec:
+    document: dict[str, object] = {
+        "kind": "identification",
+        "recordings": (recording,),
+        "variables": VARIABLES,
+        "fixed": {"stiffness_left_rear": TRUTH["stiffness_left_rear"]},
+        "optimizer": PsoSettings(particles=16, inertia_end=0.3),
+        "iterations": 14,
+    }
+    return IdentificationSpec.model_validate(document | changes)
+
+
+def judged(links: tuple[int, ...], objectives: np.ndarray) -> Judgement:
+    only = IdentificationSpec.model_validate(
+        {"kind": "identification", "recordings": ["0" * 32, "1" * 32], "links": links}
+    )
+    return only.judge(objectives, np.isnan(objectives).any(axis=2))
+
+
+def test_fitness_is_the_mean_error_over_walks_and_chosen_links() -> None:
+    # Two designs, two walks, three links; the second design fails in one walk.
+    errors = np.array([[[1.0, 2.0, 3.0], [3.0, 4.0, 8.0]], [[1.0, 1.0, 1.0], [np.nan] * 3]])
+    everything, second_link = judged((1, 2, 3), errors), judged((2,), errors)
+    assert everything.fitness.tolist() == [3.5, np.inf]
+    np.testing.assert_allclose(everything.utilities[0], [2.0, 5.0])
+    assert second_link.fitness.tolist() == [3.0, np.inf]
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> SqlStore:
+    return open_store(str(tmp_path / "jobs.db"))
+
+
+def finished(store: SqlStore, wanted: IdentificationSpec) -> str:
+    job, _ = JobService(store).submit(wanted)
+    evaluator = open_evaluator("in-process", cpus=2)
+    try:
+        assert run_embedded(store, evaluator, job.id).state is JobState.SUCCEEDED
+    finally:
+        evaluator.close()
+    return job.id
+
+
+@pytest.mark.slow
+def test_it_recovers_the_twins_battery_mass_and_efficiency(store: SqlStore, twin: Twin) -> None:
+    job_id = finished(store, spec(store.add_recording(twin.recording)))
+    best = store.best(job_id)
+    assert best is not None
+    found = dict(zip(VARIABLES, best.design.tolist(), strict=False))
+    assert found["battery_voltage"] == pytest.approx(TRUTH["battery_voltage"], abs=0.25)
+    assert found["body_mass"] == pytest.approx(TRUTH["body_mass"], abs=0.2)
+    assert found["efficiency_right_front_coxa"] == pytest.approx(0.42, abs=0.07)
+
+
+@pytest.mark.slow
+def test_a_job_stopped_half_way_ends_with_the_same_bits(store: SqlStore, twin: Twin) -> None:
+    brief = {"iterations": 4, "optimizer": PsoSettings(particles=5)}
+    wanted = spec(store.add_recording(twin.recording), **brief)
+    whole = finished(store, wanted)
+    job, _ = JobService(store).submit(wanted)
+    stop = threading.Event()
+    evaluator = open_evaluator("in-process", cpus=1)
+    try:
+        run_embedded(store, evaluator, job.id, stop=stop, on_commit=lambda *_: stop.set())
+        assert store.job(job.id).progress.iterations < 4
+        run_embedded(store, evaluator, job.id)
+    finally:
+        evaluator.close()
+    pairs = zip(
+        store.evaluations_between(whole, 0, 4), store.evaluations_between(job.id, 0, 4), strict=True
+    )
+    for one, other in pairs:
+        assert one.design.tobytes() == other.design.tobytes()
+        assert one.objectives.tobytes() == other.objectives.tobytes()
+        assert one.fitness == other.fitness
+
+
+@pytest.mark.slow
+def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: SqlStore, twin: Twin) -> None:
+    recording, service = store.add_recording(twin.recording), JobService(store)
+    brief = {"iterations": 3, "optimizer": PsoSettings(particles=6)}
+    jobs = [
+        store.job(finished(store, spec(recording, seed=seed, name=f"run {seed}", **brief)))
+        for seed in (1, 2)
+    ]
+    found = service.convergence(jobs)
+    assert [p.variable.name for p in found.parameters] == list(VARIABLES)
+    assert found.fitness == tuple(job.progress.best_fitness for job in jobs)
+    assert all(p.trust is not None and len(p.intervals) == 12 for p in found.parameters)
+    assert service.convergence(jobs[:1]).parameters[0].trust is None
+
+
+def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin) -> None:
+    recording, service = store.add_recording(twin.recording), JobService(store)
+    first, _ = service.submit(spec(recording))
+    other, _ = service.submit(spec(recording, links=(1,)))
+    with pytest.raises(InvalidRequest, match="another problem") as refused:
+        service.convergence([first, other])
+    assert refused.value.field == "also"
+    with pytest.raises(Conflict, match="no design yet"):
+        service.convergence([first])
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (
+            {"variables": [{"name": "efficiency_left_rear_tibia", "low": 0.5, "high": 1.5}]},
+            "variables",
+        ),
+        ({"fixed": {"battery_voltage": -3.0}, "variables": ["body_mass"]}, "fixed"),
+    ],
+)
+def test_bounds_that_no_robot_has_are_refused(
+    store: SqlStore, twin: Twin, change: dict[str, object], field: str
+) -> None:
+    with pytest.raises(InvalidRequest) as refused:
+        JobService(store).submit(spec(store.add_recording(twin.recording), **change))
+    assert refused.value.field == field

@@ -1,0 +1,123 @@
+"""The 45 parameters of table 2.7: which there are, and that each changes what it names alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.errors import SimulationInputError
+from sim.identification.parameters import (
+    identifiable_variables,
+    nominal_values,
+    with_parameters,
+)
+from sim.kernel.native import native_kernel
+from sim.kernel.parameters import Layout, body_of, pack_parameters
+from sim.robot import RobotFiles, load_robot
+from sim.robot.robot import Robot
+from sim.scenario import SCENARIOS
+
+QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
+
+
+def packed(robot: Robot) -> np.ndarray:
+    kernel = native_kernel(load_robot("szabadka2"))
+    assert kernel is not None
+    return pack_parameters(robot, body_of(robot, kernel.body), SCENARIOS[0], 2e-4)
+
+
+def test_the_hexapod_has_the_45_of_the_thesis() -> None:
+    names = [variable.name for variable in identifiable_variables(load_robot("szabadka2"))]
+    assert len(names) == len(set(names)) == 45
+    counts = {
+        kind: sum(name.startswith(f"{kind}_") for name in names)
+        for kind in ("battery", "efficiency", "stiffness", "damping", "sole", "friction")
+    }
+    assert counts == {
+        "battery": 2,
+        "efficiency": 18,
+        "stiffness": 6,
+        "damping": 6,
+        "sole": 6,
+        "friction": 6,
+    }
+
+
+def test_a_robot_of_ones_own_has_those_of_its_own_legs() -> None:
+    files = RobotFiles(
+        toml=(QUADRUPED / "robot.toml").read_text(), urdf=(QUADRUPED / "robot.urdf").read_text()
+    )
+    robot = load_robot(files)
+    names = [variable.name for variable in identifiable_variables(robot)]
+    assert len(names) == 3 + 3 * 4 + 4 * 4
+    changed = with_parameters(robot, {names[-1]: 0.33})
+    assert changed.contacts()[-1].friction == 0.33
+    assert changed.contacts()[0] == robot.contacts()[0]
+
+
+def test_every_described_value_lies_within_the_bounds_of_the_search() -> None:
+    robot = load_robot("szabadka2")
+    described = nominal_values(robot)
+    for variable in identifiable_variables(robot):
+        if variable.name in described:
+            assert variable.low <= described[variable.name] <= variable.high
+
+
+def test_described_values_change_nothing() -> None:
+    robot = load_robot("szabadka2")
+    np.testing.assert_array_equal(
+        packed(with_parameters(robot, nominal_values(robot))), packed(robot)
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "field", "index"),
+    [
+        ("battery_voltage", 9.5, "supply_voltage", 0),
+        ("battery_resistance", 0.1, "supply_resistance", 0),
+        ("body_mass", 4.4, "base_mass", 0),
+        ("stiffness_left_rear", 4321.0, "stiffness", 5),
+        ("damping_right_front", 77.0, "damping", 0),
+        ("sole_left_front", 0.005, "sole", 1),
+        ("friction_right_middle", 0.7, "friction", 2),
+    ],
+)
+def test_each_reaches_the_kernels_own_input(
+    name: str, value: float, field: str, index: int
+) -> None:
+    robot = load_robot("szabadka2")
+    before, after = packed(robot), packed(with_parameters(robot, {name: value}))
+    where = Layout(robot).slices[field].start + index
+    assert after[where] == value
+    touched = np.flatnonzero(before != after)
+    # A body of another mass has another inertia too.
+    allowed = {"base_mass", "base_moment", "base_inertia"} if name == "body_mass" else {field}
+    spans = [Layout(robot).slices[f] for f in allowed]
+    assert all(any(s.start <= i < s.stop for s in spans) for i in touched)
+    if name != "body_mass":
+        assert touched.tolist() == [where]
+
+
+def test_efficiency_is_the_named_gearheads_friction_alone() -> None:
+    robot = load_robot("szabadka2")
+    joint = robot.joint_names.index("left_front_femur")
+    lossless = with_parameters(robot, {"efficiency_left_front_femur": 1.0})
+    before, after = robot.drives().viscous, lossless.drives().viscous
+    assert np.flatnonzero(before != after).tolist() == [joint]
+    assert after[joint] == robot.drives().motor_friction[joint]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("efficiency_left_front_femur", 1.2),
+        ("battery_voltage", -1.0),
+        ("body_mass", 0.0),
+        ("stiffness_left_rear", 0.0),
+    ],
+)
+def test_a_value_that_no_robot_has_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(SimulationInputError, match=f"^{name}: "):
+        with_parameters(load_robot("szabadka2"), {name: value})

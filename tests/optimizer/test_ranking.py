@@ -1,0 +1,131 @@
+"""What if another preference had judged: the same arithmetic as the job's own, only faster."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import spearmanr
+
+from services.optimizer.fast_preference import fitness_of, log_utilities, utilities
+from services.optimizer.job_spec import JobSpec
+from services.optimizer.preference import PREFERENCES, Preference, judge
+from services.optimizer.ranking import best_so_far, rank
+from sim.outcome import Status
+from tests.optimizer.columns import columns_of, fitness_only
+
+objective = st.one_of(
+    st.floats(-1.0, 1e6), st.sampled_from([0.0, -0.9, math.nan, math.inf, 1e-300, 5e-324])
+)
+preference = st.builds(
+    Preference,
+    bias=st.tuples(*[st.floats(0.0, 1e6)] * 5),
+    exponent=st.tuples(*[st.one_of(st.just(0.0), st.floats(0.01, 10.0))] * 5).filter(any),
+)
+
+
+@given(
+    rows=st.lists(st.tuples(*[objective] * 12), min_size=1, max_size=8),
+    statuses=st.lists(st.sampled_from([Status.OK, Status.OK, Status.FELL]), min_size=16),
+    weights=preference,
+)
+def test_it_agrees_with_the_jobs_own_arithmetic(
+    rows: list[tuple[float, ...]], statuses: list[Status], weights: Preference
+) -> None:
+    objectives = np.array(rows).reshape(-1, 2, 6)
+    ended = np.array(statuses[: 2 * len(rows)], dtype=np.uint8).reshape(-1, 2)
+    columns = columns_of(objectives, ended)
+
+    exact = judge(objectives, ended != Status.OK, weights)
+    fast = log_utilities(columns, weights)
+
+    np.testing.assert_allclose(fast, exact.log_utilities, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(fitness_of(fast), exact.fitness, rtol=1e-12)
+
+
+def test_more_rows_than_a_block_are_all_judged() -> None:
+    objectives = np.random.default_rng(1).uniform(0.1, 50.0, (9001, 3, 6))
+    columns = columns_of(objectives)
+    exact = judge(objectives, columns.failed, PREFERENCES["B"])
+    fast = log_utilities(columns, PREFERENCES["B"])
+    np.testing.assert_allclose(fitness_of(fast), exact.fitness, rtol=1e-12)
+
+
+def test_utilities_are_by_the_jobs_own_preference() -> None:
+    spec = JobSpec(scenarios=("1", "2"), preference="B")
+    columns = columns_of(np.random.default_rng(2).uniform(0.1, 50.0, (5, 2, 6)))
+    exact = spec.judge(columns.objectives, columns.failed).utilities
+    np.testing.assert_allclose(utilities(columns, spec), exact, rtol=1e-12)
+
+
+def two_objectives(*pairs: tuple[float, float]) -> np.ndarray:
+    """One scenario: torque and energy, all others one."""
+    return np.array([[[torque, 1.0, 1.0, energy, 1.0, 0.0]] for torque, energy in pairs])
+
+
+TORQUE = Preference(bias=(0.0,) * 5, exponent=(1.0, 0.0, 0.0, 0.0, 0.0))
+ENERGY = Preference(bias=(0.0,) * 5, exponent=(0.0, 0.0, 0.0, 1.0, 0.0))
+
+
+def test_another_preference_puts_other_designs_first() -> None:
+    columns = columns_of(two_objectives((1, 9), (2, 8), (3, 7)), preference=TORQUE)
+    ranking = rank(columns, ENERGY, top=2)
+    assert [(d.row, d.rank, d.rank_before) for d in ranking.top] == [(2, 1, 3), (1, 2, 2)]
+    assert [d.fitness for d in ranking.top] == pytest.approx([7.0, 8.0])
+    assert ranking.present_best == pytest.approx(9.0)
+    assert ranking.correlation == pytest.approx(-1.0)
+
+
+def test_the_jobs_own_preference_changes_nothing() -> None:
+    columns = columns_of(two_objectives((3, 1), (1, 2), (2, 9)), preference=TORQUE)
+    ranking = rank(columns, TORQUE, top=3)
+    assert [d.rank_before for d in ranking.top] == [1, 2, 3]
+    assert ranking.correlation == pytest.approx(1.0)
+    assert ranking.present_best == ranking.top[0].fitness
+
+
+def test_of_equal_designs_the_earliest_is_first() -> None:
+    ranking = rank(columns_of(two_objectives((1, 5), (2, 5), (3, 4))), ENERGY, top=3)
+    assert [d.row for d in ranking.top] == [2, 0, 1]
+
+
+def test_a_design_that_failed_has_no_rank() -> None:
+    fell = np.array([[Status.FELL], [Status.OK]], dtype=np.uint8)
+    columns = columns_of(two_objectives((1, 1), (2, 2)), fell, preference=TORQUE)
+    ranking = rank(columns, ENERGY, top=5)
+    assert [d.row for d in ranking.top] == [1]
+    assert ranking.correlation is None
+
+
+def test_a_design_without_a_weighted_objective_ranks_only_without_it() -> None:
+    columns = columns_of(two_objectives((1, math.nan), (2, 2)), preference=ENERGY)
+    first = rank(columns, TORQUE, top=5).top[0]
+    assert (first.row, first.rank_before) == (0, None)
+
+
+def test_without_any_evaluation_there_is_no_ranking() -> None:
+    ranking = rank(columns_of(np.empty((0, 2, 6))), TORQUE, top=5)
+    assert (ranking.top, ranking.present_best, ranking.correlation) == ((), None, None)
+    assert len(ranking.best_so_far) == 0
+
+
+def test_the_best_so_far_is_by_iteration_and_never_rises() -> None:
+    columns = fitness_only((math.inf, math.inf), (5.0, 4.0), (6.0, 7.0), (3.0, math.inf))
+    found = best_so_far(columns.iteration, columns.fitness)
+    assert found.tolist() == [math.inf, 4.0, 4.0, 3.0]
+
+
+def test_the_correlation_is_spearmans_with_shared_ranks() -> None:
+    generator = np.random.default_rng(3)
+    pairs = generator.integers(1, 9, (200, 2)).astype(float)
+    columns = columns_of(two_objectives(*map(tuple, pairs)), preference=TORQUE)
+    expected = spearmanr(pairs[:, 0], pairs[:, 1]).statistic
+    assert rank(columns, ENERGY, top=1).correlation == pytest.approx(expected, abs=1e-12)
+
+
+def test_designs_that_are_all_equal_have_no_correlation() -> None:
+    columns = columns_of(two_objectives((1, 1), (1, 1)), preference=TORQUE)
+    assert rank(columns, ENERGY, top=1).correlation is None

@@ -1,0 +1,174 @@
+"""Evaluations as columns, and the cache that holds them: the same bits as row by row."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from services.optimizer.errors import Conflict, NotFound
+from services.optimizer.evaluation_columns import EvaluationColumns
+from services.optimizer.history_cache import HistoryCache
+from services.optimizer.job import Claim, CompletedIteration
+from services.optimizer.store.sql_store import SqlStore
+from sim.outcome import Outcome, Status
+from tests.store.examples import LEASE, ask, begun, completed, spec
+from tests.store.test_bits import anything, column, finite, many
+
+INF = math.inf
+
+
+def go_on(store: SqlStore, claim: Claim, *fitness: tuple[float, ...]) -> None:
+    """Commit one more iteration for every swarm's fitness."""
+    start = store.job(claim.job.id).progress.iterations
+    for index, values in enumerate(fitness, start):
+        store.commit(claim, completed(index, values), ask(index + 1))
+
+
+def assert_as_row_by_row(store: SqlStore, job_id: str, columns: EvaluationColumns) -> None:
+    rows = store.evaluations_between(job_id, 0, 1000)
+    assert len(columns) == len(rows)
+    assert columns.iteration.tolist() == [row.iteration for row in rows]
+    assert columns.particle.tolist() == [row.particle for row in rows]
+    for name in ("designs", "objectives", "statuses"):
+        one = {"designs": "design"}.get(name, name)
+        expected = np.stack([getattr(row, one) for row in rows])
+        found: NDArray[np.generic] = getattr(columns, name)
+        assert found.dtype == expected.dtype and found.tobytes() == expected.tobytes()
+    assert columns.fitness.tolist() == [row.fitness for row in rows]
+
+
+def test_columns_hold_what_the_rows_hold(store: SqlStore) -> None:
+    claim = begun(store)
+    go_on(store, claim, (4.0, INF), (INF, INF), (2.0, 3.0))
+    columns = store.evaluation_columns(claim.job.id, 0, 3)
+    assert columns is not None
+    assert columns.objectives.shape == (6, 2, 6)
+    assert columns.statuses[1].tolist() == [Status.OK, Status.FELL]
+    assert_as_row_by_row(store, claim.job.id, columns)
+
+
+def test_only_committed_iterations_have_columns(store: SqlStore) -> None:
+    claim = begun(store)
+    assert store.evaluation_columns(claim.job.id, 0, 10) is None
+    go_on(store, claim, (4.0, 3.0), (2.0, 1.0))
+    some = store.evaluation_columns(claim.job.id, 1, 2**70)
+    assert some is not None and some.iteration.tolist() == [1, 1]
+    with pytest.raises(NotFound):
+        store.evaluation_columns("bcdfghjkmnpq", 0, 1)
+
+
+@many
+@given(
+    designs=st.lists(finite, min_size=2, max_size=2),
+    objectives=st.lists(anything, min_size=12, max_size=12),
+)
+def test_every_bit_of_a_number_comes_back(
+    store: SqlStore, designs: list[float], objectives: list[float]
+) -> None:
+    job, _ = store.create_job(spec(particles=1))
+    claim = store.claim("a", lease_seconds=LEASE, job_id=job.id)
+    assert claim is not None
+    store.begin(claim, ask(0, particles=1))
+    ok = np.full(1, Status.OK, dtype=np.uint8)
+    outcomes = tuple(Outcome(column(objectives[k : k + 6], 1, 6), ok) for k in (0, 6))
+    done = CompletedIteration(0, column(designs, 1, 2), outcomes, np.array([1.0]), 0.5)
+    store.commit(claim, done, None)
+    columns = store.evaluation_columns(job.id, 0, 1)
+    assert columns is not None
+    # What is not finite is stored as null.
+    expected = [x if math.isfinite(x) else math.nan for x in objectives]
+    assert columns.designs.tobytes() == column(designs, 1, 2).tobytes()
+    assert columns.objectives.tobytes() == column(expected, 1, 2, 6).tobytes()
+
+
+def test_the_cache_reads_on_where_it_stopped(store: SqlStore) -> None:
+    claim = begun(store)
+    cache = HistoryCache(store)
+    job = store.job(claim.job.id)
+    nothing = cache.columns(job)
+    assert len(nothing) == 0 and nothing.objectives.shape == (0, 2, 6)
+    for _ in range(4):
+        go_on(store, claim, (4.0, INF), (2.0, 3.0))
+        job = store.job(claim.job.id)
+        earlier, known = nothing.fitness.tolist(), len(nothing)
+        columns = cache.columns(job)
+        assert_as_row_by_row(store, job.id, columns)
+        # What was handed out before is neither changed nor moved.
+        assert nothing.fitness.tolist() == earlier == columns.fitness[:known].tolist()
+        nothing = columns
+
+
+def test_what_was_read_is_not_read_again(store: SqlStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    claim = begun(store)
+    go_on(store, claim, (4.0, 3.0), (2.0, 1.0))
+    cache = HistoryCache(store)
+    first = cache.columns(store.job(claim.job.id))
+    asked: list[tuple[int, int]] = []
+    read = SqlStore.evaluation_columns
+
+    def counted(self: SqlStore, job_id: str, first: int, last: int) -> EvaluationColumns | None:
+        asked.append((first, last))
+        return read(self, job_id, first, last)
+
+    monkeypatch.setattr(SqlStore, "evaluation_columns", counted)
+    again = cache.columns(store.job(claim.job.id))
+    assert asked == [] and np.shares_memory(again.objectives, first.objectives)
+    go_on(store, claim, (5.0, 6.0))
+    cache.columns(store.job(claim.job.id))
+    assert asked == [(2, 3)]
+
+
+def test_columns_cannot_be_written_to(store: SqlStore) -> None:
+    claim = begun(store)
+    go_on(store, claim, (4.0, 3.0))
+    columns = HistoryCache(store).columns(store.job(claim.job.id))
+    with pytest.raises(ValueError, match="read-only"):
+        columns.fitness[0] = 0.0
+
+
+def test_the_job_asked_about_longest_ago_is_dropped_first(store: SqlStore) -> None:
+    jobs = []
+    for _ in range(3):
+        claim = begun(store)
+        go_on(store, claim, (4.0, 3.0), (2.0, 1.0))
+        jobs.append(store.job(claim.job.id))
+    whole = HistoryCache(store)
+    whole.columns(jobs[0])
+    size = whole.nbytes
+
+    cache = HistoryCache(store, max_bytes=2 * size)
+    first, second = cache.columns(jobs[0]), cache.columns(jobs[1])
+    cache.columns(jobs[0])
+    cache.columns(jobs[2])
+    assert cache.nbytes <= 2 * size
+    assert np.shares_memory(cache.columns(jobs[0]).fitness, first.fitness)
+    assert not np.shares_memory(cache.columns(jobs[1]).fitness, second.fitness)
+
+
+def test_a_job_that_is_too_large_is_refused_with_the_way_out(store: SqlStore) -> None:
+    claim = begun(store)
+    go_on(store, claim, (4.0, 3.0))
+    with pytest.raises(Conflict, match="export"):
+        HistoryCache(store, max_bytes=100).columns(store.job(claim.job.id))
+
+
+def test_many_threads_read_the_same_history(store: SqlStore) -> None:
+    claim = begun(store)
+    go_on(store, claim, *[(4.0, INF)] * 30)
+    job = store.job(claim.job.id)
+    cache = HistoryCache(store)
+    found: list[EvaluationColumns] = []
+    threads = [threading.Thread(target=lambda: found.append(cache.columns(job))) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 8
+    for columns in found:
+        assert_as_row_by_row(store, job.id, columns)

@@ -1,0 +1,100 @@
+"""Jobs that get another budget, as they are stored."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import text
+
+from services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, NotFound
+from services.optimizer.job import Command, JobState
+from services.optimizer.store import migrate
+from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
+from tests.store.test_job_states import in_state
+
+
+@pytest.mark.parametrize("state", [s for s in JobState if s is not JobState.CANCELLED])
+def test_the_store_keeps_the_budget_and_the_state_that_follows(
+    store: SqlStore, state: JobState
+) -> None:
+    job_id = in_state(store, state)
+    before = store.job(job_id)
+    after = store.extend(job_id, 40)
+    assert after == store.job(job_id)
+    assert after.spec == before.spec.model_copy(update={"iterations": 40})
+    assert after.state is (JobState.QUEUED if state is JobState.SUCCEEDED else state)
+    assert after.progress == before.progress
+
+
+def test_a_refused_extension_changes_nothing(store: SqlStore) -> None:
+    cancelled, succeeded = (in_state(store, s) for s in (JobState.CANCELLED, JobState.SUCCEEDED))
+    before = store.job(cancelled), store.job(succeeded)
+    with pytest.raises(Conflict):
+        store.extend(cancelled, 40)
+    with pytest.raises(InvalidRequest, match="iterations"):
+        store.extend(succeeded, 1)
+    with pytest.raises(NotFound):
+        store.extend("bcdfghjkmnpq", 40)
+    assert (store.job(cancelled), store.job(succeeded)) == before
+
+
+def test_a_runner_under_an_older_budget_is_told_before_anything_is_stored(
+    store: SqlStore,
+) -> None:
+    claim = begun(store)
+    store.extend(claim.job.id, 40)
+    with pytest.raises(BudgetChanged):
+        store.commit(claim, completed(0), ask(1))
+    assert store.job(claim.job.id).progress.iterations == 0
+
+
+def test_who_claims_an_extended_job_gets_the_last_ask_with_its_fitness(
+    store: SqlStore, clock: Clock
+) -> None:
+    claim = begun(store)
+    store.commit(claim, completed(0, (4.0, math.inf)), None)
+    store.extend(claim.job.id, 40)
+    again = store.claim("runner-b", lease_seconds=LEASE)
+    assert again is not None and again.ask is None and again.answered is not None
+    assert again.answered.ask.iteration == 0
+    assert again.answered.ask.state == ask(0).state
+    np.testing.assert_array_equal(again.answered.ask.positions, ask(0).positions)
+    assert again.answered.fitness.tolist() == [4.0, math.inf]
+
+
+def test_the_same_key_still_means_the_job_as_it_was_submitted(store: SqlStore) -> None:
+    job, _ = store.create_job(spec(), idempotency_key="k1")
+    store.extend(job.id, 40)
+    again, new = store.create_job(spec(), idempotency_key="k1")
+    assert not new and again == store.job(job.id)
+    with pytest.raises(Conflict):
+        store.create_job(spec(iterations=40), idempotency_key="k1")
+
+
+def test_a_job_of_an_older_schema_has_the_budget_of_its_spec(fresh_url: str) -> None:
+    database = connect(parse_url(fresh_url), for_migration=True)
+    config = Config()
+    config.set_main_option("script_location", str(migrate._MIGRATIONS))
+    with database.transaction(write=True) as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0002")
+        connection.execute(
+            text(
+                "INSERT INTO jobs (id, state, spec, created_at, updated_at, lease_token,"
+                " iterations, evaluations, compute_seconds) VALUES ('bcdfghjkmnpq', 'queued',"
+                " :spec, '2030-01-01 00:00:00', '2030-01-01 00:00:00', 0, 0, 0, 0.0)"
+            ),
+            {"spec": spec(iterations=7).resolved().model_dump_json()},
+        )
+    database.close()
+    store = open_store(fresh_url)
+    job = store.command("bcdfghjkmnpq", Command.PAUSE)
+    assert (job.spec.iterations, job.state) == (7, JobState.PAUSED)
+    assert store.extend("bcdfghjkmnpq", 9).spec.iterations == 9
+    store.close()

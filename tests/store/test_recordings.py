@@ -1,0 +1,82 @@
+"""Recorded walks: kept once, never changed, handed to whoever claims a job that needs them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.identification_spec import IdentificationSpec
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
+from sim.controllers import CONTROLLERS
+from sim.identification.recorded_walk import RecordedWalk
+from sim.robot import load_robot
+from sim.scenario import Scenario
+
+SCENARIO = Scenario(name="brief", cycle_time=0.6, radius=0.16, withers=0.15, cycles=1.0)
+
+
+def recording(**changes: object) -> RecordedWalk:
+    rng = np.random.default_rng(1)
+    document = {
+        "scenario": SCENARIO,
+        "controller": "fuzzy-pi",
+        "design": dict(CONTROLLERS["fuzzy-pi"].published["A"]),
+        "first_tick": 20,
+        "joints": load_robot("szabadka2").joint_names,
+        "current": rng.uniform(0.0, 0.3, (10, 18)).tolist(),
+    }
+    return RecordedWalk.model_validate(document | changes)
+
+
+def spec(*recordings: str) -> IdentificationSpec:
+    return IdentificationSpec(
+        kind="identification", recordings=recordings, variables=("body_mass",), iterations=2
+    )
+
+
+def test_a_recording_comes_back_to_the_last_bit(store: SqlStore) -> None:
+    walk = recording()
+    name = store.add_recording(walk)
+    assert store.recordings([name])[name] == walk
+
+
+def test_the_same_walk_is_the_same_recording_and_another_is_another(store: SqlStore) -> None:
+    first = store.add_recording(recording())
+    assert store.add_recording(recording()) == first
+    assert store.add_recording(recording(first_tick=21)) != first
+
+
+def test_an_unknown_recording_is_not_found(store: SqlStore) -> None:
+    with pytest.raises(NotFound, match="there is no recording '0000"):
+        store.recordings(["0" * 32])
+
+
+def test_a_claim_brings_the_recordings_that_the_job_names(store: SqlStore) -> None:
+    wanted, other = store.add_recording(recording()), store.add_recording(recording(first_tick=21))
+    store.create_job(spec(wanted))
+    claim = store.claim("runner", lease_seconds=10.0)
+    assert claim is not None
+    assert dict(claim.recordings) == {wanted: recording()}
+    assert other not in claim.recordings
+
+
+def test_a_job_keeps_its_kind(store: SqlStore) -> None:
+    wanted = store.add_recording(recording())
+    job, _ = store.create_job(spec(wanted))
+    assert store.job(job.id).spec == spec(wanted).resolved()
+
+
+def test_a_job_for_a_recording_that_is_not_there_is_refused(store: SqlStore) -> None:
+    with pytest.raises(InvalidRequest, match="there is no recording") as refused:
+        JobService(store).submit(spec("0" * 32))
+    assert refused.value.field == "recordings.0"
+    assert store.jobs().items == ()
+
+
+def test_a_job_for_a_recording_of_other_joints_is_refused(store: SqlStore) -> None:
+    other = recording(joints=load_robot("szabadka2").joint_names[::-1])
+    with pytest.raises(InvalidRequest, match="other joints") as refused:
+        JobService(store).submit(spec(store.add_recording(other)))
+    assert refused.value.field == "recordings.0"

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any, Final, cast
@@ -26,6 +25,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
+from api.field_errors import field_error, field_errors
 from api.views import FieldErrorView, ProblemView
 from services.optimizer.errors import (
     Conflict,
@@ -81,8 +81,6 @@ _HTTP: Final = {
 }
 """What to do about the errors that the framework itself raises."""
 
-_LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)
-
 
 def problem(
     request_path: str,
@@ -136,7 +134,7 @@ async def _on_domain_error(request: Request, error: Exception) -> Response:
         message = detail.removeprefix(f"{error.field}: ")
         errors = [FieldErrorView(field=error.field, message=message)]
     elif isinstance(error, SimulationInputError):
-        errors = [_field_error("", detail)]
+        errors = [field_error("", detail)]
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
         _log.error("%s %s: %s", request.method, request.url.path, detail)
         return problem(request.url.path, status, name, detail, headers=_RETRY)
@@ -159,50 +157,27 @@ async def _on_invalid(request: Request, raised: Exception) -> Response:
         message = f"{reason} at character {entry['loc'][-1]}; send one JSON object"
         errors = [FieldErrorView(field="body", message=message)]
         return problem(request.url.path, 400, "malformed-json", f"body: {message}", errors=errors)
-    errors = _without_repeats(_describe(entry, error.body) for entry in found[:_MOST_ERRORS])
-    detail = "; ".join(f"{e.field}: {e.message}" if e.field else e.message for e in errors)
-    if len(found) > _MOST_ERRORS:
-        detail += f"; and {len(found) - _MOST_ERRORS} more"
-    return problem(request.url.path, 422, "invalid-request", detail, errors=errors)
+    errors = _in_the_words_of_the_request(found, error.body)
+    shown = errors[:_MOST_ERRORS]
+    detail = "; ".join(f"{e.field}: {e.message}" if e.field else e.message for e in shown)
+    if len(errors) > _MOST_ERRORS:
+        detail += f"; and {len(errors) - _MOST_ERRORS} more"
+    return problem(request.url.path, 422, "invalid-request", detail, errors=shown)
 
 
-def _describe(entry: Mapping[str, Any], body: Any) -> FieldErrorView:
-    """One of pydantic's errors in the request's own terms."""
-    where, *path = entry["loc"]
-    if where == "body":
-        field = ".".join(str(part) for part in _own_path(path, body, entry["type"]))
-        if not field and entry["type"] in ("missing", "model_attributes_type"):
-            return FieldErrorView(
-                field="body", message="send a JSON object as application/json; /docs has examples"
-            )
-    else:
-        field = ".".join(str(part) for part in path)
-    return _field_error(field, str(entry["msg"]).removeprefix("Value error, "))
-
-
-def _own_path(path: Sequence[Any], body: Any, kind: str) -> list[Any]:
-    """The parts of an error's location that are in the body, without pydantic's union labels."""
-    own: list[Any] = []
-    value = body
-    for part in path:
-        inside = isinstance(value, dict) and part in value
-        inside = inside or (isinstance(value, list) and isinstance(part, int) and part < len(value))
-        if inside:
-            value = value[part]
-            own.append(part)
-        elif kind == "missing" and part is path[-1]:
-            own.append(part)
-    return own
-
-
-def _field_error(field: str, message: str) -> FieldErrorView:
-    """Checks of a whole object begin their message with the field that they blame."""
-    match = _LEADING_FIELD.match(message)
-    if not field and match:
-        field, message = match.groups()
-    return FieldErrorView(field=field, message=message)
-
-
-def _without_repeats(errors: Any) -> list[FieldErrorView]:
-    """In order; each alternative of a union reports the same field."""
-    return list({(error.field, error.message): error for error in errors}.values())
+def _in_the_words_of_the_request(
+    found: Sequence[Mapping[str, Any]], body: Any
+) -> list[FieldErrorView]:
+    """Of a body by its own fields; of parameters by their names."""
+    in_body = [{**entry, "loc": entry["loc"][1:]} for entry in found if entry["loc"][0] == "body"]
+    if in_body and not isinstance(body, dict):
+        message = "send a JSON object as application/json; /docs has examples"
+        return [FieldErrorView(field="body", message=message)]
+    parameters = [
+        field_error(
+            ".".join(map(str, entry["loc"][1:])), entry["msg"].removeprefix("Value error, ")
+        )
+        for entry in found
+        if entry["loc"][0] != "body"
+    ]
+    return parameters + field_errors(in_body, body)

@@ -106,27 +106,11 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
 
 def invalid_request(error: ValidationError, data: Mapping[str, Any]) -> InvalidRequest:
     """What pydantic found wrong, in the words of the input: paths as in the file."""
-    found: dict[tuple[str, str], None] = {}
-    for entry in error.errors(include_url=False):
-        field = ".".join(_path_in(data, entry["loc"], missing=entry["type"] == "missing"))
-        message = entry["msg"].removeprefix("Value error, ")
-        found[field, message] = None
-    (field, message), *others = found
-    more = "".join(f"; {f}: {m}" if f else f"; {m}" for f, m in others)
-    return InvalidRequest(message + more, field=field)
+    from api.field_errors import field_errors
 
-
-def _path_in(data: Any, location: tuple[int | str, ...], *, missing: bool) -> list[str]:
-    """The parts of a location that the input has: pydantic adds the names of union members."""
-    path: list[str] = []
-    for position, part in enumerate(location):
-        try:
-            data = data[part]
-        except (KeyError, IndexError, TypeError):
-            if not (missing and position == len(location) - 1):
-                continue
-        path.append(str(part))
-    return path
+    first, *others = field_errors(error.errors(include_url=False), data)
+    more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)
+    return InvalidRequest(first.message + more, field=first.field)
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -25,16 +25,7 @@ from tests.validation.conftest import DESIGN, TwoWalks
 
 pytestmark = pytest.mark.slow
 
-NO_CHANGE = Perturbation(
-    supply_voltage=1.0,
-    supply_resistance=1.0,
-    efficiency=1.0,
-    motor_friction=1.0,
-    ground_friction=1.0,
-    stiffness=1.0,
-    damping=1.0,
-    gearlash=0.0,
-)
+NO_CHANGE = Perturbation.of({})
 PERFECT = Instruments(
     current_noise=0.0,
     supply_noise=0.0,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from services.optimizer.job import (
 )
 from services.optimizer.spec import Spec
 from services.optimizer.specs import SPECS, AnySpec
+from services.optimizer.store.tables import iterations
 from sim.outcome import Status
 
 Row = Mapping[Any, Any]
@@ -78,6 +79,12 @@ def budget(row: Row) -> int:
 def spec_document(spec: Spec) -> dict[str, Any]:
     """The JSON document of a spec; it carries its schema version."""
     return spec.model_dump(mode="json")
+
+
+LISTED: Final = tuple(
+    column for column in iterations.c if column.name not in ("positions", "optimizer_state")
+)
+"""Columns of an iteration as it is listed: an ask is a hundred times as long as all others."""
 
 
 def to_iteration(row: Row) -> Iteration:

@@ -47,7 +47,7 @@ from services.optimizer.store.records import (
     outstanding_ask,
     update_job,
 )
-from services.optimizer.store.rows import budget, to_evaluation, to_iteration, to_job
+from services.optimizer.store.rows import LISTED, budget, to_evaluation, to_iteration, to_job
 from services.optimizer.store.tables import evaluations, iterations, jobs
 from services.optimizer.store.transitions import (
     entering,
@@ -266,7 +266,7 @@ class SqlStore:
         """See `Store.iterations`."""
         limit = _checked_limit(limit)
         query = (
-            select(iterations)
+            select(*LISTED)
             .where(iterations.c.job_id == job_id, iterations.c.committed_at.is_not(None))
             .order_by(iterations.c.iteration)
             .limit(limit + 1)

@@ -1,0 +1,115 @@
+/** Requests to the API, typed by its OpenAPI document. */
+
+import { ApiProblem, problemOf } from './problem'
+import type { paths } from './schema'
+
+type Method = 'get' | 'post'
+
+/** Paths that have an operation of the method. */
+export type PathOf<M extends Method> = {
+  [P in keyof paths]: paths[P] extends Record<M, { responses: unknown }> ? P : never
+}[keyof paths]
+
+type Operation<P extends keyof paths, M extends Method> =
+  paths[P] extends Record<M, infer O> ? O : never
+
+type Json<R> = R extends { content: { 'application/json': infer B } } ? B : never
+
+/** Body of the successful answer. */
+export type Answer<P extends keyof paths, M extends Method> =
+  Operation<P, M> extends { responses: infer R } ? Json<R[keyof R & (200 | 201 | 202)]> : never
+
+/** Body that the operation takes. */
+export type Body<P extends keyof paths, M extends Method> =
+  Operation<P, M> extends { requestBody: { content: { 'application/json': infer B } } } ? B : never
+
+type Query<P extends keyof paths, M extends Method> =
+  Operation<P, M> extends { parameters: { query?: infer Q } } ? Q : never
+
+type Params<P extends keyof paths, M extends Method> =
+  Operation<P, M> extends { parameters: { path: infer V } } ? V : never
+
+interface Options {
+  readonly signal?: AbortSignal
+}
+
+/** GET a resource; `get('/v1/jobs/{job_id}', { path: { job_id } })`. */
+export async function get<P extends PathOf<'get'>>(
+  path: P,
+  options: Options & { path?: Params<P, 'get'>; query?: Query<P, 'get'> } = {},
+): Promise<Answer<P, 'get'>> {
+  const response = await send(url(path, options.path, options.query), { signal: options.signal })
+  return (await response.json()) as Answer<P, 'get'>
+}
+
+/** POST a body, or a command without one. */
+export async function post<P extends PathOf<'post'>>(
+  path: P,
+  options: Options & {
+    path?: Params<P, 'post'>
+    body?: Body<P, 'post'>
+    headers?: Record<string, string>
+  } = {},
+): Promise<Answer<P, 'post'>> {
+  const request = posted(options.body, options.signal, options.headers)
+  const response = await send(url(path, options.path), request)
+  return (await response.json()) as Answer<P, 'post'>
+}
+
+/** GET a resource that is not JSON. */
+export async function getBytes<P extends PathOf<'get'>>(
+  path: P,
+  options: Options & { path?: Params<P, 'get'>; query?: Query<P, 'get'> } = {},
+): Promise<ArrayBuffer> {
+  const response = await send(url(path, options.path, options.query), { signal: options.signal })
+  return response.arrayBuffer()
+}
+
+/** POST a body whose answer is not JSON. */
+export async function postBytes<P extends PathOf<'post'>>(
+  path: P,
+  options: Options & { path?: Params<P, 'post'>; body?: Body<P, 'post'> } = {},
+): Promise<ArrayBuffer> {
+  const response = await send(url(path, options.path), posted(options.body, options.signal))
+  return response.arrayBuffer()
+}
+
+/** The path with its parameters filled in, and what is not null or undefined as query. */
+export function url(path: string, params?: unknown, query?: unknown): string {
+  const values = (params ?? {}) as Record<string, unknown>
+  const filled = path.replace(/\{(\w+)\}/g, (_, name: string) =>
+    encodeURIComponent(String(values[name])),
+  )
+  const pairs = Object.entries(query ?? {}).filter(
+    ([, value]) => value !== undefined && value !== null,
+  )
+  if (pairs.length === 0) return filled
+  return `${filled}?${new URLSearchParams(pairs.map(([name, value]) => [name, String(value)]))}`
+}
+
+function posted(
+  body: unknown,
+  signal?: AbortSignal,
+  headers: Record<string, string> = {},
+): RequestInit {
+  if (body === undefined) return { method: 'POST', headers, signal }
+  return {
+    method: 'POST',
+    headers: { ...headers, 'Content-Type': 'application/json' },
+    body: JSON.stringify(body),
+    signal,
+  }
+}
+
+/** The successful response; throws ApiProblem for any other, and AbortError as fetch does. */
+async function send(target: string, init: RequestInit): Promise<Response> {
+  let response: Response
+  try {
+    response = await fetch(target, init)
+  } catch (error) {
+    if (error instanceof DOMException && error.name === 'AbortError') throw error
+    throw new ApiProblem(0, 'the server cannot be reached; is `gaitswarm serve` still running?')
+  }
+  if (!response.ok) throw await problemOf(response)
+  return response
+}

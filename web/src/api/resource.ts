@@ -1,0 +1,83 @@
+/** Answers of the API as component state. */
+
+import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
+import { messageOf } from './problem'
+
+/** An answer that is awaited, there, or failed; `data` stays while it is asked for again. */
+export interface Resource<T> {
+  readonly data: T | null
+  readonly error: Error | null
+  readonly loading: boolean
+  /** Ask again. */
+  readonly reload: () => void
+}
+
+/**
+ * What `load` resolves to, asked again when `key` changes; null as key asks nothing.
+ * An answer that a later question has overtaken is dropped.
+ */
+export function useResource<T>(
+  key: string | null,
+  load: (signal: AbortSignal) => Promise<T>,
+): Resource<T> {
+  const [state, setState] = useState<Omit<Resource<T>, 'reload'> & { key: string | null }>({
+    data: null,
+    error: null,
+    loading: key !== null,
+    key,
+  })
+  const [turn, setTurn] = useState(0)
+  const latest = useRef(load)
+  latest.current = load
+  useEffect(() => {
+    if (key === null) {
+      setState({ data: null, error: null, loading: false, key })
+      return
+    }
+    const abort = new AbortController()
+    setState((s) => ({
+      data: s.key === key ? s.data : null,
+      error: null,
+      loading: true,
+      key,
+    }))
+    latest.current(abort.signal).then(
+      (data) => {
+        if (!abort.signal.aborted) setState({ data, error: null, loading: false, key })
+      },
+      (error: unknown) => {
+        if (abort.signal.aborted) return
+        const shown = error instanceof Error ? error : new Error(messageOf(error))
+        setState((s) => ({ ...s, error: shown, loading: false, key }))
+      },
+    )
+    return () => abort.abort()
+  }, [key, turn])
+  const reload = useCallback(() => setTurn((n) => n + 1), [])
+  return { data: state.data, error: state.error, loading: state.loading, reload }
+}
+
+/** Call `tick` every `milliseconds` while the tab is shown, and at once when it is shown again. */
+export function usePolling(tick: () => void, milliseconds: number, active = true): void {
+  const latest = useRef(tick)
+  latest.current = tick
+  useEffect(() => {
+    if (!active) return
+    const call = () => {
+      if (!document.hidden) latest.current()
+    }
+    const timer = setInterval(call, milliseconds)
+    document.addEventListener('visibilitychange', call)
+    return () => {
+      clearInterval(timer)
+      document.removeEventListener('visibilitychange', call)
+    }
+  }, [milliseconds, active])
+}
+
+/** The time [ms], renewed every `milliseconds` while the tab is shown. */
+export function useNow(milliseconds = 1000): number {
+  const [now, setNow] = useState(Date.now)
+  usePolling(() => setNow(Date.now()), milliseconds)
+  return now
+}

@@ -1,0 +1,31 @@
+/** The API's objects under short names; their fields come from the OpenAPI document. */
+
+import type { components } from './schema'
+
+type Schemas = components['schemas']
+
+export type JobSpec = Schemas['JobSpec']
+export type JobState = Schemas['JobState']
+export type JobSummary = Schemas['JobSummaryView']
+export type Job = Schemas['JobView']
+export type Iteration = Schemas['IterationView']
+export type Evaluation = Schemas['EvaluationView']
+export type ScenarioResult = Schemas['ScenarioResultView']
+export type Scenario = Schemas['Scenario']
+export type Variable = Schemas['Variable']
+export type Preference = Schemas['Preference']
+export type PreferencePreset = Schemas['PreferenceView']
+export type ScenarioPreset = Schemas['ScenarioView']
+export type Controller = Schemas['ControllerView']
+export type PsoSettings = Schemas['PsoSettings']
+export type RobotVariant = Schemas['RobotVariant']
+export type RobotFiles = Schemas['RobotFiles']
+export type Simulation = Schemas['SimulationView']
+export type DistributionItem = Schemas['DistributionItemView']
+export type Ranking = Schemas['RankingView']
+export type RankedDesign = Schemas['RankedDesignView']
+export type Objective = Schemas['ObjectiveView']
+export type IdentificationSpec = Schemas['IdentificationSpec']
+/** A spec of any kind. */
+export type AnySpec = JobSpec | IdentificationSpec
+export type Estimate = Schemas['CostView']

@@ -1,0 +1,123 @@
+/** The frame around every page: header, navigation, and the page that the path means. */
+
+import { useEffect, useRef } from 'preact/hooks'
+import { Empty } from './components/feedback'
+import { lazyPage } from './components/lazy-page'
+import icon from './icon.svg'
+import { JobsPage } from './jobs/page'
+import { usePlace } from './router/navigation'
+import { type Route, routeOf } from './router/routes'
+import { toggleTheme, useTheme } from './theme'
+
+const NewJobPage = lazyPage('the form', () => import('./submission/page'))
+const JobPage = lazyPage('the job', () => import('./job/page'))
+const WalkPage = lazyPage('the walk', () => import('./walk/page'))
+const ControllerPage = lazyPage('the controller', () => import('./controller/page'))
+
+const LINKS = [
+  { page: 'jobs', href: '/jobs', label: 'Jobs' },
+  { page: 'new-job', href: '/jobs/new', label: 'New job' },
+  { page: 'walk', href: '/walk', label: 'Walk' },
+  { page: 'controller', href: '/controller', label: 'Controller' },
+] as const
+
+const TITLES: Readonly<Record<Route['page'], string>> = {
+  jobs: 'Jobs',
+  'new-job': 'New job',
+  job: 'Job',
+  walk: 'Walk',
+  controller: 'Controller',
+  'not-found': 'No such page',
+}
+
+export function App() {
+  const place = usePlace()
+  const route = routeOf(place.path)
+  const identity = route.page === 'job' ? `job ${route.id}` : route.page
+  return (
+    <>
+      <a class="skip-link" href="#main">
+        Skip to content
+      </a>
+      <header class="masthead">
+        <a class="brand" href="/jobs" aria-label="gaitswarm, jobs">
+          <img src={icon} alt="" width="22" height="22" />
+          <span>gaitswarm</span>
+        </a>
+        <nav aria-label="Main">
+          {LINKS.map((link) => (
+            <a
+              key={link.page}
+              href={link.href}
+              aria-current={isUnder(route, link.page) ? 'page' : undefined}
+            >
+              {link.label}
+            </a>
+          ))}
+          <a href="/docs">API</a>
+        </nav>
+        <ThemeToggle />
+      </header>
+      <Main key={identity} route={route} />
+    </>
+  )
+}
+
+/** The page itself; takes the focus after each move, so that keyboards and readers start there. */
+function Main({ route }: { route: Route }) {
+  const main = useRef<HTMLElement>(null)
+  useEffect(() => {
+    document.title = `${TITLES[route.page]} · gaitswarm`
+    if (moved) main.current?.focus({ preventScroll: true })
+    moved = true
+  }, [route.page])
+  return (
+    <main id="main" tabIndex={-1} ref={main} data-page={route.page}>
+      <Page route={route} />
+    </main>
+  )
+}
+
+let moved = false
+
+function Page({ route }: { route: Route }) {
+  switch (route.page) {
+    case 'jobs':
+      return <JobsPage />
+    case 'new-job':
+      return <NewJobPage />
+    case 'job':
+      return <JobPage id={route.id} tab={route.tab} />
+    case 'walk':
+      return <WalkPage />
+    case 'controller':
+      return <ControllerPage />
+    case 'not-found':
+      return (
+        <Empty title="There is no such page">
+          <p>
+            Go to the <a href="/jobs">list of jobs</a>.
+          </p>
+        </Empty>
+      )
+  }
+}
+
+function ThemeToggle() {
+  const theme = useTheme()
+  const other = theme === 'dark' ? 'light' : 'dark'
+  return (
+    <button
+      type="button"
+      class="plain compact"
+      onClick={toggleTheme}
+      aria-label={`Show in ${other} colours`}
+    >
+      {other === 'dark' ? 'Dark' : 'Light'}
+    </button>
+  )
+}
+
+function isUnder(route: Route, page: Route['page']): boolean {
+  return route.page === page || (page === 'jobs' && route.page === 'job')
+}

@@ -1,0 +1,261 @@
+/** Lines over one axis, drawn by uPlot: values under the pointer, zoom by dragging. */
+
+import { useEffect, useRef } from 'preact/hooks'
+import uPlot from 'uplot'
+import 'uplot/dist/uPlot.min.css'
+import { formatExact, formatNumber, withUnit } from '../format/number'
+import { themeColour, useTheme } from '../theme'
+import { logRange, logTicks } from './log-axis'
+
+export interface Series {
+  readonly label: string
+  readonly values: ArrayLike<number | null>
+  readonly colour: `--${string}`
+  /** Line width [px]; 0 draws no line, as for the edges of a band. */
+  readonly width?: number
+  readonly dash?: readonly number[]
+  /** Left out of the readout under the pointer. */
+  readonly silent?: boolean
+}
+
+/** An area between two series, by their indices. */
+export interface Band {
+  readonly upper: number
+  readonly lower: number
+  readonly colour: `--${string}`
+  /** Opacity, 0 to 1. */
+  readonly opacity: number
+}
+
+export interface LineChartProps {
+  /** What is drawn, for screen readers. */
+  readonly label: string
+  readonly x: ArrayLike<number>
+  readonly xLabel: string
+  readonly xUnit?: string
+  readonly yLabel: string
+  readonly yUnit?: string
+  readonly series: readonly Series[]
+  readonly bands?: readonly Band[]
+  readonly logarithmic?: boolean
+  /** Whether x is counted: ticks at whole numbers only. */
+  readonly counted?: boolean
+  /** Room beside the first and the last x, in the unit of x. */
+  readonly xMargin?: number
+  /** Whether the y axis begins at zero. */
+  readonly fromZero?: boolean
+  /** Draws behind the lines. */
+  readonly paint?: (plot: uPlot) => void
+  /** Height [px] at the common size of type; larger type makes it larger. */
+  readonly height?: number
+  /** Position of a vertical line, such as the moment that a replay shows. */
+  readonly marker?: number | null
+  /** Called with the x under the pointer when it is clicked. */
+  readonly onPick?: (x: number) => void
+  /** Charts of the same key move their pointers together. */
+  readonly sync?: string
+}
+
+/** Steps between ticks of what is counted. */
+const WHOLE_STEPS = [0, 1, 2, 3, 4, 5, 6].flatMap((power) =>
+  [1, 2, 5].map((factor) => factor * 10 ** power),
+)
+
+export function LineChart(props: LineChartProps) {
+  const box = useRef<HTMLDivElement>(null)
+  const readout = useRef<HTMLParagraphElement>(null)
+  const plot = useRef<uPlot | null>(null)
+  const latest = useRef(props)
+  latest.current = props
+  const theme = useTheme()
+  const height = remPixels((props.height ?? 260) / 14)
+
+  useEffect(() => {
+    const parent = box.current!
+    const width = Math.max(120, parent.clientWidth)
+    const drawn = new uPlot(
+      { ...options(latest, readout.current!), width, height },
+      dataOf(latest.current),
+      parent,
+    )
+    plot.current = drawn
+    const observer = new ResizeObserver(() => {
+      const now = Math.max(120, parent.clientWidth)
+      if (now !== drawn.width) drawn.setSize({ width: now, height })
+    })
+    observer.observe(parent)
+    return () => {
+      observer.disconnect()
+      drawn.destroy()
+      plot.current = null
+    }
+  }, [theme, height, shapeOf(props)])
+
+  useEffect(() => plot.current?.setData(dataOf(latest.current)), [props.x, props.series])
+  useEffect(() => plot.current?.redraw(false), [props.marker])
+
+  return (
+    <div class="line-chart">
+      <div class="chart-box" ref={box} role="img" aria-label={props.label} />
+      <p class="readout" ref={readout} aria-hidden="true" />
+    </div>
+  )
+}
+
+/** What a new plot is needed for; other changes are only new data. */
+function shapeOf({
+  series,
+  bands,
+  logarithmic,
+  fromZero,
+  xLabel,
+  yLabel,
+  xUnit,
+  yUnit,
+}: LineChartProps) {
+  const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.silent])
+  return JSON.stringify([lines, bands, logarithmic, fromZero, xLabel, yLabel, xUnit, yUnit])
+}
+
+function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
+  const columns = series.map(({ values }) =>
+    logarithmic ? Array.from(values, (v) => (v !== null && v > 0 ? v : null)) : values,
+  )
+  return [x, ...columns] as unknown as uPlot.AlignedData
+}
+
+/** props: kept by reference, as callbacks outlive a rendering. */
+function options(props: { current: LineChartProps }, readout: HTMLElement) {
+  const { series, bands = [], logarithmic, fromZero, sync, counted, xMargin = 0 } = props.current
+  const { xLabel, xUnit = '1', yLabel, yUnit = '1' } = props.current
+  const axis: uPlot.Axis = {
+    stroke: themeColour('--text-muted'),
+    font: `${remPixels(0.857)}px ${bodyFont()}`,
+    labelFont: `${remPixels(0.857)}px ${bodyFont()}`,
+    grid: { stroke: themeColour('--grid'), width: 1 },
+    ticks: { stroke: themeColour('--line'), width: 1, size: 4 },
+    gap: 4,
+    labelGap: 0,
+    labelSize: remPixels(1.5),
+  }
+  const values = (_: uPlot, splits: number[]) => splits.map((v) => formatExact(v, 5))
+  const result: Omit<uPlot.Options, 'width' | 'height'> = {
+    legend: { show: false },
+    padding: [remPixels(1.4), remPixels(0.7), 0, 0],
+    cursor: {
+      points: { size: 6 },
+      drag: { x: true, y: false, uni: 20 },
+      sync: sync ? { key: sync } : undefined,
+    },
+    scales: {
+      x: {
+        time: false,
+        range: (_, low, high) => [low - xMargin, low === high ? high + 1 : high + xMargin],
+      },
+      y: logarithmic
+        ? { distr: 3, range: (_, low, high) => logRange(low, high) }
+        : fromZero
+          ? { range: (_, __, high) => [0, high > 0 ? high * 1.05 : 1] }
+          : {},
+    },
+    axes: [
+      {
+        ...axis,
+        label: withUnit(xLabel, xUnit),
+        values,
+        size: remPixels(2.2),
+        incrs: counted ? WHOLE_STEPS : undefined,
+      },
+      {
+        ...axis,
+        label: withUnit(yLabel, yUnit),
+        values,
+        size: (_, texts) => axisWidth(texts),
+        ...(logarithmic && {
+          splits: (_: uPlot, __: number, low: number, high: number) => logTicks(low, high),
+          filter: (_: uPlot, splits: number[]) => splits,
+        }),
+      },
+    ],
+    series: [
+      {},
+      ...series.map(
+        (s): uPlot.Series => ({
+          label: s.label,
+          stroke: s.width === 0 ? undefined : themeColour(s.colour),
+          width: s.width ?? 1.5,
+          dash: s.dash ? [...s.dash] : undefined,
+          points: { show: s.width === 0 ? false : undefined, size: 4 },
+        }),
+      ),
+    ],
+    bands: bands.map((b) => ({
+      series: [b.upper + 1, b.lower + 1] as [number, number],
+      fill: withAlpha(themeColour(b.colour), b.opacity),
+    })),
+    hooks: {
+      drawAxes: [(u) => props.current.paint?.(u)],
+      setCursor: [(u) => showReadout(u, props.current, readout)],
+      draw: [(u) => drawMarker(u, props.current.marker)],
+      ready: [
+        (u) => {
+          u.over.addEventListener('click', () => {
+            const { left } = u.cursor
+            if (left !== undefined && left >= 0) props.current.onPick?.(u.posToVal(left, 'x'))
+          })
+        },
+      ],
+    },
+  }
+  return result
+}
+
+function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {
+  const { idx } = u.cursor
+  if (idx === null || idx === undefined) {
+    element.textContent = ''
+    return
+  }
+  const unit = (value: string, of = '1') => (of === '1' ? value : `${value}\u00a0${of}`)
+  const shown = props.series.filter((s) => !s.silent)
+  const parts = shown.map((s) => `${s.label} ${unit(formatNumber(s.values[idx]), props.yUnit)}`)
+  const at = unit(formatExact(props.x[idx]), props.xUnit)
+  element.textContent = [`${props.xLabel} ${at}`, ...parts].join('  ·  ')
+}
+
+function drawMarker(u: uPlot, marker: number | null | undefined) {
+  if (marker === null || marker === undefined) return
+  const x = u.valToPos(marker, 'x', true)
+  const { left, top, width, height } = u.bbox
+  if (x < left || x > left + width) return
+  u.ctx.save()
+  u.ctx.strokeStyle = themeColour('--text')
+  u.ctx.lineWidth = devicePixelRatio
+  u.ctx.setLineDash([])
+  u.ctx.beginPath()
+  u.ctx.moveTo(x, top)
+  u.ctx.lineTo(x, top + height)
+  u.ctx.stroke()
+  u.ctx.restore()
+}
+
+/** Room for the longest number of an axis [px]. */
+function axisWidth(texts: string[] | null): number {
+  const longest = Math.max(3, ...(texts ?? []).map((text) => text.length))
+  return Math.ceil(longest * remPixels(0.5) + remPixels(0.8))
+}
+
+function remPixels(rem: number): number {
+  return Math.round(rem * Number.parseFloat(getComputedStyle(document.documentElement).fontSize))
+}
+
+function bodyFont(): string {
+  return getComputedStyle(document.body).fontFamily
+}
+
+/** A colour `rgb(...)` with an opacity. */
+export function withAlpha(colour: string, opacity: number): string {
+  return colour.replace(/^rgb\((.*)\)$/, (_, channels: string) =>
+    channels.includes(',') ? `rgba(${channels}, ${opacity})` : `rgb(${channels} / ${opacity})`,
+  )
+}

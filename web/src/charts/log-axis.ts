@@ -1,0 +1,35 @@
+/** Range and ticks of a logarithmic axis that may span much less than a power of ten. */
+
+/** The data's range with a little room around it. */
+export function logRange(low: number | null, high: number | null): [number, number] {
+  if (low === null || high === null || !(low > 0)) return [1, 10]
+  const room = Math.max((high / low) ** 0.05, 1.02)
+  return [low / room, high * room]
+}
+
+/** Round numbers between two others, some four to ten of them. */
+export function logTicks(low: number, high: number): number[] {
+  if (!(low > 0) || !(high > low)) return [low]
+  const decades = Math.log10(high / low)
+  if (decades < 1) return linearTicks(low, high)
+  const every = Math.max(1, Math.ceil(decades / 8))
+  const factors = decades < 3 ? [1, 2, 5] : [1]
+  const ticks: number[] = []
+  for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
+    if (power % every !== 0) continue
+    for (const factor of factors) ticks.push(Number(`${factor}e${power}`))
+  }
+  return ticks.filter((tick) => tick >= low && tick <= high)
+}
+
+/** Multiples of 1, 2 or 5 times a power of ten between two numbers. */
+export function linearTicks(low: number, high: number, wanted = 6): number[] {
+  const rough = (high - low) / wanted
+  const power = 10 ** Math.floor(Math.log10(rough))
+  const step = ([1, 2, 5, 10].find((factor) => factor * power >= rough) ?? 10) * power
+  const ticks: number[] = []
+  for (let n = Math.ceil(low / step - 1e-9); n <= high / step + 1e-9; n++) {
+    ticks.push(Number((n * step).toPrecision(12)))
+  }
+  return ticks
+}

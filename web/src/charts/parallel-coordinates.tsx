@@ -1,0 +1,181 @@
+/** Rows as lines across one axis per column; dragging along an axis selects a stretch of it. */
+
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { formatExact } from '../format/number'
+import { themeColour, useTheme } from '../theme'
+import { type Brush, BUCKETS, type ParallelModel, selectRows, valueAt } from './parallel-model'
+import { type Palette, ProgressivePainter } from './progressive-painter'
+
+export type Brushes = ReadonlyMap<number, Brush>
+
+/** Strokes shorter than this share of the axis are clicks, which end a selection. */
+const LEAST_STROKE = 0.01
+const AXIS_WIDTH_PX = 74
+
+export function ParallelCoordinates({
+  model,
+  brushes,
+  onBrush,
+  label,
+  height = 380,
+}: {
+  model: ParallelModel
+  brushes: Brushes
+  onBrush: (brushes: Brushes) => void
+  label: string
+  height?: number
+}) {
+  const canvas = useRef<HTMLCanvasElement>(null)
+  const painter = useRef<ProgressivePainter | null>(null)
+  const box = useRef<HTMLDivElement>(null)
+  const [width, setWidth] = useState(0)
+  const theme = useTheme()
+  const palette = useMemo(() => themePalette(), [theme])
+  const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
+
+  useLayoutEffect(() => {
+    const observer = new ResizeObserver(() => setWidth(box.current!.clientWidth))
+    observer.observe(box.current!)
+    return () => observer.disconnect()
+  }, [])
+
+  useEffect(() => {
+    painter.current = new ProgressivePainter(canvas.current!, (drawn, of) => {
+      canvas.current!.dataset.drawn = String(drawn)
+      canvas.current!.dataset.rows = String(of)
+    })
+    return () => painter.current?.stop()
+  }, [])
+
+  useEffect(() => {
+    if (width === 0) return
+    const element = canvas.current!
+    const [w, h] = [Math.round(width * devicePixelRatio), Math.round(height * devicePixelRatio)]
+    if (element.width !== w || element.height !== h) {
+      element.width = w
+      element.height = h
+    }
+    painter.current!.paint(model, selected, palette)
+  }, [model, selected, palette, width, height])
+
+  const least = model.axes.length * AXIS_WIDTH_PX
+  return (
+    <div class="parallel-scroll">
+      <div class="parallel" ref={box} style={{ minWidth: `${least}px` }}>
+        <div class="parallel-heads">
+          {model.axes.map((axis) => (
+            <span key={axis.name} class="small">
+              <strong>{axis.name}</strong>
+              <span class="unit">{axis.unit === '1' ? '\u00a0' : axis.unit}</span>
+              <span class="muted">{formatExact(axis.high, 4)}</span>
+            </span>
+          ))}
+        </div>
+        <div class="parallel-plot" style={{ height: `${height}px` }}>
+          <canvas ref={canvas} role="img" aria-label={label} />
+          {model.axes.map((axis, index) => (
+            <AxisBrush
+              key={axis.name}
+              left={(index + 0.5) / model.axes.length}
+              brush={brushes.get(index) ?? null}
+              title={`${axis.name}: ${readBrush(model, index, brushes)}`}
+              onBrush={(brush) => onBrush(withBrush(brushes, index, brush))}
+            />
+          ))}
+        </div>
+        <div class="parallel-heads">
+          {model.axes.map((axis) => (
+            <span key={axis.name} class="small muted">
+              {formatExact(axis.low, 4)}
+            </span>
+          ))}
+        </div>
+      </div>
+    </div>
+  )
+}
+
+/** The brushes with one of them changed; null takes it away. */
+export function withBrush(brushes: Brushes, axis: number, brush: Brush | null): Brushes {
+  const changed = new Map(brushes)
+  if (brush === null) changed.delete(axis)
+  else changed.set(axis, brush)
+  return changed
+}
+
+function AxisBrush({
+  left,
+  brush,
+  title,
+  onBrush,
+}: {
+  /** Place of the axis as a share of the width. */
+  left: number
+  brush: Brush | null
+  title: string
+  onBrush: (brush: Brush | null) => void
+}) {
+  const start = useRef<number | null>(null)
+  const place = (event: PointerEvent) => {
+    const box = (event.currentTarget as HTMLElement).getBoundingClientRect()
+    return Math.min(1, Math.max(0, 1 - (event.clientY - box.top) / box.height))
+  }
+  const stretch = (event: PointerEvent): Brush | null => {
+    const [a, b] = [start.current!, place(event)]
+    return Math.abs(a - b) < LEAST_STROKE ? null : [Math.min(a, b), Math.max(a, b)]
+  }
+  return (
+    <div
+      class="axis"
+      title={title}
+      style={{ left: `${left * 100}%` }}
+      onPointerDown={(event) => {
+        event.currentTarget.setPointerCapture(event.pointerId)
+        start.current = place(event)
+      }}
+      onPointerMove={(event) => {
+        if (start.current !== null) onBrush(stretch(event))
+      }}
+      onPointerUp={(event) => {
+        if (start.current !== null) onBrush(stretch(event))
+        start.current = null
+      }}
+      onPointerCancel={() => {
+        start.current = null
+      }}
+    >
+      {brush && (
+        <span
+          class="brush"
+          style={{ bottom: `${brush[0] * 100}%`, height: `${(brush[1] - brush[0]) * 100}%` }}
+        />
+      )}
+    </div>
+  )
+}
+
+function readBrush(model: ParallelModel, index: number, brushes: Brushes): string {
+  const brush = brushes.get(index)
+  if (!brush) return 'drag along the axis to select'
+  const [low, high] = brush.map((place) => formatExact(valueAt(model.axes[index], place), 4))
+  return `${low} to ${high} selected`
+}
+
+/** From the best colour to the worst, through one between them. */
+function themePalette(): Palette {
+  const stops = ['--rank-best', '--rank-middle', '--rank-worst'] as const
+  const [best, middle, worst] = stops.map((name) => channels(themeColour(name)))
+  const buckets = Array.from({ length: BUCKETS }, (_, k) => {
+    const at = k / (BUCKETS - 1)
+    return at < 0.5 ? mixed(best, middle, at * 2) : mixed(middle, worst, at * 2 - 1)
+  })
+  return { buckets, failed: themeColour('--line-strong') }
+}
+
+function channels(colour: string): number[] {
+  return (colour.match(/[\d.]+/g) ?? []).slice(0, 3).map(Number)
+}
+
+function mixed(a: readonly number[], b: readonly number[], share: number): string {
+  return `rgb(${a.map((value, k) => Math.round(value + (b[k] - value) * share)).join(', ')})`
+}

@@ -1,0 +1,143 @@
+/** Parallel coordinates as numbers: where each row crosses each axis, its colour, its selection. */
+
+export interface AxisSource {
+  readonly name: string
+  readonly unit: string
+  /** Bounds; taken from the values where they are null. */
+  readonly low: number | null
+  readonly high: number | null
+  readonly logarithmic: boolean
+  readonly values: Float32Array
+}
+
+export interface Axis {
+  readonly name: string
+  readonly unit: string
+  readonly low: number
+  readonly high: number
+  readonly logarithmic: boolean
+  /** Place of each row on the axis, 0 at its low end and 1 at its high end; NaN for none. */
+  readonly places: Float32Array
+}
+
+/** A stretch of an axis, in places. */
+export type Brush = readonly [low: number, high: number]
+
+export const BUCKETS = 12
+/** Bucket of rows without a fitness. */
+export const FAILED = 255
+
+export interface ParallelModel {
+  readonly rows: number
+  readonly axes: readonly Axis[]
+  /** Colour of each row by its rank in fitness: 0 for the best ones, FAILED for none. */
+  readonly buckets: Uint8Array
+  /** All rows in an order in which any beginning is a fair sample. */
+  readonly order: Uint32Array
+  readonly fitness: Float32Array
+}
+
+export function buildModel(sources: readonly AxisSource[], fitness: Float32Array): ParallelModel {
+  return {
+    rows: fitness.length,
+    axes: sources.map(axisOf),
+    buckets: bucketsOf(fitness),
+    order: shuffledOrder(fitness.length),
+    fitness,
+  }
+}
+
+/** Value at a place of an axis. */
+export function valueAt({ low, high, logarithmic }: Axis, place: number): number {
+  return logarithmic ? low * (high / low) ** place : low + place * (high - low)
+}
+
+/** Place of a value on an axis. */
+export function placeOf({ low, high, logarithmic }: Omit<Axis, 'places'>, value: number): number {
+  return logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)
+}
+
+/** Rows inside every brush, in the model's order. brushes: by index of the axis. */
+export function selectRows(
+  { axes, order }: ParallelModel,
+  brushes: ReadonlyMap<number, Brush>,
+): Uint32Array {
+  if (brushes.size === 0) return order
+  const tests = [...brushes].map(([axis, [low, high]]) => ({
+    places: axes[axis].places,
+    low,
+    high,
+  }))
+  const selected = new Uint32Array(order.length)
+  let count = 0
+  for (let k = 0; k < order.length; k++) {
+    const row = order[k]
+    let inside = true
+    for (const { places, low, high } of tests) {
+      const place = places[row]
+      if (!(place >= low && place <= high)) {
+        inside = false
+        break
+      }
+    }
+    if (inside) selected[count++] = row
+  }
+  return selected.subarray(0, count)
+}
+
+/** The best rows among some, by fitness. */
+export function bestRows({ fitness }: ParallelModel, rows: Uint32Array, most: number): number[] {
+  const best: number[] = []
+  for (const row of rows) {
+    const value = fitness[row]
+    if (Number.isNaN(value)) continue
+    if (best.length === most && value >= fitness[best[most - 1]]) continue
+    let at = best.length
+    while (at > 0 && fitness[best[at - 1]] > value) at--
+    best.splice(at, 0, row)
+    if (best.length > most) best.pop()
+  }
+  return best
+}
+
+function axisOf(source: AxisSource): Axis {
+  const { name, unit, values } = source
+  let [least, greatest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
+  for (const value of values) {
+    if (value < least) least = value
+    if (value > greatest) greatest = value
+  }
+  const low = source.low ?? (Number.isFinite(least) ? least : 0)
+  let high = source.high ?? (Number.isFinite(greatest) ? greatest : 1)
+  if (!(high > low)) high = low + (Math.abs(low) || 1) * 1e-6
+  const scale = { name, unit, low, high, logarithmic: source.logarithmic && low > 0 }
+  return { ...scale, places: values.map((value) => placeOf(scale, value)) }
+}
+
+/** Equal numbers of rows in each bucket, so that a few very bad ones do not take all colours. */
+function bucketsOf(fitness: Float32Array): Uint8Array {
+  const finite = fitness.filter((value) => Number.isFinite(value)).sort()
+  const limits = Array.from(
+    { length: BUCKETS - 1 },
+    (_, k) => finite[Math.floor(((k + 1) / BUCKETS) * finite.length)],
+  )
+  return Uint8Array.from(fitness, (value) => {
+    if (!Number.isFinite(value)) return FAILED
+    let bucket = 0
+    while (bucket < limits.length && value >= limits[bucket]) bucket++
+    return bucket
+  })
+}
+
+/** Every row once, jumping by a stride that has no factor in common with their number. */
+function shuffledOrder(rows: number): Uint32Array {
+  const order = new Uint32Array(rows)
+  let stride = Math.max(1, Math.round(rows * 0.618))
+  while (commonFactor(stride, rows) > 1) stride++
+  for (let k = 0, row = 0; k < rows; k++, row = (row + stride) % rows) order[k] = row
+  return order
+}
+
+function commonFactor(a: number, b: number): number {
+  return b === 0 ? a : commonFactor(b, a % b)
+}

@@ -1,0 +1,34 @@
+/** Pages whose code is fetched when they are first shown. */
+
+import type { ComponentType } from 'preact'
+import { useEffect, useState } from 'preact/hooks'
+import { ErrorNotice, Loading } from './feedback'
+
+/** A component that stands for a module's default export. what: as in "Loading the walk". */
+export function lazyPage<P extends object>(
+  what: string,
+  load: () => Promise<{ default: ComponentType<P> }>,
+): ComponentType<P> {
+  let loaded: ComponentType<P> | null = null
+  return function LazyPage(props: P) {
+    const [Page, setPage] = useState<ComponentType<P> | null>(() => loaded)
+    const [error, setError] = useState<unknown>(null)
+    useEffect(() => {
+      if (loaded) return
+      load().then((module) => {
+        loaded = module.default
+        setPage(() => module.default)
+      }, setError)
+    }, [])
+    if (error !== null) {
+      return (
+        <ErrorNotice
+          what={`The code of ${what} could not be loaded.`}
+          error={error}
+          retry={() => location.reload()}
+        />
+      )
+    }
+    return Page ? <Page {...props} /> : <Loading what={what} />
+  }
+}

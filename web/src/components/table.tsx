@@ -1,0 +1,193 @@
+/** A table that sorts by its headers and is shown in pages. */
+
+import type { ComponentChildren } from 'preact'
+import { useState } from 'preact/hooks'
+import { formatCount } from '../format/number'
+import { type Cell, paged, type SortOrder, sorted } from './rows'
+
+export interface Column<R> {
+  readonly key: string
+  readonly label: string
+  /** Written into the header in brackets; `1` is not written. */
+  readonly unit?: string
+  readonly numeric?: boolean
+  /** What the column is sorted by; a column without it cannot be sorted. */
+  readonly value?: (row: R) => Cell
+  /** What is shown; the value itself if missing. */
+  readonly cell?: (row: R) => ComponentChildren
+  /** Left out on narrow screens. */
+  readonly minor?: boolean
+  /** Whether the cell is the row's header. */
+  readonly header?: boolean
+}
+
+export function Table<R>({
+  caption,
+  columns,
+  rows,
+  rowKey,
+  order: initial,
+  pageSize = 50,
+  tall = false,
+  rowData,
+}: {
+  /** What the table holds; read by screen readers, and shown unless it is all hidden by style. */
+  caption: string
+  columns: readonly Column<R>[]
+  rows: readonly R[]
+  rowKey: (row: R) => string
+  order?: SortOrder
+  pageSize?: number
+  /** Scroll inside a box of limited height. */
+  tall?: boolean
+  /** data- attributes of a row. */
+  rowData?: (row: R) => Record<`data-${string}`, string | number>
+}) {
+  const [order, setOrder] = useState<SortOrder | null>(initial ?? null)
+  const [wanted, setWanted] = useState(0)
+  const by = columns.find((column) => column.key === order?.column)?.value
+  const inOrder = order && by ? sorted(rows, by, order.descending) : rows
+  const page = paged(inOrder, wanted, pageSize)
+  return (
+    <div>
+      {/* A box that scrolls must take the keyboard. */}
+      <section
+        class={tall ? 'table-scroll tall' : 'table-scroll'}
+        tabIndex={0}
+        aria-label={`${caption}: table`}
+      >
+        <table>
+          <caption class="visually-hidden">{caption}</caption>
+          <thead>
+            <tr>
+              {columns.map((column) => (
+                <Header key={column.key} column={column} order={order} onOrder={setOrder} />
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {page.rows.map((row) => (
+              <tr key={rowKey(row)} {...rowData?.(row)}>
+                {columns.map((column) => cell(column, row))}
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </section>
+      {page.pages > 1 && (
+        <Pager
+          page={page.page}
+          pages={page.pages}
+          total={rows.length}
+          size={pageSize}
+          onPage={setWanted}
+        />
+      )}
+    </div>
+  )
+}
+
+function cell<R>(column: Column<R>, row: R) {
+  const content = column.cell ? column.cell(row) : column.value?.(row)
+  if (column.header) {
+    return (
+      <th key={column.key} scope="row" class={classes(column)}>
+        {content}
+      </th>
+    )
+  }
+  return (
+    <td key={column.key} class={classes(column)}>
+      {content}
+    </td>
+  )
+}
+
+function Header<R>({
+  column,
+  order,
+  onOrder,
+}: {
+  column: Column<R>
+  order: SortOrder | null
+  onOrder: (order: SortOrder) => void
+}) {
+  const active = order?.column === column.key
+  const label = (
+    <>
+      {column.label}
+      {column.unit && column.unit !== '1' && <span class="unit"> [{column.unit}]</span>}
+    </>
+  )
+  const mark = active ? (order.descending ? ' ↓' : ' ↑') : ''
+  return (
+    <th
+      scope="col"
+      class={classes(column)}
+      aria-sort={active ? (order.descending ? 'descending' : 'ascending') : undefined}
+    >
+      {column.value ? (
+        <button
+          type="button"
+          onClick={() => onOrder({ column: column.key, descending: active && !order.descending })}
+        >
+          <span>
+            {label}
+            <span aria-hidden="true">{mark}</span>
+          </span>
+        </button>
+      ) : (
+        label
+      )}
+    </th>
+  )
+}
+
+export function Pager({
+  page,
+  pages,
+  total,
+  size,
+  onPage,
+}: {
+  /** From 0. */
+  page: number
+  pages: number
+  total: number
+  size: number
+  onPage: (page: number) => void
+}) {
+  const last = Math.min(total, (page + 1) * size)
+  return (
+    <nav class="pager" aria-label="Pages of the table">
+      <span>
+        {formatCount(page * size + 1)}–{formatCount(last)} of {formatCount(total)}
+      </span>
+      <span class="row">
+        <button
+          type="button"
+          class="compact"
+          disabled={page === 0}
+          onClick={() => onPage(page - 1)}
+        >
+          Previous
+        </button>
+        <span>
+          page {page + 1} of {pages}
+        </span>
+        <button
+          type="button"
+          class="compact"
+          disabled={page >= pages - 1}
+          onClick={() => onPage(page + 1)}
+        >
+          Next
+        </button>
+      </span>
+    </nav>
+  )
+}
+
+function classes<R>(column: Column<R>): string {
+  return `${column.numeric ? 'numeric' : ''}${column.minor ? ' minor' : ''}`
+}

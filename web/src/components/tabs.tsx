@@ -1,0 +1,59 @@
+/** Parts of a page of which one is shown. */
+
+import type { ComponentChildren } from 'preact'
+import { useId } from 'preact/hooks'
+
+export interface Tab<K extends string> {
+  readonly key: K
+  readonly label: string
+}
+
+/** Tabs with the panel of the chosen one; arrow keys move between them. */
+export function Tabs<K extends string>({
+  tabs,
+  chosen,
+  onChoose,
+  label,
+  children,
+}: {
+  tabs: readonly Tab<K>[]
+  chosen: K
+  onChoose: (key: K) => void
+  label: string
+  /** The chosen tab's panel. */
+  children: ComponentChildren
+}) {
+  const id = useId()
+  const move = (event: KeyboardEvent) => {
+    const step = event.key === 'ArrowRight' ? 1 : event.key === 'ArrowLeft' ? -1 : 0
+    if (step === 0) return
+    event.preventDefault()
+    const at = tabs.findIndex((tab) => tab.key === chosen)
+    const next = tabs[(at + step + tabs.length) % tabs.length]
+    onChoose(next.key)
+    document.getElementById(`${id}-${next.key}`)?.focus()
+  }
+  return (
+    <>
+      <div class="tabs" role="tablist" aria-label={label} onKeyDown={move}>
+        {tabs.map((tab) => (
+          <button
+            key={tab.key}
+            type="button"
+            role="tab"
+            id={`${id}-${tab.key}`}
+            aria-selected={tab.key === chosen}
+            aria-controls={`${id}-panel`}
+            tabIndex={tab.key === chosen ? 0 : -1}
+            onClick={() => onChoose(tab.key)}
+          >
+            {tab.label}
+          </button>
+        ))}
+      </div>
+      <div role="tabpanel" id={`${id}-panel`} aria-labelledby={`${id}-${chosen}`}>
+        {children}
+      </div>
+    </>
+  )
+}

@@ -1,0 +1,55 @@
+/** The values of a design, with what each is and the bounds of its search. */
+
+import type { Variable } from '../api/types'
+import { type Column, Table } from '../components/table'
+import { formatExact } from '../format/number'
+import type { ResolvedDesign } from '../walk/resolve-design'
+
+interface Row {
+  readonly variable: Variable
+  readonly value: number
+}
+
+export function DesignCard({ design }: { design: ResolvedDesign }) {
+  const { controller } = design
+  const known = [...controller.variables, ...controller.gait_variables]
+  const rows = known
+    .filter(({ name }) => name in design.design)
+    .map((variable): Row => ({ variable, value: design.design[variable.name] }))
+  const columns: Column<Row>[] = [
+    { key: 'name', label: 'variable', header: true, value: ({ variable }) => variable.name },
+    {
+      key: 'value',
+      label: 'value',
+      numeric: true,
+      cell: ({ value }) => formatExact(value),
+    },
+    {
+      key: 'unit',
+      label: 'unit',
+      cell: ({ variable }) => (variable.unit === '1' ? '' : variable.unit),
+    },
+    {
+      key: 'bounds',
+      label: 'bounds of the search',
+      numeric: true,
+      minor: true,
+      cell: ({ variable }) => `${formatExact(variable.low)} to ${formatExact(variable.high)}`,
+    },
+    { key: 'meaning', label: 'meaning', cell: ({ variable }) => variable.description },
+  ]
+  return (
+    <section class="card" data-design>
+      <header>
+        <h2>Design</h2>
+        <p class="muted small">{controller.description}</p>
+      </header>
+      <Table
+        caption="Values of the design"
+        columns={columns}
+        rows={rows}
+        rowKey={({ variable }) => variable.name}
+      />
+    </section>
+  )
+}

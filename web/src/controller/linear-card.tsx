@@ -1,0 +1,69 @@
+/** What a controller without rules does: its law and its gains. */
+
+import { formatExact } from '../format/number'
+import type { ResolvedDesign } from '../walk/resolve-design'
+
+interface Term {
+  readonly gain: string
+  readonly text: string
+  readonly meaning: string
+}
+
+/** Terms of the law, by the gain that they need. */
+const TERMS: readonly Term[] = [
+  { gain: 'P', text: 'error', meaning: 'answers at once, in proportion to the angle error' },
+  {
+    gain: 'I',
+    text: '∫ error dt',
+    meaning: 'grows as long as an error stays, and so takes it away',
+  },
+  {
+    gain: 'D',
+    text: 'd error / dt',
+    meaning: 'answers to the change of the error, and so damps',
+  },
+]
+
+/** Whether a controller has gains and nothing else; it has no fuzzy surface then. */
+export function isLinear({ controller }: ResolvedDesign): boolean {
+  return controller.variables.every(({ name }) => TERMS.some(({ gain }) => gain === name))
+}
+
+export function LinearCard({ design }: { design: ResolvedDesign }) {
+  const terms = TERMS.filter(({ gain }) => gain in design.design)
+  return (
+    <section class="card" data-linear={design.controller.name}>
+      <header>
+        <h2>Its law</h2>
+        <p class="muted small">
+          This controller is linear: it has no rules, so no fuzzy surface and no table. Its answer
+          does not depend on the motor current.
+        </p>
+      </header>
+      <p class="law">
+        PWM ={' '}
+        {terms.map(({ gain, text }, k) => (
+          <span key={gain}>
+            {k > 0 && ' + '}
+            <b>{formatExact(design.design[gain])}</b> · {text}
+          </span>
+        ))}
+      </p>
+      <ul>
+        {terms.map(({ gain, meaning }) => (
+          <li key={gain}>
+            <b>{gain}</b> = {formatExact(design.design[gain])}{' '}
+            <span class="unit">
+              {design.controller.variables.find(({ name }) => name === gain)?.unit}
+            </span>
+            : {meaning}.
+          </li>
+        ))}
+      </ul>
+      <p class="muted">
+        To see a surface, choose a fuzzy design above, for example{' '}
+        <a href="/controller?controller=fuzzy-pi&published=A">the published optimum A</a>.
+      </p>
+    </section>
+  )
+}

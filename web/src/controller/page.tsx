@@ -1,0 +1,185 @@
+/** One controller: its design, and what it answers to error and current. */
+
+import { useState } from 'preact/hooks'
+import { post } from '../api/client'
+import { useResource } from '../api/resource'
+import { ErrorNotice, Loading } from '../components/feedback'
+import { Tabs } from '../components/tabs'
+import { formatExact, quantity } from '../format/number'
+import { setQuery, usePlace } from '../router/navigation'
+import { jobPath, withQuery } from '../router/routes'
+import { DesignPicker } from '../walk/design-picker'
+import { type DesignSource, queryOf, sourceOf, wordOf } from '../walk/design-source'
+import { type ResolvedDesign, resolveDesign } from '../walk/resolve-design'
+import './controller.css'
+import { DesignCard } from './design-card'
+import { FuzzyPanel } from './fuzzy-panel'
+import { isLinear, LinearCard } from './linear-card'
+import { inputOf, type SurfaceView } from './surface'
+
+/** Points of the grid; odd, so that zero error is one of them. */
+const GRID = { error_points: 65, current_points: 33 }
+
+export default function ControllerPage() {
+  const { query } = usePlace()
+  const [source, wrong] = sourceIn(query)
+  return (
+    <>
+      <div class="page-header">
+        <h1>Controller</h1>
+      </div>
+      {source ? (
+        <Controller source={source} query={query} />
+      ) : (
+        <>
+          <ErrorNotice what="This address names no controller." error={wrong} />
+          <p class="row">
+            <a class="button" href="/controller">
+              Show the published optimum A
+            </a>
+          </p>
+        </>
+      )}
+    </>
+  )
+}
+
+function Controller({ source, query }: { source: DesignSource; query: URLSearchParams }) {
+  const resolved = useResource(wordOf(source), (signal) => resolveDesign(source, signal))
+  const design = resolved.data
+  const velocity = Number(query.get('velocity') ?? 0)
+  return (
+    <div class="stack">
+      <div class="card walk-choice">
+        <DesignPicker
+          label="Design"
+          chosen={design?.source ?? source}
+          chosenLabel={design?.label ?? 'This design'}
+          onChoose={(chosen) => setQuery({ ...queryOf(chosen!), velocity: null })}
+        />
+        {design && <Links source={source} />}
+      </div>
+      {resolved.error && (
+        <ErrorNotice
+          what="This controller cannot be shown."
+          error={resolved.error}
+          retry={resolved.reload}
+        />
+      )}
+      {resolved.loading && !design && <Loading what="the design" />}
+      {design && isLinear(design) && <LinearCard design={design} />}
+      {design && !isLinear(design) && (
+        <Fuzzy design={design} velocity={Number.isFinite(velocity) ? velocity : 0} />
+      )}
+      {design && <DesignCard design={design} />}
+    </div>
+  )
+}
+
+function Fuzzy({ design, velocity }: { design: ResolvedDesign; velocity: number }) {
+  const key = JSON.stringify([design.controller.name, design.design, velocity])
+  const own = new Set(design.controller.variables.map(({ name }) => name))
+  const values = Object.entries(design.design).filter(([name]) => own.has(name))
+  const surface = useResource(key, (signal) =>
+    post('/v1/controllers/{controller}/surface', {
+      path: { controller: design.controller.name },
+      body: { design: Object.fromEntries(values), ...GRID, velocity_error: velocity },
+      signal,
+    }),
+  )
+  if (surface.error) {
+    return (
+      <ErrorNotice
+        what="The fuzzy surface cannot be shown."
+        error={surface.error}
+        retry={surface.reload}
+      />
+    )
+  }
+  if (!surface.data) return <Loading what="the fuzzy surface" />
+  return <Outputs surface={surface.data} />
+}
+
+function Outputs({ surface }: { surface: SurfaceView }) {
+  const { outputs } = surface
+  const [name, setName] = useState(outputs[0].name)
+  const output = outputs.find((each) => each.name === name) ?? outputs[0]
+  const panel = <FuzzyPanel key={output.name} surface={surface} output={output} />
+  return (
+    <>
+      {surface.velocity_error !== null && (
+        <VelocityChoice surface={surface} velocity={surface.velocity_error} />
+      )}
+      {outputs.length === 1 ? (
+        panel
+      ) : (
+        <Tabs
+          label="Outputs"
+          tabs={outputs.map((each) => ({ key: each.name, label: `${each.name} [${each.unit}]` }))}
+          chosen={output.name}
+          onChoose={setName}
+        >
+          {panel}
+        </Tabs>
+      )}
+    </>
+  )
+}
+
+/** At which velocity error the surfaces are drawn. */
+function VelocityChoice({ surface, velocity }: { surface: SurfaceView; velocity: number }) {
+  const { range, unit, values } = inputOf(surface, 'velocity')
+  return (
+    <div class="card field">
+      <label for="velocity">Velocity error at which the surfaces are drawn</label>
+      <div class="row">
+        <input
+          id="velocity"
+          type="range"
+          min={range[0]}
+          max={range[1]}
+          step={(range[1] - range[0]) / (values.length - 1)}
+          value={velocity}
+          aria-valuetext={quantity(velocity, unit)}
+          onChange={(event) => setQuery({ velocity: formatted(event.currentTarget.value) })}
+        />
+        <output for="velocity">{quantity(velocity, unit)}</output>
+      </div>
+      <span class="hint">
+        From {formatExact(range[0])} to {quantity(range[1], unit)}. FzzP does not depend on it.
+      </span>
+    </div>
+  )
+}
+
+/** As the query has it; none for zero. */
+function formatted(value: string): string | null {
+  return Number(value) === 0 ? null : String(Number(value))
+}
+
+function Links({ source }: { source: DesignSource }) {
+  const set = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
+  return (
+    <div class="row">
+      <a
+        class="button"
+        href={withQuery('/walk', Object.fromEntries(set) as Record<string, string>)}
+      >
+        Its walk
+      </a>
+      {'job' in source && (
+        <a class="button" href={jobPath(source.job)}>
+          Its job
+        </a>
+      )}
+    </div>
+  )
+}
+
+function sourceIn(query: URLSearchParams): [DesignSource | null, unknown] {
+  try {
+    return [sourceOf(query), null]
+  } catch (error) {
+    return [null, error]
+  }
+}

@@ -1,0 +1,66 @@
+/** The rules in words, with their weights and how far they fire at the chosen point. */
+
+import { type Column, Table } from '../components/table'
+import { formatExact } from '../format/number'
+import { type Cell, type Output, type Rule, ruleText, type SurfaceView, strength } from './surface'
+
+interface Row {
+  readonly number: number
+  readonly rule: Rule
+  readonly fires: number
+}
+
+export function RulesCard({
+  surface,
+  output,
+  cell,
+}: {
+  surface: SurfaceView
+  output: Output
+  cell: Cell
+}) {
+  const rows = output.rules.map(
+    (rule, k): Row => ({ number: k + 1, rule, fires: strength(rule, surface, cell) }),
+  )
+  const columns: Column<Row>[] = [
+    { key: 'number', label: 'rule', numeric: true, header: true, value: (row) => row.number },
+    { key: 'text', label: 'in words', cell: (row) => ruleText(row.rule, output.name) },
+    {
+      key: 'weight',
+      label: 'weight',
+      numeric: true,
+      value: (row) => row.rule.weight,
+      cell: (row) => formatExact(row.rule.weight),
+    },
+    {
+      key: 'fires',
+      label: 'fires at the point',
+      numeric: true,
+      value: (row) => row.fires,
+      cell: (row) => (
+        <span class="firing">
+          <i class="bar" aria-hidden="true">
+            <b style={{ width: `${100 * row.fires}%` }} />
+          </i>
+          <span>{row.fires.toFixed(3)}</span>
+        </span>
+      ),
+    },
+  ]
+  return (
+    <section class="card" data-rules={rows.length}>
+      <header>
+        <h2>Rules of {output.name}</h2>
+        <p class="muted small">
+          A rule fires as far as the least of its conditions holds, times its weight.
+        </p>
+      </header>
+      <Table
+        caption={`Rules of ${output.name}`}
+        columns={columns}
+        rows={rows}
+        rowKey={(row) => String(row.number)}
+      />
+    </section>
+  )
+}

@@ -1,0 +1,161 @@
+/** The surface in three dimensions, with the choice of what it shows. */
+
+import { useEffect, useRef, useState } from 'preact/hooks'
+import { messageOf } from '../api/problem'
+import { ChartFrame } from '../components/chart-frame'
+import { quantity, withUnit } from '../format/number'
+import { useTheme } from '../theme'
+import { Segmented } from '../walk/player-controls'
+import { type Cell, cells, extent, type Layer } from './surface'
+import type { SurfaceScene } from './surface-scene'
+
+const TURN = Math.PI / 24
+
+const TURNS: Readonly<Record<string, readonly [around: number, up: number]>> = {
+  ArrowLeft: [-TURN, 0],
+  ArrowRight: [TURN, 0],
+  ArrowUp: [0, TURN],
+  ArrowDown: [0, -TURN],
+}
+
+export function SurfaceView({
+  layers,
+  name,
+  cell,
+}: {
+  layers: readonly Layer[]
+  /** Of the output. */
+  name: string
+  cell: Cell
+}) {
+  const [key, setKey] = useState<Layer['key']>('inference')
+  const layer = layers.find((each) => each.key === key) ?? layers[0]
+  return (
+    <ChartFrame
+      title={withUnit(`Surface of ${name}`, layer.unit)}
+      note="Output over error and current; the ball is the chosen point. Drag to turn."
+      table={() => <Summary layers={layers} />}
+      tools={
+        <Segmented
+          label="What the surface shows"
+          value={key}
+          options={layers.map((each) => [each.key, each.title] as const)}
+          onChoose={setKey}
+        />
+      }
+    >
+      <Stage layer={layer} cell={cell} />
+    </ChartFrame>
+  )
+}
+
+function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
+  const stage = useRef<HTMLDivElement>(null)
+  const scene = useRef<SurfaceScene | null>(null)
+  const latest = useRef({ layer, cell })
+  latest.current = { layer, cell }
+  const [failure, setFailure] = useState<string | null>(null)
+  const theme = useTheme()
+
+  useEffect(() => {
+    const box = stage.current!
+    let observer: ResizeObserver | null = null
+    let left = false
+    import('./surface-scene')
+      .then(({ SurfaceScene }) => {
+        if (left) return
+        const built = new SurfaceScene(latest.current.layer, latest.current.cell)
+        scene.current = built
+        box.append(built.canvas)
+        const fill = () => box.clientWidth > 0 && built.resize(box.clientWidth, box.clientHeight)
+        fill()
+        built.resetView()
+        observer = new ResizeObserver(fill)
+        observer.observe(box)
+      })
+      .catch((error: unknown) => !left && setFailure(messageOf(error)))
+    return () => {
+      left = true
+      observer?.disconnect()
+      scene.current?.dispose()
+      scene.current = null
+    }
+  }, [])
+  useEffect(() => scene.current?.show(layer, cell), [layer, theme])
+  useEffect(() => scene.current?.mark(cell), [cell])
+
+  const press = (event: KeyboardEvent) => {
+    const turn = TURNS[event.key]
+    if (!turn) return
+    event.preventDefault()
+    scene.current?.turn(turn[0], turn[1])
+  }
+  const [low, high] = extent(layer.values)
+  return (
+    <>
+      <div
+        class="surface-stage"
+        ref={stage}
+        tabIndex={0}
+        role="application"
+        aria-label="The surface in three dimensions; arrow keys turn it. The maps have its numbers."
+        data-surface={layer.key}
+        data-min={low}
+        data-max={high}
+        data-cells={cells(layer.values)}
+        data-own-keys
+        onKeyDown={press}
+      >
+        {failure !== null && (
+          <div class="notice" data-tone="warn" role="alert">
+            <strong>The surface cannot be drawn in three dimensions here.</strong>
+            <p>
+              {failure} Switch on hardware acceleration or WebGL in the browser's settings. The maps
+              show the same numbers.
+            </p>
+          </div>
+        )}
+      </div>
+      <div class="row spread small muted">
+        <span>
+          From {quantity(low, layer.unit)} to {quantity(high, layer.unit)}.
+        </span>
+        <button type="button" class="compact" onClick={() => scene.current?.resetView()}>
+          Reset view
+        </button>
+      </div>
+    </>
+  )
+}
+
+/** The range of every layer; their numbers one by one are in the maps' tables. */
+function Summary({ layers }: { layers: readonly Layer[] }) {
+  return (
+    <table>
+      <caption>Every number is in the tables of the maps below.</caption>
+      <thead>
+        <tr>
+          <th scope="col">what</th>
+          <th scope="col" class="numeric">
+            least
+          </th>
+          <th scope="col" class="numeric">
+            greatest
+          </th>
+        </tr>
+      </thead>
+      <tbody>
+        {layers.map(({ key, title, values, unit }) => (
+          <tr key={key}>
+            <th scope="row">{title}</th>
+            {extent(values).map((value, k) => (
+              <td class="numeric" key={k}>
+                {quantity(value, unit)}
+              </td>
+            ))}
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  )
+}

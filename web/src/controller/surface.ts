@@ -1,0 +1,142 @@
+/** A fuzzy controller's surface: numbers over error and current. Pure. */
+
+import type { components } from '../api/schema'
+
+type Schemas = components['schemas']
+
+export type SurfaceView = Schemas['SurfaceView']
+export type Universe = Schemas['UniverseView']
+export type Output = Schemas['FuzzyOutputView']
+export type Rule = Schemas['RuleView']
+
+/** Values by error, then by current. */
+export type Matrix = readonly (readonly number[])[]
+
+/** A point of the grid. */
+export interface Cell {
+  readonly error: number
+  readonly current: number
+}
+
+/** A matrix over error and current with what its numbers mean. */
+export interface Layer {
+  readonly key: 'inference' | 'table' | 'difference'
+  readonly title: string
+  readonly note: string
+  readonly values: Matrix
+  readonly error: Universe
+  readonly current: Universe
+  readonly unit: string
+  /** Value of full colour; as much below zero. */
+  readonly limit: number
+}
+
+/** Inference, table, and table less inference; the first two in the same colours. */
+export function layersOf(surface: SurfaceView, output: Output): Layer[] {
+  const axes = { error: inputOf(surface, 'error'), current: inputOf(surface, 'current') }
+  const difference = output.table.map((row, i) => row.map((v, k) => v - output.inference[i][k]))
+  const limit = Math.max(largest(output.inference), largest(output.table))
+  const common = { ...axes, unit: output.unit }
+  return [
+    {
+      ...common,
+      key: 'inference',
+      title: 'Inference',
+      note: 'What the rules say.',
+      values: output.inference,
+      limit,
+    },
+    {
+      ...common,
+      key: 'table',
+      title: 'Quantised table',
+      note: 'What the microcontroller looks up.',
+      values: output.table,
+      limit,
+    },
+    {
+      ...common,
+      key: 'difference',
+      title: 'Difference',
+      note: 'Table less inference, in colours of its own.',
+      values: difference,
+      limit: largest(difference),
+    },
+  ]
+}
+
+export function inputOf(surface: SurfaceView, name: string): Universe {
+  const found = surface.inputs.find((input) => input.name === name)
+  if (!found) throw new Error(`the surface has no input ${name}; reload the page`)
+  return found
+}
+
+/** Least and greatest value of a matrix. */
+export function extent(values: Matrix): readonly [low: number, high: number] {
+  let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
+  for (const row of values) {
+    for (const value of row) {
+      low = Math.min(low, value)
+      high = Math.max(high, value)
+    }
+  }
+  return [low, high]
+}
+
+/** Number of values. */
+export function cells(values: Matrix): number {
+  return values.reduce((sum, row) => sum + row.length, 0)
+}
+
+function largest(values: Matrix): number {
+  const [low, high] = extent(values)
+  return Math.max(Math.abs(low), Math.abs(high))
+}
+
+/** The cell in the middle of the error's range and a quarter up the current's. */
+export function firstCell({ error, current }: Layer): Cell {
+  return {
+    error: Math.floor((3 * error.values.length) / 4),
+    current: Math.floor(current.values.length / 4),
+  }
+}
+
+/** The cell so many steps further, within the grid. */
+export function moved(cell: Cell, errors: number, currents: number, layer: Layer): Cell {
+  const within = (index: number, count: number) => Math.min(count - 1, Math.max(0, index))
+  return {
+    error: within(cell.error + errors, layer.error.values.length),
+    current: within(cell.current + currents, layer.current.values.length),
+  }
+}
+
+/** Index of the value nearest to another one. */
+export function nearest(values: readonly number[], value: number): number {
+  return values.reduce(
+    (best, v, k) => (Math.abs(v - value) < Math.abs(values[best] - value) ? k : best),
+    0,
+  )
+}
+
+/** How far a rule fires at a cell, times its weight: the least degree of its antecedents [1]. */
+export function strength(rule: Rule, surface: SurfaceView, cell: Cell): number {
+  const degrees = Object.entries(rule.if).map(([name, set]) => {
+    const input = inputOf(surface, name)
+    const membership = input.memberships.find((m) => m.name === set)
+    return membership?.degrees[indexOf(input, surface, cell)] ?? 0
+  })
+  return Math.min(1, ...degrees) * rule.weight
+}
+
+/** Index of an input's value at a cell; inputs beside error and current are held. */
+export function indexOf(input: Universe, surface: SurfaceView, cell: Cell): number {
+  if (input.name === 'error') return cell.error
+  if (input.name === 'current') return cell.current
+  return nearest(input.values, surface.velocity_error ?? 0)
+}
+
+/** A rule as a sentence. */
+export function ruleText(rule: Rule, output: string): string {
+  const conditions = Object.entries(rule.if).map(([name, set]) => `${name} is ${set}`)
+  return `If ${conditions.join(' and ')}, then ${output} is ${rule.then}`
+}

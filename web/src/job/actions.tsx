@@ -1,0 +1,135 @@
+/** Pause, resume, extend, cancel and clone, as far as the job's state allows. */
+
+import { useState } from 'preact/hooks'
+import { post } from '../api/client'
+import type { Job } from '../api/types'
+import { ConfirmDialog } from '../components/confirm-dialog'
+import { ErrorNotice } from '../components/feedback'
+import { formatCount } from '../format/number'
+import { withQuery } from '../router/routes'
+
+type Asking = 'cancel' | 'extend' | null
+
+export function JobActions({ job, onJob }: { job: Job; onJob: (job: Job) => void }) {
+  const [asking, setAsking] = useState<Asking>(null)
+  const [busy, setBusy] = useState(false)
+  const [error, setError] = useState<unknown>(null)
+  const command = (send: () => Promise<Job>) => {
+    setBusy(true)
+    setError(null)
+    setAsking(null)
+    send()
+      .then(onJob, setError)
+      .finally(() => setBusy(false))
+  }
+  const path = { job_id: job.id }
+  const can = (name: string) => name in job.links
+  return (
+    <div class="stack-tight actions">
+      <div class="row">
+        {can('pause') && (
+          <button
+            type="button"
+            disabled={busy}
+            onClick={() => command(() => post('/v1/jobs/{job_id}/pause', { path }))}
+          >
+            Pause
+          </button>
+        )}
+        {can('resume') && (
+          <button
+            type="button"
+            class="primary"
+            disabled={busy}
+            onClick={() => command(() => post('/v1/jobs/{job_id}/resume', { path }))}
+          >
+            Resume
+          </button>
+        )}
+        {can('extend') && (
+          <button type="button" disabled={busy} onClick={() => setAsking('extend')}>
+            Extend…
+          </button>
+        )}
+        <a class="button" href={withQuery('/jobs/new', { clone: job.id })}>
+          Clone
+        </a>
+        {can('cancel') && (
+          <button type="button" class="danger" disabled={busy} onClick={() => setAsking('cancel')}>
+            Cancel…
+          </button>
+        )}
+      </div>
+      {error !== null && <ErrorNotice what="That was not done." error={error} />}
+      <ConfirmDialog
+        open={asking === 'cancel'}
+        title="Cancel this job for good?"
+        confirm="Cancel the job"
+        dismiss="Keep it"
+        dangerous
+        onConfirm={() => command(() => post('/v1/jobs/{job_id}/cancel', { path }))}
+        onDismiss={() => setAsking(null)}
+      >
+        <p>
+          It cannot be resumed. The {formatCount(job.iterations)} iterations that are committed
+          stay; the one under way is lost. To go on later, pause it instead.
+        </p>
+      </ConfirmDialog>
+      <ExtendDialog
+        key={`${job.id} ${asking === 'extend'}`}
+        job={job}
+        open={asking === 'extend'}
+        onExtend={(iterations) =>
+          command(() => post('/v1/jobs/{job_id}/extend', { path, body: { iterations } }))
+        }
+        onDismiss={() => setAsking(null)}
+      />
+    </div>
+  )
+}
+
+function ExtendDialog({
+  job,
+  open,
+  onExtend,
+  onDismiss,
+}: {
+  job: Job
+  open: boolean
+  onExtend: (iterations: number) => void
+  onDismiss: () => void
+}) {
+  const [budget, setBudget] = useState(String(job.iterations_planned + 25))
+  const wanted = Number(budget)
+  const valid = Number.isInteger(wanted) && wanted > job.iterations
+  return (
+    <ConfirmDialog
+      open={open}
+      title="Give the job another budget"
+      confirm={`Run ${valid ? formatCount(wanted) : '…'} iterations in all`}
+      disabled={!valid}
+      onConfirm={() => onExtend(wanted)}
+      onDismiss={onDismiss}
+    >
+      <p>
+        {formatCount(job.iterations)} of {formatCount(job.iterations_planned)} iterations are done;
+        the job goes on after them.
+      </p>
+      <div class="field">
+        <label for="extend-budget">
+          Iterations in all <span class="unit">[1]</span>
+        </label>
+        <input
+          id="extend-budget"
+          type="number"
+          min={job.iterations + 1}
+          step={1}
+          value={budget}
+          aria-invalid={!valid}
+          onInput={(event) => setBudget(event.currentTarget.value)}
+        />
+        {!valid && <span class="wrong">a whole number above {formatCount(job.iterations)}</span>}
+      </div>
+    </ConfirmDialog>
+  )
+}

@@ -1,0 +1,66 @@
+/** The same selection by numbers, for keyboards and for exact bounds. */
+
+import { type Brushes, withBrush } from '../charts/parallel-coordinates'
+import { type Axis, type ParallelModel, placeOf, valueAt } from '../charts/parallel-model'
+
+export function BrushFields({
+  model,
+  brushes,
+  onBrush,
+}: {
+  model: ParallelModel
+  brushes: Brushes
+  onBrush: (brushes: Brushes) => void
+}) {
+  return (
+    <details class="brush-fields">
+      <summary>Select by numbers</summary>
+      <div class="brush-grid">
+        {model.axes.map((axis, index) => {
+          const [low, high] = brushes.get(index) ?? [0, 1]
+          const change = (end: 'low' | 'high', text: string) => {
+            const place = text === '' ? (end === 'low' ? 0 : 1) : placeOf(axis, Number(text))
+            const brush = end === 'low' ? ([place, high] as const) : ([low, place] as const)
+            const whole = brush[0] <= 0 && brush[1] >= 1
+            onBrush(withBrush(brushes, index, whole ? null : brush))
+          }
+          return (
+            <fieldset key={axis.name}>
+              <legend>
+                {axis.name} {axis.unit !== '1' && <span class="unit">[{axis.unit}]</span>}
+              </legend>
+              <Bound axis={axis} name="from" place={low} onChange={(text) => change('low', text)} />
+              <Bound axis={axis} name="to" place={high} onChange={(text) => change('high', text)} />
+            </fieldset>
+          )
+        })}
+      </div>
+    </details>
+  )
+}
+
+function Bound({
+  axis,
+  name,
+  place,
+  onChange,
+}: {
+  axis: Axis
+  name: 'from' | 'to'
+  place: number
+  onChange: (text: string) => void
+}) {
+  return (
+    <label class="row small">
+      {name}
+      <input
+        class="short"
+        type="number"
+        step="any"
+        aria-label={`${axis.name} ${name}`}
+        value={Number(valueAt(axis, place).toPrecision(4))}
+        onChange={(event) => onChange(event.currentTarget.value)}
+      />
+    </label>
+  )
+}

@@ -1,0 +1,67 @@
+/** How far the swarm is spread over the design space. */
+
+import { useMemo } from 'preact/hooks'
+import { LineChart } from '../charts/line-chart'
+import { ChartFrame } from '../components/chart-frame'
+import { Table } from '../components/table'
+import { percent } from '../format/number'
+import type { Distribution } from './use-distribution'
+
+export function DiversityChart({ distribution }: { distribution: Distribution }) {
+  const { items } = distribution
+  const drawn = useMemo(
+    () => ({
+      x: items.map((item) => item.index),
+      series: [
+        {
+          label: 'diversity',
+          values: items.map((item) => (item.diversity === null ? null : item.diversity * 100)),
+          colour: '--series-3' as const,
+        },
+      ],
+    }),
+    [items],
+  )
+  return (
+    <ChartFrame
+      title="Diversity of the swarm"
+      note="Spread of the designs as a share of each variable’s range: near zero, the swarm has gathered."
+      table={() => (
+        <Table
+          caption="Diversity by iteration"
+          tall
+          rows={items}
+          rowKey={(item) => String(item.index)}
+          order={{ column: 'index', descending: true }}
+          columns={[
+            {
+              key: 'index',
+              label: 'Iteration',
+              numeric: true,
+              header: true,
+              value: (i) => i.index,
+            },
+            {
+              key: 'diversity',
+              label: 'Diversity',
+              numeric: true,
+              value: (item) => item.diversity,
+              cell: (item) => percent(item.diversity),
+            },
+          ]}
+        />
+      )}
+    >
+      <LineChart
+        label={`Diversity of the swarm, now ${percent(items.at(-1)?.diversity)} of the range`}
+        x={drawn.x}
+        xLabel="iteration"
+        counted
+        yLabel="diversity"
+        yUnit="%"
+        series={drawn.series}
+        fromZero
+      />
+    </ChartFrame>
+  )
+}

@@ -1,0 +1,120 @@
+/** A job's name, state, figures and commands. */
+
+import { useNow } from '../api/resource'
+import type { Job } from '../api/types'
+import { Progress } from '../components/progress'
+import { STATE_TONES, StateBadge } from '../components/state-badge'
+import { formatCount, quantity } from '../format/number'
+import { formatAge, formatClock, formatDuration, formatMoment } from '../format/time'
+import { JobActions } from './actions'
+import type { LiveJob } from './use-job'
+
+export function JobHeader({ live, job }: { live: LiveJob; job: Job }) {
+  const { followed } = live
+  const committed = Math.max(job.iterations, followed.iterations.length)
+  const tone = STATE_TONES[job.state]
+  return (
+    <section class="card job-header" aria-label="The job">
+      <div class="page-header">
+        <div>
+          <div class="row">
+            <h1>{job.name || job.id}</h1>
+            <span role="status">
+              <StateBadge state={job.state} />
+            </span>
+            <StreamNote live={live} />
+          </div>
+          <p class="muted small">{subtitle(job)}</p>
+        </div>
+        <JobActions job={job} onJob={live.replace} />
+      </div>
+      {job.error && (
+        <div class="notice" data-tone="bad" role="alert" data-error>
+          <strong>It failed.</strong>
+          <p>{job.error}</p>
+          <p class="small">
+            What was committed before is kept. Resume tries the iteration again; clone lets you
+            change the job.
+          </p>
+        </div>
+      )}
+      <Progress
+        done={committed}
+        planned={job.iterations_planned}
+        label={`${committed} of ${job.iterations_planned} iterations`}
+        tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
+      />
+      <Figures job={job} committed={committed} />
+    </section>
+  )
+}
+
+function Figures({ job, committed }: { job: Job; committed: number }) {
+  const now = useNow(1000)
+  const unit = fitnessUnit(job)
+  return (
+    <dl class="figures">
+      <Figure
+        label="Iterations"
+        value={`${formatCount(committed)} of ${formatCount(job.iterations_planned)}`}
+      />
+      <Figure label="Best fitness" value={quantity(job.best_fitness, unit, 5)} />
+      <Figure
+        label="Found in iteration"
+        value={job.best_iteration === null ? '–' : formatCount(job.best_iteration)}
+      />
+      <Figure
+        label="Evaluations"
+        value={`${formatCount(job.evaluations)} of ${formatCount(job.evaluations_planned)}`}
+      />
+      <Figure label="Evaluation rate" value={quantity(job.evaluations_per_second, '1/s', 3)} />
+      <Figure label="Walks" value={quantity(job.simulations_per_second, '1/s', 3)} />
+      <Figure
+        label="Time left"
+        value={job.state === 'succeeded' ? 'done' : formatDuration(job.eta_seconds)}
+      />
+      <Figure label="Computing time" value={formatDuration(job.compute_seconds)} />
+      <Figure label="Submitted" value={`${formatAge(job.created_at, now)} ago`} />
+    </dl>
+  )
+}
+
+function Figure({ label, value }: { label: string; value: string }) {
+  return (
+    <div>
+      <dt>{label}</dt>
+      <dd>{value}</dd>
+    </div>
+  )
+}
+
+/** Whether what is shown is what is. */
+function StreamNote({ live }: { live: LiveJob }) {
+  const { connection, staleSince } = live.followed
+  if (connection === 'stale' && staleSince !== null) {
+    return (
+      <span class="badge" data-tone="warn" role="status">
+        data is stale since {formatClock(staleSince)}; reconnecting
+      </span>
+    )
+  }
+  if (connection === 'open') return <span class="muted small">live</span>
+  return null
+}
+
+/** Unit of the job's fitness: the product of a tuning job has none, an identification fits amperes. */
+export function fitnessUnit(job: Job): string {
+  return job.kind === 'identification' ? 'A' : '1'
+}
+
+function subtitle(job: Job): string {
+  const { spec } = job
+  const parts = [
+    job.id,
+    job.controller ?? 'identification',
+    `${formatCount(job.particles)} particles`,
+    `seed ${spec.seed}`,
+    `submitted ${formatMoment(job.created_at)}`,
+  ]
+  return parts.join(' · ')
+}

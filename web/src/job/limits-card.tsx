@@ -1,0 +1,129 @@
+/** What limits the winner now, in words and numbers; and the winner itself. */
+
+import type { Job, JobSpec, Preference } from '../api/types'
+import { Table } from '../components/table'
+import { exactQuantity, formatNumber, percent, quantity } from '../format/number'
+import { inWords } from '../format/words'
+import { withQuery } from '../router/routes'
+import { variableUnits } from './design-variables'
+import { type Analysis, analyse, type Factor } from './preference'
+
+export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
+  // The API writes every preset out.
+  const analysis = job.best && analyse(job.best.scenarios, spec.preference as Preference)
+  if (!analysis) return null
+  const units = new Map(job.objectives.map((o) => [o.name, o.unit]))
+  return (
+    <section class="card" aria-labelledby="limits">
+      <h2 id="limits">What limits the winner</h2>
+      <div class="stack">
+        <p data-limit={`${analysis.worstScenario} ${analysis.worstFactor.objective}`}>
+          {explain(analysis, units)}
+        </p>
+        <ContributionTable analysis={analysis} />
+      </div>
+    </section>
+  )
+}
+
+function explain(
+  { worstScenario, worstFactor, excess, factors }: Analysis,
+  units: Map<string, string>,
+) {
+  const steepest = factors.reduce((a, b) => (b.sensitivity > a.sensitivity ? b : a))
+  const value = quantity(worstFactor.value, units.get(worstFactor.objective) ?? '1')
+  const gain = 1 - (1 - 0.1) ** steepest.sensitivity
+  return (
+    <>
+      The scenario <strong>{worstScenario}</strong> holds it back most: its utility is{' '}
+      {formatNumber(excess, 3)} times the geometric mean of all scenarios. There,{' '}
+      <strong>{inWords(worstFactor.objective)}</strong> ({value}) weighs most. The most to gain is
+      in {inWords(steepest.objective)} of {steepest.scenario}: 10&nbsp;% less of it lowers the
+      fitness by some {percent(gain, 2)}.
+    </>
+  )
+}
+
+/** e ln(b + f) of every factor; the row sums are the logarithms of the utilities. */
+function ContributionTable({ analysis }: { analysis: Analysis }) {
+  const scenarios = Object.keys(analysis.utilities)
+  const objectives = [...new Set(analysis.factors.map((f) => f.objective))]
+  const most = Math.max(...analysis.factors.map((f) => Math.abs(f.contribution)))
+  const factor = (scenario: string, objective: string) =>
+    analysis.factors.find((f) => f.scenario === scenario && f.objective === objective) ?? null
+  return (
+    <div>
+      <Table
+        caption="Contribution e ln(b + f) of each objective to the logarithm of each scenario's utility"
+        rows={scenarios}
+        rowKey={(scenario) => scenario}
+        order={{ column: 'sum', descending: true }}
+        columns={[
+          { key: 'scenario', label: 'Scenario', header: true, value: (s) => s },
+          ...objectives.map((objective) => ({
+            key: objective,
+            label: inWords(objective),
+            numeric: true,
+            value: (s: string) => factor(s, objective)?.contribution ?? null,
+            cell: (s: string) => <Share factor={factor(s, objective)} most={most} />,
+          })),
+          {
+            key: 'sum',
+            label: 'ln utility',
+            numeric: true,
+            value: (s) => analysis.utilities[s],
+            cell: (s) => <strong>{formatNumber(analysis.utilities[s], 3)}</strong>,
+          },
+        ]}
+      />
+      <p class="muted small">
+        Each number is e ln(b + f), dimensionless; the sums are the logarithms of the utilities.
+      </p>
+    </div>
+  )
+}
+
+function Share({ factor, most }: { factor: Factor | null; most: number }) {
+  if (factor === null) return <>–</>
+  const width = (Math.abs(factor.contribution) / most) * 100
+  return (
+    <span class="share" data-negative={factor.contribution < 0}>
+      <i style={{ width: `${width}%` }} aria-hidden="true" />
+      <span>{formatNumber(factor.contribution, 3)}</span>
+    </span>
+  )
+}
+
+export function BestCard({ job }: { job: Job }) {
+  const best = job.best!
+  const units = variableUnits(job.spec)
+  const place = { job: job.id, iteration: best.iteration, particle: best.particle }
+  return (
+    <section class="card" aria-labelledby="winner">
+      <header class="row spread">
+        <h2 id="winner">The winner</h2>
+        {job.kind === 'tuning' && (
+          <span class="row">
+            <a class="button compact" href={withQuery('/walk', place)}>
+              See it walk
+            </a>
+            <a class="button compact" href={withQuery('/controller', place)}>
+              Its controller
+            </a>
+          </span>
+        )}
+      </header>
+      <p class="muted small">
+        Particle {best.particle} of iteration {best.iteration}
+      </p>
+      <dl class="design">
+        {Object.entries(best.design).map(([name, value]) => (
+          <div key={name}>
+            <dt>{name}</dt>
+            <dd>{exactQuantity(value, units.get(name) ?? '1')}</dd>
+          </div>
+        ))}
+      </dl>
+    </section>
+  )
+}

@@ -1,0 +1,49 @@
+/** How a job converges: best and swarm over the iterations, spread, and what limits the winner. */
+
+import type { Job } from '../api/types'
+import { Empty, ErrorNotice } from '../components/feedback'
+import { ConvergenceChart } from './convergence-chart'
+import { DistributionChart } from './distribution-chart'
+import { DiversityChart } from './diversity-chart'
+import { BestCard, LimitsCard } from './limits-card'
+import { useDistribution } from './use-distribution'
+import type { LiveJob } from './use-job'
+
+export function OverviewPanel({ live, job }: { live: LiveJob; job: Job }) {
+  const { iterations } = live.followed
+  const distribution = useDistribution(job.id, iterations.length)
+  if (iterations.length === 0) {
+    return (
+      <section class="card">
+        <Empty title={job.state === 'queued' ? 'Waiting for a runner' : 'No iteration yet'}>
+          <p>
+            {job.state === 'queued'
+              ? 'A runner takes the job up when it has room; this page shows it at once.'
+              : 'The first iteration appears here as soon as it is committed.'}
+          </p>
+        </Empty>
+      </section>
+    )
+  }
+  return (
+    <div class="stack">
+      {distribution.error !== null && distribution.error !== undefined && (
+        <ErrorNotice
+          what="The distribution of the swarm cannot be shown."
+          error={distribution.error}
+        />
+      )}
+      <ConvergenceChart job={job} iterations={iterations} distribution={distribution} />
+      <div class="grid">
+        <DistributionChart job={job} distribution={distribution} />
+        <DiversityChart distribution={distribution} />
+      </div>
+      {job.best && (
+        <>
+          <BestCard job={job} />
+          {job.spec.kind !== 'identification' && <LimitsCard job={job} spec={job.spec} />}
+        </>
+      )}
+    </div>
+  )
+}

@@ -1,0 +1,96 @@
+/** One job, live: header, commands, and its parts under tabs. */
+
+import { ErrorNotice, Loading } from '../components/feedback'
+import { jobPath } from '../router/routes'
+import { JobHeader } from './header'
+import { IterationPanel } from './iteration-panel'
+import { IterationsPanel } from './iterations-panel'
+import './job.css'
+import { OverviewPanel } from './overview-panel'
+import { PreferencesPanel } from './preferences-panel'
+import { ReproducePanel } from './reproduce-panel'
+import { ScenariosPanel } from './scenarios-panel'
+import { type LiveJob, useJob } from './use-job'
+import { VariablesPanel } from './variables-panel'
+
+const TABS = [
+  { tab: '', label: 'Overview' },
+  { tab: 'scenarios', label: 'Scenarios' },
+  { tab: 'variables', label: 'Variables' },
+  { tab: 'iterations', label: 'Iterations' },
+  { tab: 'preferences', label: 'What if' },
+  { tab: 'reproduce', label: 'Spec' },
+] as const
+
+export default function JobPage({ id, tab }: { id: string; tab: string }) {
+  // Another job is another page: nothing of the one before may stay.
+  return <OneJob key={id} id={id} tab={tab} />
+}
+
+function OneJob({ id, tab }: { id: string; tab: string }) {
+  const live = useJob(id)
+  const { job } = live
+  if (job === null) {
+    if (live.error === null) return <Loading what="the job" />
+    return (
+      <div class="stack">
+        <h1>Job {id}</h1>
+        <ErrorNotice what="The job cannot be shown." error={live.error} retry={live.reload} />
+        <p>
+          <a href="/jobs">All jobs</a>
+        </p>
+      </div>
+    )
+  }
+  const tabs = TABS.filter((t) => t.tab !== 'preferences' || job.kind === 'tuning')
+  const [section] = tab.split('/')
+  return (
+    <div
+      class="stack"
+      data-iteration={live.followed.iterations.at(-1)?.index ?? ''}
+      data-best={live.followed.iterations.at(-1)?.best_so_far ?? ''}
+      data-stream={streamState(live)}
+    >
+      <JobHeader live={live} job={job} />
+      <nav class="tabs" aria-label="Parts of the job">
+        {tabs.map((t) => (
+          <a
+            key={t.tab}
+            href={jobPath(id, t.tab)}
+            aria-current={t.tab === section ? 'page' : undefined}
+          >
+            {t.tab === 'scenarios' && job.kind === 'identification' ? 'Recordings' : t.label}
+          </a>
+        ))}
+      </nav>
+      <Panel live={live} tab={tab} />
+    </div>
+  )
+}
+
+function Panel({ live, tab }: { live: LiveJob; tab: string }) {
+  const job = live.job!
+  const [section, detail] = tab.split('/')
+  switch (section) {
+    case '':
+      return <OverviewPanel live={live} job={job} />
+    case 'scenarios':
+      return <ScenariosPanel job={job} />
+    case 'variables':
+      return <VariablesPanel live={live} job={job} />
+    case 'iterations':
+      if (detail) return <IterationPanel job={job} index={Number(detail)} />
+      return <IterationsPanel live={live} job={job} />
+    case 'preferences':
+      return <PreferencesPanel job={job} />
+    case 'reproduce':
+      return <ReproducePanel job={job} />
+    default:
+      return <ErrorNotice what="The job has no such part." error="Choose one of those above." />
+  }
+}
+
+/** As tests and other tools read it. */
+function streamState({ followed }: LiveJob): 'open' | 'stale' | 'ended' | 'connecting' {
+  return followed.connection
+}

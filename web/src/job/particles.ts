@@ -1,0 +1,41 @@
+/** All particles of a job as columns of numbers, as /v1/jobs/{id}/particles sends them. */
+
+export interface ParticleColumn {
+  readonly name: string
+  readonly unit: string
+  /** Bounds of a searched variable; null for what has none. */
+  readonly low: number | null
+  readonly high: number | null
+  readonly kind: string
+  /** One per particle; NaN where there is none. */
+  readonly values: Float32Array
+}
+
+export interface Particles {
+  readonly rows: number
+  /** Particles that the job has; more than `rows` if they were thinned. */
+  readonly total: number
+  readonly columns: readonly ParticleColumn[]
+}
+
+interface Header {
+  rows: number
+  total: number
+  columns: Omit<ParticleColumn, 'values'>[]
+}
+
+/** Read the answer: length of the header (uint32), header (JSON, padded), columns (float32). */
+export function decodeParticles(buffer: ArrayBuffer): Particles {
+  const length = new DataView(buffer).getUint32(0, true)
+  const text = new TextDecoder().decode(new Uint8Array(buffer, 4, length))
+  const header = JSON.parse(text) as Header
+  const columns = header.columns.map((column, index) => ({
+    ...column,
+    values: new Float32Array(buffer, 4 + length + index * header.rows * 4, header.rows),
+  }))
+  return { rows: header.rows, total: header.total, columns }
+}
+
+export function columnNamed(particles: Particles, name: string): ParticleColumn | null {
+  return particles.columns.find((column) => column.name === name) ?? null
+}

@@ -1,0 +1,136 @@
+/** Biases and exponents of the five objectives to move, and the published preferences. */
+
+import type { Preference, PreferencePreset } from '../api/types'
+import { inWords } from '../format/words'
+import { PREFERRED } from './preference'
+
+type Part = 'bias' | 'exponent'
+
+/** Sliders reach this far, or to the present value; fields take whatever the API takes. */
+const REACH = 2
+
+export function PreferenceSliders({
+  preference,
+  own,
+  presets,
+  units,
+  onChange,
+}: {
+  preference: Preference
+  /** The job's own. */
+  own: Preference
+  presets: readonly PreferencePreset[]
+  units: ReadonlyMap<string, string>
+  onChange: (preference: Preference) => void
+}) {
+  const change = (part: Part, index: number, value: number) => {
+    if (!Number.isFinite(value) || value < 0) return
+    const values = [...preference[part]]
+    values[index] = value
+    onChange({ ...preference, [part]: values as Preference[Part] })
+  }
+  return (
+    <section class="card" aria-labelledby="weights">
+      <h2 id="weights">Preference</h2>
+      <div class="stack">
+        <p class="muted small">
+          A scenario’s utility is the product of (b + f)<sup>e</sup> over the objectives f. A larger
+          e makes an objective matter more, a larger b makes small values of it matter less.
+        </p>
+        <fieldset class="segmented" aria-label="Published preferences">
+          <Choice
+            label="the job’s own"
+            chosen={same(preference, own)}
+            onChoose={() => onChange(own)}
+          />
+          {presets.map((preset) => (
+            <Choice
+              key={preset.name}
+              label={preset.name}
+              chosen={same(preference, preset)}
+              onChoose={() => onChange({ bias: preset.bias, exponent: preset.exponent })}
+            />
+          ))}
+        </fieldset>
+        {PREFERRED.map((objective, index) => (
+          <fieldset key={objective} class="weights">
+            <legend>{inWords(objective)}</legend>
+            <Weight
+              label="b"
+              name={`bias of ${inWords(objective)}`}
+              unit={units.get(objective) ?? '1'}
+              value={preference.bias[index]}
+              onChange={(value) => change('bias', index, value)}
+            />
+            <Weight
+              label="e"
+              name={`exponent of ${inWords(objective)}`}
+              unit="1"
+              value={preference.exponent[index]}
+              onChange={(value) => change('exponent', index, value)}
+            />
+          </fieldset>
+        ))}
+      </div>
+    </section>
+  )
+}
+
+function Weight({
+  label,
+  name,
+  unit,
+  value,
+  onChange,
+}: {
+  label: string
+  name: string
+  unit: string
+  value: number
+  onChange: (value: number) => void
+}) {
+  return (
+    <div class="weight">
+      <span aria-hidden="true">{label}</span>
+      <input
+        type="range"
+        min={0}
+        max={Math.max(REACH, value)}
+        step={0.01}
+        value={value}
+        aria-label={name}
+        onInput={(event) => onChange(event.currentTarget.valueAsNumber)}
+      />
+      <input
+        type="number"
+        min={0}
+        step={0.01}
+        value={Number(value.toPrecision(6))}
+        aria-label={`${name}, number`}
+        onChange={(event) => onChange(event.currentTarget.valueAsNumber)}
+      />
+      <span class="unit">{unit === '1' ? '' : unit}</span>
+    </div>
+  )
+}
+
+function Choice({
+  label,
+  chosen,
+  onChoose,
+}: {
+  label: string
+  chosen: boolean
+  onChoose: () => void
+}) {
+  return (
+    <button type="button" class="compact" aria-pressed={chosen} onClick={onChoose}>
+      {label}
+    </button>
+  )
+}
+
+export function same(a: Preference, b: Preference): boolean {
+  const equal = (x: readonly number[], y: readonly number[]) => x.every((v, k) => v === y[k])
+  return equal(a.bias, b.bias) && equal(a.exponent, b.exponent)
+}

@@ -1,0 +1,89 @@
+/** The bias-weighted product and its parts (thesis eq. 4.1, 4.2), to explain what limits a design. */
+
+import type { Preference, ScenarioResult } from '../api/types'
+
+/** The objectives that a preference weighs, in its order: f1..f5 of table 4.1. */
+export const PREFERRED = [
+  'torque',
+  'acceleration',
+  'angular_acceleration',
+  'energy',
+  'reciprocal_speed',
+] as const
+
+/** One factor (b + f)^e of a scenario's utility. */
+export interface Factor {
+  readonly scenario: string
+  readonly objective: string
+  readonly value: number
+  /** e ln(b + f): what it adds to the logarithm of the utility. */
+  readonly contribution: number
+  /** Change of the fitness, as a share of it, per relative change of the objective. */
+  readonly sensitivity: number
+}
+
+/** Why a design is worth what it is. */
+export interface Analysis {
+  readonly factors: readonly Factor[]
+  /** Logarithm of each scenario's utility. */
+  readonly utilities: Readonly<Record<string, number>>
+  /** The scenario of greatest utility, that is, of the worst. */
+  readonly worstScenario: string
+  /** The factor of greatest contribution in that scenario. */
+  readonly worstFactor: Factor
+  /** Utility of the worst scenario over the geometric mean of all. */
+  readonly excess: number
+}
+
+/** The factors of every scenario's utility; null if a walk failed. */
+export function analyse(
+  scenarios: Readonly<Record<string, ScenarioResult>>,
+  preference: Preference,
+): Analysis | null {
+  const names = Object.keys(scenarios)
+  const factors: Factor[] = []
+  const utilities: Record<string, number> = {}
+  for (const scenario of names) {
+    const own = factorsOf(scenario, scenarios[scenario], preference, names.length)
+    if (own === null) return null
+    factors.push(...own)
+    utilities[scenario] = own.reduce((sum, f) => sum + f.contribution, 0)
+  }
+  if (factors.length === 0) return null
+  const worstScenario = names.reduce((a, b) => (utilities[b] > utilities[a] ? b : a))
+  const worstFactor = factors
+    .filter((f) => f.scenario === worstScenario)
+    .reduce((a, b) => (b.contribution > a.contribution ? b : a))
+  const mean = names.reduce((sum, name) => sum + utilities[name], 0) / names.length
+  const excess = Math.exp(utilities[worstScenario] - mean)
+  return { factors, utilities, worstScenario, worstFactor, excess }
+}
+
+/** Utility of one walk under a preference (eq. 4.1); null if it failed. */
+export function utilityOf(result: ScenarioResult, preference: Preference): number | null {
+  const factors = factorsOf('', result, preference, 1)
+  return factors && Math.exp(factors.reduce((sum, f) => sum + f.contribution, 0))
+}
+
+function factorsOf(
+  scenario: string,
+  result: ScenarioResult,
+  { bias, exponent }: Preference,
+  scenarios: number,
+): Factor[] | null {
+  if (result.status !== 'ok') return null
+  const factors: Factor[] = []
+  for (const [m, objective] of PREFERRED.entries()) {
+    const [b, e, f] = [bias[m], exponent[m], result.objectives[objective]]
+    if (e === 0) continue
+    if (f === null || f === undefined || !(b + f > 0)) return null
+    factors.push({
+      scenario,
+      objective,
+      value: f,
+      contribution: e * Math.log(b + f),
+      sensitivity: (e * f) / (b + f) / scenarios,
+    })
+  }
+  return factors
+}

@@ -1,0 +1,38 @@
+/** The job as it was asked for, and commands that ask for the same again. */
+
+import type { Job } from '../api/types'
+import { CopyBlock } from '../components/copy-button'
+import { withQuery } from '../router/routes'
+import { curlCommand, submitCommand } from './commands'
+
+export function ReproducePanel({ job }: { job: Job }) {
+  return (
+    <div class="stack">
+      <section class="card" aria-labelledby="again">
+        <header class="row spread">
+          <h2 id="again">Run the same again</h2>
+          <a class="button compact" href={withQuery('/jobs/new', { clone: job.id })}>
+            Clone in the form
+          </a>
+        </header>
+        <div class="stack">
+          <p class="muted small">
+            The same spec with the same seed gives the same designs and the same bits.
+          </p>
+          <div class="stack-tight">
+            <h3>With the command line</h3>
+            <CopyBlock label="the command" text={submitCommand(job.spec, location.origin)} />
+          </div>
+          <div class="stack-tight">
+            <h3>With curl</h3>
+            <CopyBlock label="the curl command" text={curlCommand(job.spec, location.origin)} />
+          </div>
+        </div>
+      </section>
+      <section class="card" aria-labelledby="spec">
+        <h2 id="spec">The spec as JSON</h2>
+        <CopyBlock label="the spec" text={JSON.stringify(job.spec, null, 2)} />
+      </section>
+    </div>
+  )
+}

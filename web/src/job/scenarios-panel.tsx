@@ -1,0 +1,201 @@
+/** The winner scenario by scenario: utilities and objectives, beside those of a reference. */
+
+import type { Job, Preference, ScenarioResult } from '../api/types'
+import { Empty, ErrorNotice, Loading } from '../components/feedback'
+import { type Column, Table } from '../components/table'
+import { change, formatNumber } from '../format/number'
+import { inWords } from '../format/words'
+import { setQuery, usePlace } from '../router/navigation'
+import { withQuery } from '../router/routes'
+import { fitnessUnit } from './header'
+import { utilityOf } from './preference'
+import { type Reference, ReferencePicker, useReference } from './reference'
+import { UtilityBars } from './utility-bars'
+
+interface Row {
+  readonly scenario: string
+  readonly own: ScenarioResult
+  readonly other: ScenarioResult | null
+  readonly utility: number | null
+  readonly otherUtility: number | null
+}
+
+export function ScenariosPanel({ job }: { job: Job }) {
+  const { query } = usePlace()
+  const byDefault = job.kind === 'tuning' ? 'published:fuzzy-pi:A' : 'none'
+  const choice = query.get('against') ?? byDefault
+  const reference = useReference(job, choice)
+  if (!job.best) {
+    return (
+      <section class="card">
+        <Empty title="No winner yet">
+          <p>
+            No design has walked in every scenario so far. Its results appear here as soon as one
+            has.
+          </p>
+        </Empty>
+      </section>
+    )
+  }
+  const rows = rowsOf(job, reference.data)
+  return (
+    <div class="stack">
+      <div class="row spread">
+        <ReferencePicker job={job} choice={choice} onChoose={(against) => setQuery({ against })} />
+        {reference.data && <Summary job={job} rows={rows} label={reference.data.label} />}
+      </div>
+      {reference.loading && <Loading what="the reference" />}
+      {reference.error && (
+        <ErrorNotice
+          what="The reference cannot be shown."
+          error={reference.error}
+          retry={reference.reload}
+        />
+      )}
+      <UtilityBars
+        unit={fitnessUnit(job)}
+        rows={rows.map((r) => ({ name: r.scenario, own: r.utility, other: r.otherUtility }))}
+        label={reference.data?.label ?? null}
+        table={() => <UtilityTable job={job} rows={rows} reference={reference.data} />}
+      />
+      <section class="card" aria-labelledby="objectives">
+        <h2 id="objectives">Objectives of the winner</h2>
+        <Table
+          caption="Objectives of the winner by scenario"
+          rows={rows}
+          rowKey={(row) => row.scenario}
+          columns={objectiveColumns(job, reference.data)}
+        />
+        {reference.data && (
+          <p class="muted small">
+            In each cell: the winner, then {reference.data.label} and how much the winner is above
+            or below it. Less is better everywhere.
+          </p>
+        )}
+      </section>
+    </div>
+  )
+}
+
+function rowsOf(job: Job, reference: Reference | null): readonly Row[] {
+  const preference = job.spec.kind === 'identification' ? null : (job.spec.preference as Preference)
+  return Object.entries(job.best!.scenarios).map(([scenario, own]) => {
+    const other = reference?.scenarios[scenario] ?? null
+    // Another job may have another preference: its utilities are not to be compared, its objectives are.
+    const otherUtility = other && (preference ? utilityOf(other, preference) : other.utility)
+    return { scenario, own, other, utility: own.utility, otherUtility }
+  })
+}
+
+/** Fitness of both over the scenarios that both have walked in. */
+function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: string }) {
+  const both = rows.filter((row) => row.utility !== null && row.otherUtility !== null)
+  if (both.length === 0) return <p>{label} has no scenario in common with this job.</p>
+  const ratio =
+    fitnessOf(
+      job,
+      both.map((r) => r.utility!),
+    ) /
+    fitnessOf(
+      job,
+      both.map((r) => r.otherUtility!),
+    )
+  const share = Math.abs(ratio - 1) * 100
+  return (
+    <p data-ratio={ratio}>
+      Over {both.length === rows.length ? 'all' : `the ${both.length} common`} scenarios the winner
+      is <strong>{formatNumber(share, 3)}&nbsp;%</strong> {ratio < 1 ? 'better' : 'worse'} than{' '}
+      {label}.
+    </p>
+  )
+}
+
+/** Geometric mean of utilities (eq. 4.2); of an identification's errors the plain mean. */
+function fitnessOf(job: Job, utilities: readonly number[]): number {
+  const mean = (values: readonly number[]) => values.reduce((a, b) => a + b, 0) / values.length
+  return job.kind === 'tuning' ? Math.exp(mean(utilities.map(Math.log))) : mean(utilities)
+}
+
+function UtilityTable({
+  job,
+  rows,
+  reference,
+}: {
+  job: Job
+  rows: readonly Row[]
+  reference: Reference | null
+}) {
+  const unit = fitnessUnit(job)
+  const columns: Column<Row>[] = [
+    { key: 'scenario', label: 'Scenario', header: true, value: (r) => r.scenario },
+    {
+      key: 'own',
+      label: 'Winner',
+      unit,
+      numeric: true,
+      value: (r) => r.utility,
+      cell: (r) => formatNumber(r.utility),
+    },
+  ]
+  if (reference) {
+    columns.push({
+      key: 'other',
+      label: reference.label,
+      unit,
+      numeric: true,
+      value: (r) => r.otherUtility,
+      cell: (r) => formatNumber(r.otherUtility),
+    })
+  }
+  return (
+    <Table caption="Utility by scenario" rows={rows} rowKey={(r) => r.scenario} columns={columns} />
+  )
+}
+
+function objectiveColumns(job: Job, reference: Reference | null): readonly Column<Row>[] {
+  const { iteration, particle } = job.best!
+  const walk = (scenario: string) =>
+    withQuery('/walk', { job: job.id, iteration, particle, scenario })
+  return [
+    {
+      key: 'scenario',
+      label: 'Scenario',
+      header: true,
+      value: (row) => row.scenario,
+      cell: (row) =>
+        job.kind === 'tuning' ? <a href={walk(row.scenario)}>{row.scenario}</a> : row.scenario,
+    },
+    ...job.objectives.map(
+      (objective): Column<Row> => ({
+        key: objective.name,
+        label: inWords(objective.name),
+        unit: objective.unit,
+        numeric: true,
+        value: (row) => row.own.objectives[objective.name] ?? null,
+        cell: (row) => (
+          <Compared
+            own={row.own.objectives[objective.name]}
+            other={reference ? (row.other?.objectives[objective.name] ?? null) : undefined}
+          />
+        ),
+      }),
+    ),
+  ]
+}
+
+function Compared({ own, other }: { own: number | null; other: number | null | undefined }) {
+  if (other === undefined) return <>{formatNumber(own)}</>
+  // Between numbers that change their sign, a share says nothing.
+  const comparable = own !== null && other !== null && own > 0 && other > 0
+  const share = comparable ? (own / other - 1) * 100 : null
+  const tone = share === null || Math.abs(share) < 0.05 ? 'same' : share < 0 ? 'better' : 'worse'
+  return (
+    <span class="compared">
+      <span>{formatNumber(own)}</span>
+      <span class="muted small">
+        {formatNumber(other)}{' '}
+        {share !== null && <span data-tone={tone}>{change(share, '%', 2)}</span>}
+      </span>
+    </span>
+  )
+}

@@ -1,0 +1,73 @@
+/** Some designs of a job as a table, each with the way to its walk. */
+
+import type { Job } from '../api/types'
+import { type Column, Table } from '../components/table'
+import { formatNumber } from '../format/number'
+import { jobPath, withQuery } from '../router/routes'
+import { columnNamed, type Particles } from './particles'
+
+const DIGITS: Readonly<Record<string, number>> = { integer: 1, continuous: 4 }
+
+export function SelectedDesigns({
+  job,
+  particles,
+  rows,
+}: {
+  job: Job
+  particles: Particles
+  /** Rows of `particles`, in the order wanted. */
+  rows: readonly number[]
+}) {
+  const iteration = columnNamed(particles, 'iteration')!.values
+  const particle = columnNamed(particles, 'particle')!.values
+  const numbers = particles.columns.filter(({ kind }) => kind !== 'index')
+  return (
+    <Table
+      caption="Designs"
+      rows={rows}
+      rowKey={(row) => `${iteration[row]} ${particle[row]}`}
+      order={{ column: 'fitness', descending: false }}
+      columns={[
+        {
+          key: 'design',
+          label: 'Design',
+          header: true,
+          value: (row) => iteration[row] * 1e5 + particle[row],
+          cell: (row) => <Where job={job} iteration={iteration[row]} particle={particle[row]} />,
+        },
+        ...numbers.map(
+          (column): Column<number> => ({
+            key: column.name,
+            label: column.name.replace(':', ' '),
+            unit: column.unit,
+            numeric: true,
+            value: (row) => (Number.isNaN(column.values[row]) ? null : column.values[row]),
+            cell: (row) => formatNumber(column.values[row], DIGITS[column.kind] ?? 5),
+          }),
+        ),
+      ]}
+    />
+  )
+}
+
+/** Iteration and particle, leading to its walk; where nothing walks, to its iteration. */
+export function Where({
+  job,
+  iteration,
+  particle,
+}: {
+  job: Job
+  iteration: number
+  particle: number
+}) {
+  const scenario = job.scenarios[0]
+  const target =
+    job.kind === 'tuning'
+      ? withQuery('/walk', { job: job.id, iteration, particle, scenario })
+      : jobPath(job.id, `iterations/${iteration}`)
+  return (
+    <a href={target} class="nowrap">
+      iteration {iteration}, particle {particle}
+    </a>
+  )
+}

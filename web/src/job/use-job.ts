@@ -1,0 +1,126 @@
+/** One job, live: its events, and the rest of it asked for again whenever they tell news. */
+
+import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
+import { get, url } from '../api/client'
+import { ApiProblem } from '../api/problem'
+import type { Iteration, Job } from '../api/types'
+import { EventStream, type Followed, type Source } from './event-stream'
+
+export interface LiveJob {
+  readonly job: Job | null
+  readonly error: unknown
+  readonly followed: Followed
+  /** Show what a command answered, and follow the job if it goes on. */
+  readonly replace: (job: Job) => void
+  readonly reload: () => void
+}
+
+const NOTHING_YET: Followed = {
+  iterations: [],
+  state: null,
+  error: null,
+  connection: 'connecting',
+  staleSince: null,
+}
+
+/** Rates and times are worth a question at most this often [ms]. */
+const ASK_MS = 1000
+
+export function useJob(id: string): LiveJob {
+  const [job, setJob] = useState<Job | null>(null)
+  const [error, setError] = useState<unknown>(null)
+  const [followed, setFollowed] = useState<Followed>(NOTHING_YET)
+  const stream = useRef<EventStream | null>(null)
+  const asked = useRef(0)
+  const missing = useRef(false)
+
+  const ask = useCallback(() => {
+    asked.current = Date.now()
+    get('/v1/jobs/{job_id}', { path: { job_id: id } }).then(
+      (answer) => {
+        setJob(answer)
+        setError(null)
+      },
+      (problem: unknown) => {
+        setError(problem)
+        // There is nothing to follow, and asking again does not help.
+        missing.current = problem instanceof ApiProblem && problem.status === 404
+        if (missing.current) stream.current?.close()
+      },
+    )
+  }, [id])
+
+  useEffect(() => {
+    ask()
+    let left = false
+    const show = (iterations: readonly Iteration[]) => {
+      if (!left) setFollowed({ ...NOTHING_YET, iterations })
+    }
+    committedSoFar(id, show).then((known) => {
+      if (left || missing.current) return
+      stream.current = new EventStream(browserPorts(id), setFollowed, known)
+    })
+    const back = () => stream.current?.restart()
+    const gone = () => stream.current?.interrupt()
+    addEventListener('online', back)
+    addEventListener('offline', gone)
+    return () => {
+      removeEventListener('online', back)
+      removeEventListener('offline', gone)
+      left = true
+      stream.current?.close()
+      stream.current = null
+    }
+  }, [id])
+
+  // A new state is asked about at once, new iterations now and then.
+  useEffect(() => {
+    if (followed.state !== null) ask()
+  }, [followed.state, followed.connection])
+  useEffect(() => {
+    if (followed.iterations.length === 0) return
+    const wait = Math.max(0, asked.current + ASK_MS - Date.now())
+    const timer = setTimeout(ask, wait)
+    return () => clearTimeout(timer)
+  }, [followed.iterations.length])
+
+  const replace = useCallback((answer: Job) => {
+    setJob(answer)
+    stream.current?.restart()
+  }, [])
+  return { job, error, followed, replace, reload: ask }
+}
+
+/** Thousands of iterations come faster in pages than as events; if not all come, the stream does. */
+async function committedSoFar(
+  id: string,
+  show: (iterations: readonly Iteration[]) => void,
+): Promise<readonly Iteration[]> {
+  const known: Iteration[] = []
+  try {
+    for (;;) {
+      const page = await get('/v1/jobs/{job_id}/iterations', {
+        path: { job_id: id },
+        query: { after: known.at(-1)?.index, limit: 1000 },
+      })
+      known.push(...page.items)
+      show([...known])
+      if (page.next === null) return known
+    }
+  } catch {
+    return known
+  }
+}
+
+function browserPorts(id: string) {
+  const path = '/v1/jobs/{job_id}/events'
+  return {
+    open: (after: number | null): Source =>
+      new EventSource(url(path, { job_id: id }, { after })) as Source,
+    now: () => Date.now(),
+    later: (call: () => void, milliseconds: number) => {
+      const timer = setTimeout(call, milliseconds)
+      return () => clearTimeout(timer)
+    },
+  }
+}

@@ -1,0 +1,158 @@
+/** All designs of a job across their variables, coloured by fitness; brushing selects some. */
+
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { getBytes } from '../api/client'
+import { useResource } from '../api/resource'
+import type { Job } from '../api/types'
+import { type Brushes, ParallelCoordinates } from '../charts/parallel-coordinates'
+import { type AxisSource, bestRows, buildModel, selectRows } from '../charts/parallel-model'
+import { ChartFrame, LegendEntry } from '../components/chart-frame'
+import { Empty, ErrorNotice, Loading } from '../components/feedback'
+import { formatCount } from '../format/number'
+import { BrushFields } from './brush-fields'
+import { columnNamed, decodeParticles, type Particles } from './particles'
+import { SelectedDesigns } from './selected-designs'
+import type { LiveJob } from './use-job'
+
+const NONE: Brushes = new Map()
+/** How often a running job's particles are asked for again [ms]. */
+const RENEW_MS = 8000
+
+export function VariablesPanel({ live, job }: { live: LiveJob; job: Job }) {
+  const wanted = useSlowly(live.followed.iterations.length, RENEW_MS)
+  const particles = useResource(`${job.id} ${wanted}`, (signal) =>
+    getBytes('/v1/jobs/{job_id}/particles', { path: { job_id: job.id }, signal }).then(
+      decodeParticles,
+    ),
+  )
+  // While newer ones are on their way, those before stay to be looked at.
+  const shown = useRef<Particles | null>(null)
+  if (particles.data) shown.current = particles.data
+  if (particles.error && !shown.current) {
+    return (
+      <ErrorNotice
+        what="The designs cannot be shown."
+        error={particles.error}
+        retry={particles.reload}
+      />
+    )
+  }
+  if (!shown.current) return <Loading what="all designs" />
+  if (shown.current.rows === 0) {
+    return (
+      <section class="card">
+        <Empty title="No designs yet">
+          <p>They appear here with the first committed iteration.</p>
+        </Empty>
+      </section>
+    )
+  }
+  return <Designs job={job} particles={shown.current} />
+}
+
+function Designs({ job, particles }: { job: Job; particles: Particles }) {
+  const [utilities, setUtilities] = useState(false)
+  const [brushes, setBrushes] = useState(NONE)
+  const sources = useMemo(() => axesOf(particles, utilities), [particles, utilities])
+  const model = useMemo(
+    () => buildModel(sources, columnNamed(particles, 'fitness')!.values),
+    [sources, particles],
+  )
+  const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
+  const best = useMemo(() => bestRows(model, selected, 20), [model, selected])
+  const thinned = particles.rows < particles.total
+  const count = `${formatCount(selected.length)} of ${formatCount(particles.rows)} designs`
+  return (
+    <div class="stack" data-selected={selected.length}>
+      <ChartFrame
+        title="Designs by their variables"
+        note={`Each line is a design. Drag along axes to select; click an axis to let go.${
+          thinned ? ` Thinned from ${formatCount(particles.total)} designs, the best kept.` : ''
+        }`}
+        tools={
+          <>
+            <label class="check small">
+              <input
+                type="checkbox"
+                checked={utilities}
+                onChange={(event) => {
+                  setUtilities(event.currentTarget.checked)
+                  setBrushes(NONE)
+                }}
+              />
+              utilities too
+            </label>
+            <button
+              type="button"
+              class="compact"
+              disabled={brushes.size === 0}
+              onClick={() => setBrushes(NONE)}
+            >
+              Select all
+            </button>
+          </>
+        }
+        legend={
+          <>
+            <LegendEntry colour="--rank-best" label="best" />
+            <LegendEntry colour="--rank-middle" label="middle" />
+            <LegendEntry colour="--rank-worst" label="worst, by rank of fitness" />
+            <strong aria-live="polite">{count} selected</strong>
+          </>
+        }
+        table={() => <SelectedDesigns job={job} particles={particles} rows={best} />}
+      >
+        <ParallelCoordinates
+          model={model}
+          brushes={brushes}
+          onBrush={setBrushes}
+          label={`Parallel coordinates of ${count}`}
+        />
+        <BrushFields model={model} brushes={brushes} onBrush={setBrushes} />
+      </ChartFrame>
+      <section class="card" aria-labelledby="selected">
+        <h2 id="selected">The best of those selected</h2>
+        {best.length === 0 ? (
+          <Empty title="No design with a fitness is selected">
+            <button type="button" onClick={() => setBrushes(NONE)}>
+              Select all
+            </button>
+          </Empty>
+        ) : (
+          <SelectedDesigns job={job} particles={particles} rows={best} />
+        )}
+      </section>
+    </div>
+  )
+}
+
+function axesOf({ columns }: Particles, utilities: boolean): readonly AxisSource[] {
+  const wanted = columns.filter(
+    ({ kind }) => kind === 'continuous' || kind === 'integer' || (kind === 'utility' && utilities),
+  )
+  const fitness = columns.filter(({ kind }) => kind === 'fitness')
+  return [...wanted, ...fitness].map((column) => ({
+    name: column.name.replace(/^utility:/, ''),
+    unit: column.unit,
+    low: column.low,
+    high: column.high,
+    logarithmic: column.kind === 'fitness' || column.kind === 'utility',
+    values: column.values,
+  }))
+}
+
+/** A number that follows another one, but not more often than every `milliseconds`. */
+function useSlowly(value: number, milliseconds: number): number {
+  const [shown, setShown] = useState(value)
+  const changed = useRef(0)
+  useEffect(() => {
+    if (value === shown) return
+    const wait = shown === 0 ? 0 : Math.max(0, changed.current + milliseconds - Date.now())
+    const timer = setTimeout(() => {
+      changed.current = Date.now()
+      setShown(value)
+    }, wait)
+    return () => clearTimeout(timer)
+  }, [value, shown, milliseconds])
+  return shown
+}

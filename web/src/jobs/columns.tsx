@@ -1,0 +1,98 @@
+/** Columns of the list of jobs. */
+
+import type { JobSummary } from '../api/types'
+import { Progress } from '../components/progress'
+import { STATE_TONES, StateBadge } from '../components/state-badge'
+import type { Column } from '../components/table'
+import { formatCount, formatNumber } from '../format/number'
+import { formatAge, formatDuration, formatMoment } from '../format/time'
+import { jobPath } from '../router/routes'
+
+/** now: [ms], for ages. */
+export function jobColumns(now: number): readonly Column<JobSummary>[] {
+  return [
+    {
+      key: 'name',
+      label: 'Name',
+      header: true,
+      value: (job) => job.name || job.id,
+      cell: (job) => <NameCell job={job} />,
+    },
+    {
+      key: 'state',
+      label: 'State',
+      value: (job) => job.state,
+      cell: (job) => <StateBadge state={job.state} />,
+    },
+    {
+      key: 'progress',
+      label: 'Iterations',
+      value: (job) => job.iterations / job.iterations_planned,
+      cell: (job) => <ProgressCell job={job} />,
+    },
+    {
+      key: 'best',
+      label: 'Best fitness',
+      numeric: true,
+      value: (job) => job.best_fitness,
+      cell: (job) => formatNumber(job.best_fitness, 5),
+    },
+    {
+      key: 'rate',
+      label: 'Evaluations',
+      unit: '1/s',
+      numeric: true,
+      minor: true,
+      value: (job) => job.evaluations_per_second,
+      cell: (job) => formatNumber(job.evaluations_per_second, 3),
+    },
+    {
+      key: 'eta',
+      label: 'Time left',
+      numeric: true,
+      minor: true,
+      value: (job) => (job.state === 'succeeded' ? null : job.eta_seconds),
+      cell: (job) => (job.state === 'succeeded' ? '–' : formatDuration(job.eta_seconds)),
+    },
+    {
+      key: 'age',
+      label: 'Age',
+      numeric: true,
+      minor: true,
+      value: (job) => -Date.parse(job.created_at),
+      cell: (job) => (
+        <time dateTime={job.created_at} title={`submitted ${formatMoment(job.created_at)}`}>
+          {formatAge(job.created_at, now)}
+        </time>
+      ),
+    },
+  ]
+}
+
+function NameCell({ job }: { job: JobSummary }) {
+  const what = [job.kind === 'identification' ? 'identification' : null, job.controller]
+  const details = [job.name ? job.id : null, ...what].filter((part) => part)
+  return (
+    <div class="job-name">
+      <a href={jobPath(job.id)}>{job.name || job.id}</a>
+      <span class="muted small">{details.join(' · ')}</span>
+      {job.error && <span class="wrong">{job.error}</span>}
+    </div>
+  )
+}
+
+function ProgressCell({ job }: { job: JobSummary }) {
+  const tone = STATE_TONES[job.state]
+  const text = `${formatCount(job.iterations)} of ${formatCount(job.iterations_planned)}`
+  return (
+    <div class="job-progress">
+      <span>{text}</span>
+      <Progress
+        done={job.iterations}
+        planned={job.iterations_planned}
+        label={`${text} iterations`}
+        tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
+      />
+    </div>
+  )
+}

@@ -1,0 +1,72 @@
+/** The address bar as state: links move without reloading, back and forward work. */
+
+import { useEffect, useState } from 'preact/hooks'
+
+/** What the address bar says. */
+export interface Place {
+  readonly path: string
+  readonly query: URLSearchParams
+}
+
+type Listener = () => void
+
+const listeners = new Set<Listener>()
+
+/** Go to an address of this page, for example `/jobs/new?clone=k2q7`. */
+export function navigate(href: string, { replace = false } = {}): void {
+  if (replace) history.replaceState(null, '', href)
+  else history.pushState(null, '', href)
+  for (const listener of [...listeners]) listener()
+}
+
+/** Change some of the query; null removes a value. The place in the history stays the same. */
+export function setQuery(changes: Readonly<Record<string, string | null>>): void {
+  const query = new URLSearchParams(location.search)
+  for (const [name, value] of Object.entries(changes)) {
+    if (value === null) query.delete(name)
+    else query.set(name, value)
+  }
+  const text = query.toString()
+  navigate(text === '' ? location.pathname : `${location.pathname}?${text}`, { replace: true })
+}
+
+/** The present place; the component renders again when it changes. */
+export function usePlace(): Place {
+  const [href, setHref] = useState(location.pathname + location.search)
+  useEffect(() => {
+    const update = () => setHref(location.pathname + location.search)
+    listeners.add(update)
+    addEventListener('popstate', update)
+    update()
+    return () => {
+      listeners.delete(update)
+      removeEventListener('popstate', update)
+    }
+  }, [])
+  const [path, query] = split(href)
+  return { path, query: new URLSearchParams(query) }
+}
+
+/** Follow plain clicks on links to this page's own paths without reloading. */
+export function followLinks(): void {
+  document.addEventListener('click', (event) => {
+    if (event.defaultPrevented || event.button !== 0) return
+    if (event.metaKey || event.ctrlKey || event.shiftKey || event.altKey) return
+    const link = (event.target as Element | null)?.closest('a')
+    if (!link || link.target !== '' || link.hasAttribute('download')) return
+    if (link.origin !== location.origin || !isOwnPath(link.pathname)) return
+    event.preventDefault()
+    navigate(link.pathname + link.search)
+    scrollTo(0, 0)
+  })
+}
+
+/** Other paths of the server, such as /docs and /v1, are left to the browser. */
+function isOwnPath(path: string): boolean {
+  return path === '/' || /^\/(jobs|walk|controller)(\/|$)/.test(path)
+}
+
+function split(href: string): [path: string, query: string] {
+  const at = href.indexOf('?')
+  return at < 0 ? [href, ''] : [href.slice(0, at), href.slice(at)]
+}

@@ -1,0 +1,55 @@
+/** Which page a path means. Pure: the address bar is the navigation module's. */
+
+/** A page, with what its path says. */
+export type Route =
+  | { readonly page: 'jobs' }
+  | { readonly page: 'new-job' }
+  | { readonly page: 'job'; readonly id: string; readonly tab: string }
+  | { readonly page: 'walk' }
+  | { readonly page: 'controller' }
+  | { readonly page: 'not-found' }
+
+/** The route of a path such as `/jobs/k2q7/iterations`; a slash at its end makes no difference. */
+export function routeOf(path: string): Route {
+  const parts = path.split('/').filter((part) => part !== '')
+  const [first, second, ...rest] = parts.map(decoded)
+  switch (first) {
+    case undefined:
+      return { page: 'jobs' }
+    case 'jobs':
+      if (second === undefined) return { page: 'jobs' }
+      if (second === 'new' && rest.length === 0) return { page: 'new-job' }
+      return { page: 'job', id: second, tab: rest.join('/') }
+    case 'walk':
+      return second === undefined ? { page: 'walk' } : { page: 'not-found' }
+    case 'controller':
+      return second === undefined ? { page: 'controller' } : { page: 'not-found' }
+    default:
+      return { page: 'not-found' }
+  }
+}
+
+/** The path of a job's page. */
+export function jobPath(id: string, tab = ''): string {
+  const base = `/jobs/${encodeURIComponent(id)}`
+  return tab === '' ? base : `${base}/${tab}`
+}
+
+/** A path with the values that are set as its query. */
+export function withQuery(
+  path: string,
+  query: Readonly<Record<string, string | number | undefined>>,
+): string {
+  const set = Object.entries(query).filter(([, value]) => value !== undefined && value !== '')
+  if (set.length === 0) return path
+  return `${path}?${new URLSearchParams(set.map(([name, value]) => [name, String(value)]))}`
+}
+
+/** A part of a path that cannot be decoded stays as it is. */
+function decoded(part: string): string {
+  try {
+    return decodeURIComponent(part)
+  } catch {
+    return part
+  }
+}

@@ -1,0 +1,37 @@
+/** Everything that the form offers, as the API lists it. */
+
+import { get } from '../api/client'
+import type { Controller, PreferencePreset, ScenarioPreset } from '../api/types'
+import { fieldsOf, type OpenApiDocument, type SchemaField } from './schema-fields'
+
+export interface Catalogue {
+  readonly controllers: readonly Controller[]
+  readonly scenarios: readonly ScenarioPreset[]
+  readonly preferences: readonly PreferencePreset[]
+  readonly fields: {
+    readonly job: ReadonlyMap<string, SchemaField>
+    readonly scenario: ReadonlyMap<string, SchemaField>
+    readonly optimizer: ReadonlyMap<string, SchemaField>
+    readonly variant: ReadonlyMap<string, SchemaField>
+  }
+}
+
+export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
+  const [controllers, scenarios, preferences, document] = await Promise.all([
+    get('/v1/controllers', { signal }),
+    get('/v1/scenarios', { signal }),
+    get('/v1/preferences', { signal }),
+    fetch('/openapi.json', { signal }).then((answer) => answer.json() as Promise<OpenApiDocument>),
+  ])
+  return {
+    controllers: controllers.items,
+    scenarios: scenarios.items,
+    preferences: preferences.items,
+    fields: {
+      job: fieldsOf(document, 'JobSpec'),
+      scenario: fieldsOf(document, 'Scenario'),
+      optimizer: fieldsOf(document, 'PsoSettings'),
+      variant: fieldsOf(document, 'RobotVariant'),
+    },
+  }
+}

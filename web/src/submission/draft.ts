@@ -1,0 +1,208 @@
+/** A job as it stands in the form: numbers are still text, choices not yet a spec. */
+
+import type { JobSpec, Scenario, Variable } from '../api/types'
+import type { Catalogue } from './catalogue'
+import type { SchemaField } from './schema-fields'
+
+/** What becomes of a variable; `default` leaves a gait variable to each scenario. */
+export type VariableMode = 'searched' | 'fixed' | 'default'
+
+export interface VariableDraft {
+  readonly mode: VariableMode
+  readonly low: string
+  readonly high: string
+  readonly value: string
+}
+
+export interface RobotDraft {
+  readonly kind: 'szabadka2' | 'variant' | 'files'
+  readonly contact_law: string
+  /** Coxa, femur, tibia [deg]. */
+  readonly gearlash: readonly string[]
+  readonly toml: string
+  readonly urdf: string
+}
+
+export interface PreferenceDraft {
+  /** Name of a preset, or `own`. */
+  readonly kind: string
+  readonly bias: readonly string[]
+  readonly exponent: readonly string[]
+}
+
+export interface Draft {
+  readonly name: string
+  readonly robot: RobotDraft
+  readonly controller: string
+  /** Names of the presets that are chosen. */
+  readonly presets: readonly string[]
+  /** Scenarios of one's own, by field. */
+  readonly own: readonly Readonly<Record<string, string>>[]
+  readonly variables: Readonly<Record<string, VariableDraft>>
+  readonly preference: PreferenceDraft
+  readonly optimizer: Readonly<Record<string, string>>
+  readonly iterations: string
+  readonly seed: string
+}
+
+/** What the API does if nothing is said. */
+export function emptyDraft(catalogue: Catalogue): Draft {
+  const { job, optimizer, variant } = catalogue.fields
+  const controller = String(job.get('controller')?.default)
+  const preset = String(job.get('preference')?.default)
+  return {
+    name: '',
+    robot: {
+      kind: 'szabadka2',
+      contact_law: text(variant.get('contact_law')?.default),
+      gearlash: list(variant.get('gearlash')?.default, 3),
+      toml: '',
+      urdf: '',
+    },
+    controller,
+    presets: catalogue.scenarios.map((scenario) => scenario.name),
+    own: [],
+    variables: defaultVariables(catalogue, controller),
+    preference: preferenceDraft(catalogue, preset),
+    optimizer: defaults(optimizer),
+    iterations: text(job.get('iterations')?.default),
+    seed: text(job.get('seed')?.default),
+  }
+}
+
+/** All variables of a controller searched within the catalogue's bounds, gait left alone. */
+export function defaultVariables(
+  catalogue: Catalogue,
+  controller: string,
+): Readonly<Record<string, VariableDraft>> {
+  const found = catalogue.controllers.find(({ name }) => name === controller)
+  if (!found) return {}
+  const published = found.published.A ?? Object.values(found.published)[0] ?? {}
+  const entry = (variable: Variable, mode: VariableMode): [string, VariableDraft] => [
+    variable.name,
+    {
+      mode,
+      low: text(variable.low),
+      high: text(variable.high),
+      value: text(published[variable.name] ?? middle(variable)),
+    },
+  ]
+  return Object.fromEntries([
+    ...found.variables.map((variable) => entry(variable, 'searched')),
+    ...found.gait_variables.map((variable) => entry(variable, 'default')),
+  ])
+}
+
+/** The form of a spec that was submitted before; presets are recognized by their values. */
+export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
+  const empty = emptyDraft(catalogue)
+  const controller = spec.controller ?? empty.controller
+  const scenarios = (spec.scenarios ?? []).map((entry) =>
+    typeof entry === 'string' ? entry : (presetOf(entry, catalogue) ?? entry),
+  )
+  return {
+    name: spec.name ?? '',
+    robot: robotDraft(spec.robot, empty.robot),
+    controller,
+    presets: scenarios.filter((entry) => typeof entry === 'string'),
+    own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
+    variables: variablesOf(spec, defaultVariables(catalogue, controller)),
+    preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
+    optimizer: { ...empty.optimizer, ...texts(spec.optimizer ?? {}) },
+    iterations: text(spec.iterations),
+    seed: text(spec.seed),
+  }
+}
+
+/** A scenario of one's own to start from: a preset's values, or those that have a default. */
+export function scenarioDraft(
+  fields: ReadonlyMap<string, SchemaField>,
+  start: Scenario | null,
+  name: string,
+): Readonly<Record<string, string>> {
+  const values = start === null ? {} : texts(start)
+  const known = Object.entries({ ...defaults(fields), ...values }).filter(([key]) =>
+    fields.has(key),
+  )
+  return { ...Object.fromEntries(known), name }
+}
+
+export function preferenceDraft(catalogue: Catalogue, kind: string): PreferenceDraft {
+  const preset = catalogue.preferences.find(({ name }) => name === kind) ?? catalogue.preferences[0]
+  return { kind, bias: preset.bias.map(text), exponent: preset.exponent.map(text) }
+}
+
+/** The draft of a preference; one of the presets if it has a preset's values. */
+export function preferenceOf(
+  preference: JobSpec['preference'] | undefined,
+  catalogue: Catalogue,
+): PreferenceDraft | null {
+  if (preference === undefined) return null
+  if (typeof preference === 'string') return preferenceDraft(catalogue, preference)
+  const preset = catalogue.preferences.find(
+    ({ bias, exponent }) =>
+      JSON.stringify([bias, exponent]) === JSON.stringify([preference.bias, preference.exponent]),
+  )
+  if (preset) return preferenceDraft(catalogue, preset.name)
+  return { kind: 'own', bias: preference.bias.map(text), exponent: preference.exponent.map(text) }
+}
+
+function variablesOf(
+  spec: JobSpec,
+  byDefault: Readonly<Record<string, VariableDraft>>,
+): Readonly<Record<string, VariableDraft>> {
+  const drafts = { ...byDefault }
+  if (spec.variables) {
+    for (const entry of spec.variables) {
+      const name = typeof entry === 'string' ? entry : entry.name
+      const bounds =
+        typeof entry === 'string' ? {} : { low: text(entry.low), high: text(entry.high) }
+      if (drafts[name]) drafts[name] = { ...drafts[name], ...bounds, mode: 'searched' }
+    }
+  }
+  for (const [name, value] of Object.entries(spec.fixed ?? {})) {
+    if (drafts[name]) drafts[name] = { ...drafts[name], value: text(value), mode: 'fixed' }
+  }
+  return drafts
+}
+
+function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
+  if (robot === undefined || typeof robot === 'string') return empty
+  if ('toml' in robot) return { ...empty, kind: 'files', toml: robot.toml, urdf: robot.urdf }
+  return {
+    ...empty,
+    kind: 'variant',
+    contact_law: robot.contact_law ?? empty.contact_law,
+    gearlash: robot.gearlash?.map(text) ?? empty.gearlash,
+  }
+}
+
+/** Name of the preset with the same values in every field. */
+function presetOf(scenario: Scenario, catalogue: Catalogue): string | null {
+  const fields = [...catalogue.fields.scenario.keys()] as (keyof Scenario)[]
+  const same = catalogue.scenarios.find((preset) =>
+    fields.every((field) => preset[field] === scenario[field]),
+  )
+  return same?.name ?? null
+}
+
+function defaults(fields: ReadonlyMap<string, SchemaField>): Record<string, string> {
+  return Object.fromEntries([...fields].map(([name, field]) => [name, text(field.default)]))
+}
+
+function middle({ low, high, kind }: Variable): number {
+  const value = Number(((low + high) / 2).toPrecision(4))
+  return kind === 'integer' ? Math.round(value) : value
+}
+
+function texts(values: object): Record<string, string> {
+  return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, text(value)]))
+}
+
+function list(values: unknown, length: number): readonly string[] {
+  return Array.isArray(values) ? values.map(text) : Array(length).fill('0')
+}
+
+function text(value: unknown): string {
+  return value === undefined || value === null ? '' : String(value)
+}

@@ -1,0 +1,73 @@
+/** All parts of the form, with the estimate and the spec beside them. */
+
+import { useEffect, useMemo, useState } from 'preact/hooks'
+import { ApiProblem } from '../api/problem'
+import type { JobSpec } from '../api/types'
+import { errorsByField, specOf, withKinds } from './build-spec'
+import type { Catalogue } from './catalogue'
+import type { Draft } from './draft'
+import { JobSection, OptimizerSection } from './job-section'
+import { JsonForm } from './json-form'
+import { PreferenceSection } from './preference-section'
+import { RobotSection } from './robot-section'
+import { ScenariosSection } from './scenarios-section'
+import { SubmitPanel } from './submit-panel'
+import { useSubmission } from './use-submission'
+import { VariablesSection } from './variables-section'
+
+export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial: Draft }) {
+  const [draft, setDraft] = useState(initial)
+  const [asJson, setAsJson] = useState(false)
+  const spec = useMemo(() => built(draft, catalogue), [draft, catalogue])
+  const submission = useSubmission(spec)
+  const { problem } = submission
+  const errors = useMemo(
+    () => errorsByField(problem instanceof ApiProblem ? problem.errors : [], draft),
+    [problem, draft],
+  )
+  useEffect(() => {
+    if (submission.attempts > 0 && problem !== null) showFirstProblem()
+  }, [submission.attempts, problem])
+  if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
+  const parts = {
+    draft,
+    catalogue,
+    errors,
+    onChange: (changes: Partial<Draft>) => setDraft((old) => ({ ...old, ...changes })),
+  }
+  return (
+    <form
+      class="submission"
+      noValidate
+      onSubmit={(event) => {
+        event.preventDefault()
+        submission.submit()
+      }}
+    >
+      <div class="stack">
+        <JobSection {...parts} />
+        <RobotSection {...parts} />
+        <VariablesSection {...parts} />
+        <ScenariosSection {...parts} />
+        <PreferenceSection {...parts} />
+        <OptimizerSection {...parts} />
+      </div>
+      <SubmitPanel spec={spec} submission={submission} onJson={() => setAsJson(true)} />
+    </form>
+  )
+}
+
+function built(draft: Draft, catalogue: Catalogue): JobSpec {
+  const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
+  const known = controller ? [...controller.variables, ...controller.gait_variables] : []
+  return withKinds(specOf(draft), known)
+}
+
+/** After a refused submission the first field that is to blame takes the focus. */
+function showFirstProblem(): void {
+  requestAnimationFrame(() => {
+    const field = document.querySelector<HTMLElement>('.submission [aria-invalid="true"]')
+    if (field) field.focus()
+    else document.querySelector('.submission [role="alert"]')?.scrollIntoView({ block: 'center' })
+  })
+}

@@ -1,0 +1,91 @@
+/** A labelled number with unit, bounds and the problem that the API has with it. */
+
+import { useId } from 'preact/hooks'
+import { boundsInWords, describe, type SchemaField } from './schema-fields'
+
+export function NumberField({
+  label,
+  field,
+  value,
+  error,
+  onChange,
+}: {
+  label: string
+  field: SchemaField
+  value: string
+  error?: string
+  onChange: (value: string) => void
+}) {
+  const id = useId()
+  const bounds = boundsInWords(field)
+  return (
+    <div class="field">
+      <label for={id}>
+        {label} {field.unit !== '1' && <span class="unit">[{field.unit}]</span>}
+      </label>
+      <input
+        id={id}
+        inputMode="decimal"
+        value={value}
+        aria-invalid={error !== undefined}
+        aria-describedby={`${id}-hint`}
+        title={describe(field)}
+        onInput={(event) => onChange(event.currentTarget.value)}
+      />
+      <span id={`${id}-hint`}>
+        <span class="hint">{bounds}</span>
+        {error !== undefined && <span class="wrong"> {error}</span>}
+      </span>
+    </div>
+  )
+}
+
+/** A labelled choice. */
+export function ChoiceField({
+  label,
+  choices,
+  value,
+  error,
+  hint,
+  onChange,
+}: {
+  label: string
+  choices: readonly string[]
+  value: string
+  error?: string
+  hint?: string
+  onChange: (value: string) => void
+}) {
+  const id = useId()
+  return (
+    <div class="field">
+      <label for={id}>{label}</label>
+      <select
+        id={id}
+        value={value}
+        aria-invalid={error !== undefined}
+        onChange={(event) => onChange(event.currentTarget.value)}
+      >
+        {choices.map((choice) => (
+          <option key={choice} value={choice}>
+            {choice.replaceAll('_', ' ')}
+          </option>
+        ))}
+      </select>
+      {hint && <span class="hint">{hint}</span>}
+      {error !== undefined && <span class="wrong">{error}</span>}
+    </div>
+  )
+}
+
+/** Problems that belong to a part of the form rather than to one field. */
+export function Problems({ messages }: { messages: readonly string[] }) {
+  if (messages.length === 0) return null
+  return (
+    <div class="wrong" role="alert">
+      {messages.map((message) => (
+        <p key={message}>{message}</p>
+      ))}
+    </div>
+  )
+}

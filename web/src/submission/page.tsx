@@ -1,0 +1,97 @@
+/** The form of a new job, empty or prefilled from another job. */
+
+import { get } from '../api/client'
+import { useResource } from '../api/resource'
+import type { Job, JobSpec, Preference } from '../api/types'
+import { ErrorNotice, Loading } from '../components/feedback'
+import { usePlace } from '../router/navigation'
+import { around } from './around-design'
+import { type Catalogue, loadCatalogue } from './catalogue'
+import { type Draft, draftOf, emptyDraft, preferenceOf } from './draft'
+import { JobForm } from './form'
+import { JsonForm } from './json-form'
+import './submission.css'
+
+interface Start {
+  readonly catalogue: Catalogue
+  readonly draft: Draft
+  /** The job that is cloned. */
+  readonly from: Job | null
+}
+
+export default function NewJobPage() {
+  const { query } = usePlace()
+  const start = useResource(`new ${query}`, (signal) => prepare(query, signal))
+  const from = start.data?.from ?? null
+  return (
+    <>
+      <header class="page-header">
+        <div>
+          <h1>New job</h1>
+          {from && (
+            <p class="muted">
+              from <a href={`/jobs/${from.id}`}>{from.name || from.id}</a>
+            </p>
+          )}
+        </div>
+      </header>
+      {start.error && (
+        <ErrorNotice
+          what="The form cannot be filled in."
+          error={start.error}
+          retry={start.reload}
+        />
+      )}
+      {start.loading && <Loading what="the catalogue" />}
+      {start.data &&
+        (from?.spec.kind === 'identification' ? (
+          <JsonForm spec={from.spec} />
+        ) : (
+          <JobForm
+            key={String(query)}
+            catalogue={start.data.catalogue}
+            initial={start.data.draft}
+          />
+        ))}
+    </>
+  )
+}
+
+/** `clone` names a job; `preference` replaces its own; `iteration`, `particle` a design to stay near. */
+async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Start> {
+  const id = query.get('clone')
+  const [catalogue, from] = await Promise.all([
+    loadCatalogue(signal),
+    id === null ? null : get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }),
+  ])
+  if (!from || from.spec.kind === 'identification') {
+    return { catalogue, draft: emptyDraft(catalogue), from }
+  }
+  let draft = draftOf(from.spec as JobSpec, catalogue)
+  const preference = preferenceOf(preferenceIn(query), catalogue)
+  if (preference) draft = { ...draft, preference }
+  const design = await designIn(query, from.id, signal)
+  if (design) draft = around(draft, design, wholeVariables(catalogue, draft.controller))
+  return { catalogue, draft, from }
+}
+
+function preferenceIn(query: URLSearchParams): Preference | undefined {
+  const text = query.get('preference')
+  return text === null ? undefined : (JSON.parse(text) as Preference)
+}
+
+async function designIn(query: URLSearchParams, job: string, signal: AbortSignal) {
+  const [iteration, particle] = [query.get('iteration'), query.get('particle')]
+  if (iteration === null || particle === null) return null
+  const { items } = await get('/v1/jobs/{job_id}/iterations/{iteration}/evaluations', {
+    path: { job_id: job, iteration: Number(iteration) },
+    signal,
+  })
+  return items.find((evaluation) => evaluation.particle === Number(particle))?.design ?? null
+}
+
+function wholeVariables(catalogue: Catalogue, name: string): ReadonlySet<string> {
+  const controller = catalogue.controllers.find((c) => c.name === name)
+  const all = controller ? [...controller.variables, ...controller.gait_variables] : []
+  return new Set(all.filter(({ kind }) => kind === 'integer').map((v) => v.name))
+}

@@ -1,0 +1,116 @@
+/** The robot: as it is, a variant of it, or one's own from its files. */
+
+import { errorsUnder } from './build-spec'
+import type { RobotDraft } from './draft'
+import { ChoiceField, NumberField, Problems } from './number-field'
+import type { SectionProps } from './section'
+
+const KINDS = [
+  ['szabadka2', 'Szabad(ka)-II'],
+  ['variant', 'a variant of it'],
+  ['files', 'a robot of one’s own'],
+] as const
+
+const LINKS = ['coxa', 'femur', 'tibia']
+
+export function RobotSection(props: SectionProps) {
+  const { draft, catalogue, errors, onChange } = props
+  const { robot } = draft
+  const { variant } = catalogue.fields
+  const change = (changes: Partial<RobotDraft>) => onChange({ robot: { ...robot, ...changes } })
+  return (
+    <section class="card" aria-labelledby="part-robot">
+      <h2 id="part-robot">Robot</h2>
+      <div class="stack">
+        <fieldset class="segmented" aria-label="Robot">
+          {KINDS.map(([kind, label]) => (
+            <button
+              key={kind}
+              type="button"
+              aria-pressed={robot.kind === kind}
+              onClick={() => change({ kind })}
+            >
+              {label}
+            </button>
+          ))}
+        </fieldset>
+        {robot.kind === 'variant' && (
+          <div class="fields">
+            <ChoiceField
+              label="Law of friction"
+              choices={variant.get('contact_law')?.choices ?? []}
+              value={robot.contact_law}
+              error={errors.get('robot.contact_law')}
+              hint={variant.get('contact_law')?.description}
+              onChange={(contact_law) => change({ contact_law })}
+            />
+            {LINKS.map((link, index) => (
+              <NumberField
+                key={link}
+                label={`Gearlash of the ${link}`}
+                field={{ ...variant.get('gearlash')!, unit: 'deg' }}
+                value={robot.gearlash[index]}
+                error={errors.get(`robot.gearlash.${index}`)}
+                onChange={(value) =>
+                  change({ gearlash: robot.gearlash.map((old, k) => (k === index ? value : old)) })
+                }
+              />
+            ))}
+          </div>
+        )}
+        {robot.kind === 'files' && (
+          <div class="fields">
+            <FileField
+              name="robot.toml"
+              text={robot.toml}
+              accept=".toml"
+              onText={(toml) => change({ toml })}
+            />
+            <FileField
+              name="robot.urdf"
+              text={robot.urdf}
+              accept=".urdf,.xml"
+              onText={(urdf) => change({ urdf })}
+            />
+          </div>
+        )}
+        <Problems
+          messages={errorsUnder(errors, 'robot').filter(
+            (message) => robot.kind !== 'variant' || !/^(gearlash|contact_law)/.test(message),
+          )}
+        />
+      </div>
+    </section>
+  )
+}
+
+function FileField({
+  name,
+  text,
+  accept,
+  onText,
+}: {
+  name: string
+  text: string
+  accept: string
+  onText: (text: string) => void
+}) {
+  const id = `file-${name.replace('.', '-')}`
+  return (
+    <div class="field">
+      <label for={id}>{name}</label>
+      <input
+        id={id}
+        type="file"
+        accept={accept}
+        onChange={async (event) => {
+          const file = event.currentTarget.files?.[0]
+          if (file) onText(await file.text())
+        }}
+      />
+      <span class="hint">
+        {text === '' ? 'not chosen yet' : `${text.length.toLocaleString('en')} characters read`}
+      </span>
+    </div>
+  )
+}

@@ -1,0 +1,89 @@
+/** What the API's OpenAPI document says of fields: bounds, units, defaults, choices. */
+
+import { formatExact } from '../format/number'
+
+export interface SchemaField {
+  readonly name: string
+  readonly description: string
+  /** From the brackets in the description; `1` if there are none. */
+  readonly unit: string
+  readonly type: 'number' | 'integer' | 'string' | 'other'
+  readonly low: number | null
+  readonly high: number | null
+  /** Whether the bound itself is not allowed. */
+  readonly above: boolean
+  readonly below: boolean
+  readonly choices: readonly string[] | null
+  readonly default: unknown
+  readonly required: boolean
+}
+
+interface Property {
+  type?: string
+  description?: string
+  minimum?: number
+  maximum?: number
+  exclusiveMinimum?: number
+  exclusiveMaximum?: number
+  enum?: string[]
+  const?: string
+  default?: unknown
+}
+
+export interface OpenApiDocument {
+  readonly components: {
+    readonly schemas: Readonly<
+      Record<string, { properties?: Record<string, Property>; required?: string[] }>
+    >
+  }
+}
+
+/** The fields of a schema by name, in its order. Throws if the document has no such schema. */
+export function fieldsOf(
+  document: OpenApiDocument,
+  schema: string,
+): ReadonlyMap<string, SchemaField> {
+  const found = document.components.schemas[schema]
+  if (!found?.properties) throw new Error(`the API's document has no schema ${schema}`)
+  const required = new Set(found.required ?? [])
+  return new Map(
+    Object.entries(found.properties).map(([name, property]) => [
+      name,
+      fieldOf(name, property, required.has(name)),
+    ]),
+  )
+}
+
+/** The bounds in words: `0.2 to 10`, `above 0, at most 1`, `at least 0`; empty without bounds. */
+export function boundsInWords({ low, high, above, below }: SchemaField): string {
+  if (low === null && high === null) return ''
+  const least = `${above ? 'above' : 'at least'} ${formatExact(low, 8)}`
+  const most = `${below ? 'below' : 'at most'} ${formatExact(high, 8)}`
+  // Bounds that only keep numbers within what a computer holds are of no interest.
+  if (high === null || high > 1e15) return least
+  if (low === null) return most
+  return above || below ? `${least}, ${most}` : `${formatExact(low, 8)} to ${formatExact(high, 8)}`
+}
+
+/** Description without its unit. */
+export function describe({ description }: SchemaField): string {
+  return description.replace(/\s*\[[^\]]*\]/, '')
+}
+
+function fieldOf(name: string, property: Property, required: boolean): SchemaField {
+  const description = property.description ?? ''
+  const { type } = property
+  return {
+    name,
+    description,
+    unit: /\[([^\]]+)\]/.exec(description)?.[1] ?? '1',
+    type: type === 'number' || type === 'integer' || type === 'string' ? type : 'other',
+    low: property.minimum ?? property.exclusiveMinimum ?? null,
+    high: property.maximum ?? property.exclusiveMaximum ?? null,
+    above: property.exclusiveMinimum !== undefined,
+    below: property.exclusiveMaximum !== undefined,
+    choices: property.enum ?? (property.const === undefined ? null : [property.const]),
+    default: property.default,
+    required,
+  }
+}

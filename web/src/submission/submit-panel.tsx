@@ -1,0 +1,80 @@
+/** What the job will cost, what is wrong with it, and the button that starts it. */
+
+import { ApiProblem } from '../api/problem'
+import type { AnySpec } from '../api/types'
+import { CopyButton } from '../components/copy-button'
+import { ErrorNotice } from '../components/feedback'
+import { formatCount } from '../format/number'
+import { formatDuration } from '../format/time'
+import type { Submission } from './use-submission'
+
+export function SubmitPanel({
+  spec,
+  submission,
+  onJson,
+}: {
+  spec: AnySpec
+  submission: Submission
+  /** Write the spec as JSON instead. */
+  onJson?: () => void
+}) {
+  const { estimate, problem, sending } = submission
+  const json = JSON.stringify(spec, null, 2)
+  return (
+    <aside class="card submit-panel stack" aria-label="Estimate and submission">
+      <div aria-live="polite">
+        <h2>Estimate</h2>
+        {estimate ? (
+          <>
+            <dl class="estimate" data-walks={estimate.walks}>
+              <Row label="Evaluations" value={formatCount(estimate.evaluations)} />
+              <Row label="Walks" value={formatCount(estimate.walks)} />
+              <Row label="Simulated time" value={formatDuration(estimate.simulated_seconds)} />
+              <Row
+                label="Takes about"
+                value={estimate.seconds === null ? 'unknown' : formatDuration(estimate.seconds)}
+              />
+            </dl>
+            <p class="muted small">{estimate.basis}</p>
+          </>
+        ) : (
+          problem === null && <p class="muted">Asking…</p>
+        )}
+        {problem !== null && <ErrorNotice what={advice(problem)} error={problem} />}
+      </div>
+      <button type="submit" class="primary" disabled={sending}>
+        {sending ? 'Submitting…' : 'Submit the job'}
+      </button>
+      <details>
+        <summary>Spec as JSON</summary>
+        <div class="stack-tight">
+          <span class="row">
+            <CopyButton text={json} label="the spec" />
+            {onJson && (
+              <button type="button" class="compact" onClick={onJson}>
+                Edit as JSON
+              </button>
+            )}
+          </span>
+          <pre class="spec-json" tabIndex={0}>
+            {json}
+          </pre>
+        </div>
+      </details>
+    </aside>
+  )
+}
+
+function Row({ label, value }: { label: string; value: string }) {
+  return (
+    <div>
+      <dt>{label}</dt>
+      <dd>{value}</dd>
+    </div>
+  )
+}
+
+function advice(problem: unknown): string {
+  if (problem instanceof ApiProblem && problem.status === 422) return 'To be put right first:'
+  return 'The API cannot take it now.'
+}

@@ -1,0 +1,177 @@
+/** The controller, and what becomes of each of its variables and of the gait's. */
+
+import type { Controller, Variable } from '../api/types'
+import { errorsUnder, type FieldErrors } from './build-spec'
+import { defaultVariables, type VariableDraft, type VariableMode } from './draft'
+import { ChoiceField, Problems } from './number-field'
+import type { SectionProps } from './section'
+
+export function VariablesSection({ draft, catalogue, errors, onChange }: SectionProps) {
+  const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
+  const change = (name: string, changes: Partial<VariableDraft>) =>
+    onChange({
+      variables: { ...draft.variables, [name]: { ...draft.variables[name], ...changes } },
+    })
+  const table = (title: string, variables: readonly Variable[], modes: readonly VariableMode[]) => (
+    <VariableTable
+      title={title}
+      variables={variables}
+      modes={modes}
+      drafts={draft.variables}
+      errors={errors}
+      onChange={change}
+    />
+  )
+  return (
+    <section class="card" aria-labelledby="part-controller">
+      <h2 id="part-controller">Controller and variables</h2>
+      <div class="stack">
+        <div class="controller-choice">
+          <ChoiceField
+            label="Controller"
+            choices={catalogue.controllers.map(({ name }) => name)}
+            value={draft.controller}
+            error={errors.get('controller')}
+            hint={controller?.description}
+            onChange={(name) =>
+              onChange({ controller: name, variables: defaultVariables(catalogue, name) })
+            }
+          />
+        </div>
+        <Problems
+          messages={[errors.get('variables'), errors.get('fixed')].filter((m) => m !== undefined)}
+        />
+        {controller && (
+          <>
+            {table('Controller', controller.variables, ['searched', 'fixed'])}
+            <details open={anyGait(controller, draft.variables)}>
+              <summary>Gait: searched or fixed in place of the scenarios’ own values</summary>
+              {table('Gait', controller.gait_variables, ['default', 'searched', 'fixed'])}
+            </details>
+          </>
+        )}
+      </div>
+    </section>
+  )
+}
+
+function anyGait(controller: Controller, drafts: Readonly<Record<string, VariableDraft>>): boolean {
+  return controller.gait_variables.some(({ name }) => drafts[name]?.mode !== 'default')
+}
+
+const MODES: Readonly<Record<VariableMode, string>> = {
+  searched: 'searched',
+  fixed: 'fixed',
+  default: 'as in scenario',
+}
+
+function VariableTable({
+  title,
+  variables,
+  modes,
+  drafts,
+  errors,
+  onChange,
+}: {
+  title: string
+  variables: readonly Variable[]
+  modes: readonly VariableMode[]
+  drafts: Readonly<Record<string, VariableDraft>>
+  errors: FieldErrors
+  onChange: (name: string, changes: Partial<VariableDraft>) => void
+}) {
+  return (
+    <div class="table-scroll">
+      <table class="variables">
+        <caption class="visually-hidden">{title} variables</caption>
+        <thead>
+          <tr>
+            <th scope="col">Variable</th>
+            <th scope="col">Treatment</th>
+            <th scope="col">Low or value</th>
+            <th scope="col">High</th>
+            <th scope="col">Unit</th>
+          </tr>
+        </thead>
+        <tbody>
+          {variables.map((variable) => {
+            const draft = drafts[variable.name]
+            if (!draft) return null
+            const change = (changes: Partial<VariableDraft>) => onChange(variable.name, changes)
+            return (
+              <VariableRow
+                key={variable.name}
+                variable={variable}
+                draft={draft}
+                modes={modes}
+                problems={errorsUnder(errors, `variables.${variable.name}`)}
+                onChange={change}
+              />
+            )
+          })}
+        </tbody>
+      </table>
+    </div>
+  )
+}
+
+function VariableRow({
+  variable,
+  draft,
+  modes,
+  problems,
+  onChange,
+}: {
+  variable: Variable
+  draft: VariableDraft
+  modes: readonly VariableMode[]
+  problems: readonly string[]
+  onChange: (changes: Partial<VariableDraft>) => void
+}) {
+  const { name } = variable
+  const input = (part: 'low' | 'high' | 'value', label: string) => (
+    <input
+      class="short"
+      inputMode="decimal"
+      aria-label={`${label} of ${name}`}
+      aria-invalid={problems.length > 0}
+      value={draft[part]}
+      onInput={(event) => onChange({ [part]: event.currentTarget.value })}
+    />
+  )
+  return (
+    <tr data-variable={name}>
+      <th scope="row">
+        {name}
+        <span class="muted small description">{variable.description}</span>
+        {problems.map((problem) => (
+          <span key={problem} class="wrong description">
+            {problem}
+          </span>
+        ))}
+      </th>
+      <td>
+        <select
+          aria-label={`Treatment of ${name}`}
+          value={draft.mode}
+          onChange={(event) => onChange({ mode: event.currentTarget.value as VariableMode })}
+        >
+          {modes.map((mode) => (
+            <option key={mode} value={mode}>
+              {MODES[mode]}
+            </option>
+          ))}
+        </select>
+      </td>
+      <td>
+        {draft.mode === 'searched' && input('low', 'Lower bound')}
+        {draft.mode === 'fixed' && input('value', 'Value')}
+      </td>
+      <td>{draft.mode === 'searched' && input('high', 'Upper bound')}</td>
+      <td class="unit">
+        {variable.unit === '1' ? '–' : variable.unit}
+        {variable.kind === 'integer' && ' (whole)'}
+      </td>
+    </tr>
+  )
+}

@@ -1,0 +1,23 @@
+/** When a foot stands on the ground. Pure. */
+
+import type { Replay } from './replay'
+
+/** Force from which on a foot counts as standing [N]. */
+export const CONTACT_FORCE = 0.5
+
+/** Spans of time in which a foot stands [s]. */
+export function stances(replay: Replay, leg: number): (readonly [from: number, to: number])[] {
+  const spans: (readonly [number, number])[] = []
+  let from: number | null = null
+  for (let frame = 0; frame < replay.frames; frame++) {
+    const force = [0, 1, 2].map((i) => replay.value('foot_force', frame, 3 * leg + i))
+    const stands = Math.hypot(...force) > CONTACT_FORCE
+    if (stands && from === null) from = replay.time(frame)
+    if (!stands && from !== null) {
+      spans.push([from, replay.time(frame)])
+      from = null
+    }
+  }
+  if (from !== null) spans.push([from, replay.end])
+  return spans
+}

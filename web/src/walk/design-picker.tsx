@@ -1,0 +1,76 @@
+/** Choosing a design: published ones, and the best ones of recent jobs. */
+
+import { useId } from 'preact/hooks'
+import { get } from '../api/client'
+import { useResource } from '../api/resource'
+import { type DesignSource, sourceOfWord, wordOf } from './design-source'
+
+/** Jobs that are offered; others are reached from their own pages. */
+const RECENT_JOBS = 50
+
+export function DesignPicker({
+  label,
+  chosen,
+  chosenLabel,
+  none,
+  onChoose,
+}: {
+  label: string
+  chosen: DesignSource | null
+  /** How to call what is chosen if it is in neither list. */
+  chosenLabel: string
+  /** What the choice of no design is called; without it there must be one. */
+  none?: string
+  onChoose: (source: DesignSource | null) => void
+}) {
+  const id = useId()
+  const controllers = useResource('controllers', (signal) => get('/v1/controllers', { signal }))
+  const jobs = useResource('jobs', (signal) =>
+    get('/v1/jobs', { query: { limit: RECENT_JOBS }, signal }),
+  )
+  const published = (controllers.data?.items ?? []).flatMap((controller) =>
+    Object.keys(controller.published).map((study) => ({
+      word: wordOf({ kind: 'published', controller: controller.name, study }),
+      text: `${controller.name}: ${study}`,
+    })),
+  )
+  const best = (jobs.data?.items ?? [])
+    .filter((job) => job.kind !== 'identification' && job.best_fitness !== null)
+    .map((job) => ({ word: wordOf({ kind: 'best', job: job.id }), text: job.name || job.id }))
+  const word = chosen ? wordOf(chosen) : ''
+  const listed = word === '' || [...published, ...best].some((option) => option.word === word)
+  return (
+    <div class="field">
+      <label for={id}>{label}</label>
+      <select
+        id={id}
+        value={word}
+        onChange={(event) => onChoose(sourceOfWord(event.currentTarget.value))}
+      >
+        {none !== undefined && <option value="">{none}</option>}
+        {!listed && <option value={word}>{chosenLabel}</option>}
+        <Options label="Published designs" options={published} />
+        <Options label="Best of a job" options={best} />
+      </select>
+    </div>
+  )
+}
+
+function Options({
+  label,
+  options,
+}: {
+  label: string
+  options: readonly { readonly word: string; readonly text: string }[]
+}) {
+  if (options.length === 0) return null
+  return (
+    <optgroup label={label}>
+      {options.map(({ word, text }) => (
+        <option key={word} value={word}>
+          {text}
+        </option>
+      ))}
+    </optgroup>
+  )
+}

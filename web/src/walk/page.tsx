@@ -1,0 +1,182 @@
+/** One walk, or two compared: replay, worth and charts over time. */
+
+import { useMemo, useState } from 'preact/hooks'
+import { get } from '../api/client'
+import { useResource } from '../api/resource'
+import type { Scenario } from '../api/types'
+import { ErrorNotice, Loading } from '../components/feedback'
+import { setQuery, usePlace } from '../router/navigation'
+import { jobPath, withQuery } from '../router/routes'
+import { DesignPicker } from './design-picker'
+import { type DesignSource, queryOf, sourceOf, sourceOfWord, wordOf } from './design-source'
+import { Playback } from './playback'
+import { Player } from './player'
+import type { ViewChoices } from './player-controls'
+import { DEFAULT_RATE, RATES, type Recorded, recordWalk } from './recorded'
+import { type ResolvedDesign, resolveDesign } from './resolve-design'
+import { ScenarioPicker } from './scenario-picker'
+import './walk.css'
+import { WalkPlots } from './walk-plots'
+import { FailureNotices } from './walk-result'
+
+const CHOICES: ViewChoices = { arrangement: 'ghost', follow: true, forces: true, trail: true }
+
+interface Address {
+  readonly source: DesignSource
+  readonly against: DesignSource | null
+}
+
+export default function WalkPage() {
+  const { query } = usePlace()
+  const [address, wrong] = addressOf(query)
+  return (
+    <>
+      <div class="page-header">
+        <h1>Walk</h1>
+      </div>
+      {address ? (
+        <Walk address={address} query={query} />
+      ) : (
+        <>
+          <ErrorNotice what="This address names no walk." error={wrong} />
+          <p class="row">
+            <a class="button" href="/walk">
+              Show the published optimum A
+            </a>
+          </p>
+        </>
+      )}
+    </>
+  )
+}
+
+function Walk({ address, query }: { address: Address; query: URLSearchParams }) {
+  const { source, against } = address
+  const rate = RATES.find((known) => String(known) === query.get('rate')) ?? DEFAULT_RATE
+  const presets = useResource('scenarios', (signal) => get('/v1/scenarios', { signal }))
+  const first = useResource(wordOf(source), (signal) => resolveDesign(source, signal))
+  const like = first.data?.controller.name
+  const second = useResource(against && like ? `${wordOf(against)} ${like}` : null, (signal) =>
+    resolveDesign(against!, signal, like),
+  )
+  const own = first.data?.scenarios ?? []
+  const listed = presets.data?.items ?? []
+  const wanted = query.get('scenario') ?? own[0]?.name ?? listed[0]?.name ?? 'normal-fast'
+  const scenario = own.find(({ name }) => name === wanted) ?? wanted
+  const one = useWalk(first.data, scenario, rate)
+  const other = useWalk(against ? second.data : null, scenario, rate)
+  const failed = [presets, first, second, one, other].find(({ error }) => error !== null)
+  const awaited = against !== null && (other.data === null || other.loading)
+  return (
+    <div class="stack">
+      <div class="card walk-choice">
+        <DesignPicker
+          label="Design"
+          chosen={first.data?.source ?? source}
+          chosenLabel={first.data?.label ?? 'This design'}
+          onChoose={(chosen) => setQuery(queryOf(chosen!))}
+        />
+        <ScenarioPicker
+          own={own}
+          presets={listed}
+          chosen={wanted}
+          onChoose={(name) => setQuery({ scenario: name })}
+        />
+        <DesignPicker
+          label="Compare with"
+          chosen={against}
+          chosenLabel={second.data?.label ?? 'This design'}
+          none="Nothing"
+          onChoose={(chosen) => setQuery({ against: chosen && wordOf(chosen) })}
+        />
+        <RatePicker rate={rate} />
+        <Links design={first.data} />
+      </div>
+      {failed?.error && (
+        <ErrorNotice what="This walk cannot be shown." error={failed.error} retry={failed.reload} />
+      )}
+      {!failed && one.loading && <Loading what="the walk; the robot walks it now" />}
+      {!failed && !one.loading && awaited && <Loading what="the walk to compare it with" />}
+      {one.data && <Recording one={one.data} other={against ? other.data : null} />}
+    </div>
+  )
+}
+
+/** The recorded walk of a design, asked for once it is known. */
+function useWalk(design: ResolvedDesign | null, scenario: string | Scenario, rate: number) {
+  const key = design && JSON.stringify([wordOf(design.source), design.design, scenario, rate])
+  return useResource(key, (signal) => recordWalk(design!, scenario, rate, signal))
+}
+
+function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
+  const walks = useMemo(() => (other ? [one, other] : [one]), [one, other])
+  const shown = useMemo(() => walks.filter(({ replay }) => replay.frames > 0), [walks])
+  const [choices, setChoices] = useState(CHOICES)
+  const playback = useMemo(() => playbackOf(shown), [shown])
+  return (
+    <>
+      <FailureNotices walks={walks} />
+      {shown.length > 0 && (
+        <>
+          <Player walks={shown} playback={playback} choices={choices} onChoose={setChoices} />
+          <WalkPlots walks={shown} all={walks} playback={playback} />
+        </>
+      )}
+    </>
+  )
+}
+
+/** Plays at once, unless the system asks for little movement. */
+function playbackOf(walks: readonly Recorded[]): Playback {
+  const replays = walks.map(({ replay }) => replay)
+  const end = Math.max(0, ...replays.map((replay) => replay.end))
+  const playback = new Playback(end, replays[0]?.header.rate ?? DEFAULT_RATE)
+  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) playback.play()
+  return playback
+}
+
+function RatePicker({ rate }: { rate: number }) {
+  return (
+    <div class="field">
+      <label for="walk-rate">Recorded at</label>
+      <select
+        id="walk-rate"
+        value={String(rate)}
+        onChange={(event) => setQuery({ rate: event.currentTarget.value })}
+      >
+        {RATES.map((known) => (
+          <option key={known} value={String(known)}>
+            {known} Hz
+          </option>
+        ))}
+      </select>
+    </div>
+  )
+}
+
+function Links({ design }: { design: ResolvedDesign | null }) {
+  if (!design) return null
+  const { source } = design
+  const set = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
+  const query = Object.fromEntries(set) as Record<string, string>
+  return (
+    <div class="row">
+      <a class="button" href={withQuery('/controller', query)}>
+        Its controller
+      </a>
+      {'job' in source && (
+        <a class="button" href={jobPath(source.job)}>
+          Its job
+        </a>
+      )}
+    </div>
+  )
+}
+
+function addressOf(query: URLSearchParams): [Address | null, unknown] {
+  try {
+    return [{ source: sourceOf(query), against: sourceOfWord(query.get('against')) }, null]
+  } catch (error) {
+    return [null, error]
+  }
+}

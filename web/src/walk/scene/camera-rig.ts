@@ -1,0 +1,96 @@
+/** The camera: orbits about the robot by hand, and walks along with it if asked to. */
+
+import { PerspectiveCamera, Spherical, Vector3 } from 'three'
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js'
+
+/** Directions to look from, x ahead, y left, z up; lengths are shares of the distance. */
+export const VIEWS = {
+  'three-quarter': [0.5, -0.87, 0.48],
+  side: [0, -1, 0.12],
+  front: [1, -0.001, 0.2],
+  top: [0.001, -0.02, 1],
+} as const
+
+export type ViewName = keyof typeof VIEWS
+
+const NEAREST = 0.25
+const FURTHEST = 6
+
+export class CameraRig {
+  readonly camera = new PerspectiveCamera(32, 1, 0.02, 60)
+  follow = true
+  /** Half the height of what is to be seen [m]. */
+  reach = 0.3
+  private readonly controls: OrbitControls
+  private readonly target = new Vector3()
+  private readonly step = new Vector3()
+  private aspect = 1
+
+  constructor(canvas: HTMLCanvasElement, onChange: () => void) {
+    this.camera.up.set(0, 0, 1)
+    this.controls = new OrbitControls(this.camera, canvas)
+    this.controls.minDistance = NEAREST
+    this.controls.maxDistance = FURTHEST
+    this.controls.maxPolarAngle = 0.56 * Math.PI
+    this.controls.addEventListener('change', onChange)
+    // The wheel scrolls the page, as long as the scene was not clicked or reached by Tab.
+    this.controls.enableZoom = false
+    canvas.addEventListener('focus', () => {
+      this.controls.enableZoom = true
+    })
+    canvas.addEventListener('blur', () => {
+      this.controls.enableZoom = false
+    })
+    canvas.style.touchAction = 'pan-y'
+  }
+
+  /** What is being looked at moved there; both stay as far from each other if it is followed. */
+  moveTarget(target: Vector3): void {
+    this.step.subVectors(target, this.target)
+    this.target.copy(target)
+    if (!this.follow) return
+    this.controls.target.add(this.step)
+    this.camera.position.add(this.step)
+    this.controls.update()
+  }
+
+  /** Look from a direction, all of the robot in view. */
+  look(from: ViewName): void {
+    const narrow = Math.min(1, this.aspect)
+    const distance = this.reach / (narrow * Math.tan((16 * Math.PI) / 180))
+    const direction = new Vector3(...VIEWS[from]).normalize()
+    this.controls.target.copy(this.target)
+    this.camera.position.copy(this.target).addScaledVector(direction, Math.min(FURTHEST, distance))
+    this.controls.update()
+  }
+
+  /** Turn about what is looked at [rad]. */
+  turn(around: number, up: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target)
+    // Spherical has y up, the scene z.
+    const angles = new Spherical().setFromVector3(new Vector3(offset.x, offset.z, -offset.y))
+    angles.theta += around
+    angles.phi = Math.min(0.56 * Math.PI, Math.max(0.02, angles.phi - up))
+    const turned = new Vector3().setFromSpherical(angles)
+    this.camera.position.copy(this.controls.target).add(new Vector3(turned.x, -turned.z, turned.y))
+    this.controls.update()
+  }
+
+  /** Come nearer by a factor. */
+  zoom(factor: number): void {
+    const offset = this.camera.position.clone().sub(this.controls.target)
+    const length = Math.min(FURTHEST, Math.max(NEAREST, offset.length() / factor))
+    this.camera.position.copy(this.controls.target).add(offset.setLength(length))
+    this.controls.update()
+  }
+
+  resize(width: number, height: number): void {
+    this.aspect = width / height
+    this.camera.aspect = this.aspect
+    this.camera.updateProjectionMatrix()
+  }
+
+  dispose(): void {
+    this.controls.dispose()
+  }
+}

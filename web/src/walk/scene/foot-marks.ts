@@ -1,0 +1,107 @@
+/** Where feet touch the ground, and with how much force. */
+
+import {
+  CircleGeometry,
+  ConeGeometry,
+  CylinderGeometry,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  Quaternion,
+  Vector3,
+} from 'three'
+import { CONTACT_FORCE } from '../contact'
+import { sampleChannel } from '../pose'
+import type { Replay } from '../replay'
+import type { Palette } from './palette'
+
+const DISC = 0.024
+const SHAFT = 0.0035
+const HEAD = 0.011
+const HEAD_LENGTH = 0.026
+const UP = new Vector3(0, 1, 0)
+
+export class FootMarks {
+  readonly object = new Group()
+  private readonly discs: Mesh[] = []
+  private readonly arrows: Arrow[] = []
+  private readonly positions: Float32Array
+  private readonly forces: Float32Array
+  private readonly discMaterial = new MeshBasicMaterial({ transparent: true, opacity: 0.75 })
+  // Through the leg, along which most forces point.
+  private readonly arrowMaterial = new MeshBasicMaterial({ depthTest: false, transparent: true })
+  private readonly force = new Vector3()
+  private withForces = true
+
+  constructor(
+    private readonly replay: Replay,
+    /** Length of an arrow [m/N]. */
+    private readonly scale: number,
+    /** Height of discs over the ground [m]; that of another walk's differs, so that one covers. */
+    private readonly height: number,
+  ) {
+    const legs = replay.header.robot.legs.length
+    this.positions = new Float32Array(3 * legs)
+    this.forces = new Float32Array(3 * legs)
+    for (let leg = 0; leg < legs; leg++) {
+      const disc = new Mesh(new CircleGeometry(DISC, 32), this.discMaterial)
+      const arrow = new Arrow(this.arrowMaterial)
+      this.discs.push(disc)
+      this.arrows.push(arrow)
+      this.object.add(disc, arrow.object)
+    }
+  }
+
+  /** Mark the feet as they were at a time [s]. */
+  show(time: number): void {
+    sampleChannel(this.replay, 'foot_position', time, this.positions)
+    sampleChannel(this.replay, 'foot_force', time, this.forces)
+    this.discs.forEach((disc, leg) => {
+      const [x, y] = this.positions.subarray(3 * leg, 3 * leg + 2)
+      this.force.fromArray(this.forces, 3 * leg)
+      const size = this.force.length()
+      disc.visible = size > CONTACT_FORCE
+      disc.position.set(x, y, this.height)
+      this.arrows[leg].point(x, y, this.height, this.force, size * this.scale)
+      this.arrows[leg].object.visible = disc.visible && this.withForces
+    })
+  }
+
+  setForces(shown: boolean): void {
+    this.withForces = shown
+  }
+
+  recolour(colours: Palette, accent: Palette['force']): void {
+    this.discMaterial.color.copy(accent)
+    this.arrowMaterial.color.copy(colours.force)
+  }
+}
+
+/** An arrow along a vector; its head keeps its size. */
+class Arrow {
+  readonly object = new Group()
+  private readonly shaft: Mesh
+  private readonly head: Mesh
+  private readonly turn = new Quaternion()
+  private readonly direction = new Vector3()
+
+  constructor(material: MeshBasicMaterial) {
+    this.shaft = new Mesh(new CylinderGeometry(SHAFT, SHAFT, 1, 12), material)
+    this.head = new Mesh(new ConeGeometry(HEAD, HEAD_LENGTH, 20), material)
+    this.shaft.renderOrder = 1
+    this.head.renderOrder = 1
+    this.object.add(this.shaft, this.head)
+  }
+
+  point(x: number, y: number, z: number, vector: Vector3, length: number): void {
+    const shaft = Math.max(1e-4, length - HEAD_LENGTH)
+    const head = Math.min(1, length / HEAD_LENGTH)
+    this.object.position.set(x, y, z)
+    this.direction.copy(vector).normalize()
+    this.object.quaternion.copy(this.turn.setFromUnitVectors(UP, this.direction))
+    this.shaft.scale.set(1, shaft, 1)
+    this.shaft.position.y = shaft / 2
+    this.head.scale.setScalar(Math.max(1e-3, head))
+    this.head.position.y = length - (head * HEAD_LENGTH) / 2
+  }
+}

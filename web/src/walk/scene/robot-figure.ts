@@ -1,0 +1,134 @@
+/** A robot as it is seen: solids on its links, put where the recording says. */
+
+import {
+  BoxGeometry,
+  type BufferGeometry,
+  CapsuleGeometry,
+  type Color,
+  CylinderGeometry,
+  Group,
+  Mesh,
+  MeshStandardMaterial,
+  SphereGeometry,
+} from 'three'
+import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js'
+import { POSE, samplePoses } from '../pose'
+import type { Replay, Role, Shape } from '../replay'
+import type { FigurePalette, Palette } from './palette'
+
+/** Parts of one colour. */
+type Part = 'frame' | 'accent' | 'limb' | 'joint' | 'load'
+
+const PARTS: Readonly<Record<Role, Part>> = {
+  body: 'frame',
+  coxa: 'joint',
+  femur: 'accent',
+  tibia: 'limb',
+  foot: 'joint',
+  load: 'load',
+}
+
+/** Opacity of a walk that is shown behind another one. */
+const GHOST = 0.38
+
+export class RobotFigure {
+  readonly object = new Group()
+  private readonly links: Group[] = []
+  private readonly materials: Readonly<Record<Part, MeshStandardMaterial>> = {
+    frame: new MeshStandardMaterial({ roughness: 0.55, metalness: 0.25 }),
+    accent: new MeshStandardMaterial({ roughness: 0.45, metalness: 0.1 }),
+    limb: new MeshStandardMaterial({ roughness: 0.4, metalness: 0.35 }),
+    joint: new MeshStandardMaterial({ roughness: 0.7, metalness: 0.1 }),
+    load: new MeshStandardMaterial({ roughness: 0.8 }),
+  }
+  private readonly poses: Float32Array
+
+  constructor(private readonly replay: Replay) {
+    const { links } = replay.header.robot
+    this.poses = new Float32Array(links.length * POSE)
+    for (const { shapes } of links) {
+      const group = new Group()
+      for (const shape of shapes) this.addShape(group, shape)
+      this.links.push(group)
+      this.object.add(group)
+    }
+  }
+
+  /** Put every link where it was at a time [s]. */
+  show(time: number): void {
+    samplePoses(this.replay, time, this.poses)
+    this.links.forEach((link, k) => {
+      const [x, y, z, qx, qy, qz, qw] = this.poses.subarray(k * POSE, (k + 1) * POSE)
+      link.position.set(x, y, z)
+      link.quaternion.set(qx, qy, qz, qw)
+    })
+  }
+
+  /** Where the body is now in the world [m]. */
+  get body(): readonly [number, number, number] {
+    return [this.poses[0], this.poses[1], this.poses[2]]
+  }
+
+  recolour(colours: Palette, own: FigurePalette): void {
+    const each: Record<Part, Color> = { ...own, load: colours.load }
+    for (const part of Object.keys(each) as Part[]) this.materials[part].color.copy(each[part])
+  }
+
+  /** Let what is behind shine through, or not. */
+  setGhost(ghost: boolean): void {
+    for (const material of Object.values(this.materials)) {
+      material.transparent = ghost
+      material.opacity = ghost ? GHOST : 1
+      material.depthWrite = !ghost
+      // Where both robots are at the same place, the first one is seen.
+      material.polygonOffset = ghost
+      material.polygonOffsetFactor = 2
+      material.polygonOffsetUnits = 40
+      material.needsUpdate = true
+    }
+    this.object.traverse((object) => {
+      object.castShadow = !ghost
+    })
+  }
+
+  private addShape(link: Group, shape: Shape): void {
+    const [x, y, z, qx, qy, qz, qw] = shape.origin
+    const solid = this.mesh(solidOf(shape), PARTS[shape.role])
+    solid.position.set(x, y, z)
+    solid.quaternion.set(qx, qy, qz, qw)
+    link.add(solid)
+    if (shape.type === 'box' && shape.role === 'body') this.markFront(solid, shape.size)
+    if (shape.type === 'capsule') {
+      // A hub where the joint turns tells one limb from the next.
+      link.add(this.mesh(new SphereGeometry(shape.size[0] * 1.18, 24, 16), 'joint'))
+    }
+  }
+
+  /** A stripe over the front edge: which way is ahead. */
+  private markFront(body: Mesh, [length, width, height]: readonly number[]): void {
+    const stripe = this.mesh(new BoxGeometry(0.16 * length, 0.62 * width, 0.02 * height), 'accent')
+    stripe.position.set(0.34 * length, 0, 0.51 * height)
+    body.add(stripe)
+  }
+
+  private mesh(geometry: BufferGeometry, part: Part): Mesh {
+    const mesh = new Mesh(geometry, this.materials[part])
+    mesh.castShadow = true
+    mesh.receiveShadow = true
+    return mesh
+  }
+}
+
+/** three's capsules and cylinders lie along y, recorded ones along z. */
+function solidOf({ type, size }: Shape): BufferGeometry {
+  switch (type) {
+    case 'box':
+      return new RoundedBoxGeometry(size[0], size[1], size[2], 3, 0.12 * Math.min(...size))
+    case 'sphere':
+      return new SphereGeometry(size[0], 24, 16)
+    case 'cylinder':
+      return new CylinderGeometry(size[0], size[0], size[1], 32).rotateX(Math.PI / 2)
+    case 'capsule':
+      return new CapsuleGeometry(size[0], size[1], 8, 24).rotateX(Math.PI / 2)
+  }
+}

@@ -1,0 +1,68 @@
+/** How steep the ground is: a level line, a plumb line and the angle between ground and level. */
+
+import {
+  BufferGeometry,
+  Group,
+  Line,
+  LineBasicMaterial,
+  Sprite,
+  SpriteMaterial,
+  Vector3,
+} from 'three'
+import { proportion, textTexture } from './label'
+
+/** Of the level line, and of the arc about its end [m]. */
+const LENGTH = 0.6
+const RADIUS = 0.42
+
+/** Of the number of degrees [m]. */
+const HEIGHT = 0.055
+
+export class SlopeMark {
+  /** Stands on the level, so it belongs to the scene, not to the tilted ground. */
+  readonly object = new Group()
+  private readonly material = new LineBasicMaterial({ depthTest: false })
+  private readonly label = new Sprite(
+    new SpriteMaterial({ depthTest: false, transparent: false, alphaTest: 0.4 }),
+  )
+
+  constructor(
+    private readonly degrees: number,
+    /** Up the ground, a unit vector of the scene. */
+    uphill: Vector3,
+    /** Where the angle is, from what is looked at [m]. */
+    private readonly corner: Vector3,
+  ) {
+    const level = uphill.clone().setZ(0).normalize()
+    const angle = (Math.abs(degrees) * Math.PI) / 180
+    const direction = (at: number) => level.clone().multiplyScalar(Math.cos(at)).setZ(Math.sin(at))
+    const base = level.clone().multiplyScalar(LENGTH)
+    const top = uphill.clone().multiplyScalar(LENGTH / Math.cos(angle))
+    const arc = Array.from({ length: 25 }, (_, k) =>
+      direction((k / 24) * angle).multiplyScalar(RADIUS),
+    )
+    this.object.add(this.line([top, new Vector3(), base, top]), this.line(arc))
+    this.label.position.copy(direction(angle / 2).multiplyScalar(RADIUS - 0.09))
+    this.object.add(this.label)
+    // The level lies under the ground: over it, but behind robots.
+    for (const part of this.object.children) part.renderOrder = -1
+  }
+
+  /** Stay beside what is looked at. */
+  moveTo(target: Vector3): void {
+    this.object.position.addVectors(target, this.corner)
+  }
+
+  recolour(colour: string): void {
+    this.material.color.setStyle(colour)
+    const map = textTexture(`${Math.abs(this.degrees).toFixed(0)}°`, colour)
+    this.label.scale.set(HEIGHT * proportion(map), HEIGHT, 1)
+    this.label.material.map?.dispose()
+    this.label.material.map = map
+    this.label.material.needsUpdate = true
+  }
+
+  private line(points: Vector3[]): Line {
+    return new Line(new BufferGeometry().setFromPoints(points), this.material)
+  }
+}

@@ -1,0 +1,28 @@
+/** The way that the body came. */
+
+import { BufferAttribute, BufferGeometry, type Color, Line, LineBasicMaterial } from 'three'
+import type { Replay } from '../replay'
+
+export class Trail {
+  readonly object: Line<BufferGeometry, LineBasicMaterial>
+
+  constructor(private readonly replay: Replay) {
+    const points = new Float32Array(3 * replay.frames)
+    for (let frame = 0; frame < replay.frames; frame++) {
+      for (let i = 0; i < 3; i++) points[3 * frame + i] = replay.value('link_pose', frame, i)
+    }
+    const geometry = new BufferGeometry()
+    geometry.setAttribute('position', new BufferAttribute(points, 3))
+    this.object = new Line(geometry, new LineBasicMaterial())
+    // The part that is drawn changes, so its bounds would have to.
+    this.object.frustumCulled = false
+  }
+
+  show(time: number): void {
+    this.object.geometry.setDrawRange(0, this.replay.frameAt(time) + 1)
+  }
+
+  recolour(colour: Color): void {
+    this.object.material.color.copy(colour)
+  }
+}

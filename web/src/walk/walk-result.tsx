@@ -1,0 +1,109 @@
+/** How the walks ended and what they are worth. */
+
+import { Table } from '../components/table'
+import { change, formatNumber, NONE } from '../format/number'
+import type { Recorded } from './recorded'
+import type { Replay } from './replay'
+
+/** Objectives of a walk as the simulator lists them (thesis table 4.1), all to be minimized. */
+const OBJECTIVES: Readonly<Record<string, { unit: string; meaning: string }>> = {
+  torque: { unit: 'N m', meaning: 'rms of the summed gear torques' },
+  acceleration: { unit: 'm/s²', meaning: "rms of the body's acceleration" },
+  angular_acceleration: { unit: 'rad/s²', meaning: "rms of the body's angular acceleration" },
+  energy: { unit: 'J/m', meaning: 'electrical energy per metre' },
+  reciprocal_speed: { unit: 's/m', meaning: 'one over the mean speed' },
+  height_loss: { unit: 'm', meaning: "body's height at the end less that at the start" },
+}
+
+/** A notice for every walk that did not get to its end. */
+export function FailureNotices({ walks }: { walks: readonly Recorded[] }) {
+  const failed = walks.filter(({ replay }) => replay.header.status !== 'ok')
+  return failed.map(({ label, replay }) => (
+    <div
+      class="notice"
+      data-tone="bad"
+      role="status"
+      data-status={replay.header.status}
+      key={label}
+    >
+      <strong>
+        {label}: {replay.header.status} after {replay.header.duration.toFixed(2)}&nbsp;s.
+      </strong>
+      <p>
+        {sentence(replay.header.explanation)} {extentOf(replay)}
+      </p>
+    </div>
+  ))
+}
+
+interface Row {
+  readonly name: string
+  readonly values: readonly (number | null)[]
+}
+
+export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
+  const rows: Row[] = Object.keys(walks[0].replay.header.objectives).map((name) => ({
+    name,
+    values: walks.map(({ replay }) => replay.header.objectives[name] ?? null),
+  }))
+  const numbers = walks.map(({ label }, k) => ({
+    key: `walk-${k}`,
+    label: walks.length > 1 ? label : 'value',
+    numeric: true,
+    cell: (row: Row) => formatNumber(row.values[k]),
+  }))
+  const compared = {
+    key: 'difference',
+    label: 'second against first',
+    numeric: true,
+    cell: ({ name, values: [first, second] }: Row) => difference(name, first, second),
+  }
+  return (
+    <section class={walks.length > 1 ? 'card wide' : 'card'} data-objectives>
+      <header>
+        <h2>What the walk is worth</h2>
+        <p class="muted small">All are to be small.</p>
+      </header>
+      <Table<Row>
+        caption="Objectives of the walk"
+        rows={rows}
+        rowKey={(row) => row.name}
+        columns={[
+          {
+            key: 'name',
+            label: 'objective',
+            header: true,
+            cell: ({ name }) => (
+              <>
+                {name.replaceAll('_', ' ')}{' '}
+                <span class="unit">{OBJECTIVES[name] ? `[${OBJECTIVES[name].unit}]` : ''}</span>
+                <span class="muted small block">{OBJECTIVES[name]?.meaning}</span>
+              </>
+            ),
+          },
+          ...numbers,
+          ...(walks.length > 1 ? [compared] : []),
+        ]}
+      />
+    </section>
+  )
+}
+
+/** In per cent; in the objective's unit where it may be of either sign. */
+function difference(name: string, first: number | null, second: number | null): string {
+  if (first === null || second === null) return NONE
+  return first > 0 && second > 0
+    ? change(100 * (second / first - 1), '%')
+    : change(second - first, OBJECTIVES[name]?.unit)
+}
+
+/** How much of a failed walk there is to see. */
+function extentOf({ frames, header }: Replay): string {
+  if (frames === 0) return 'There is nothing to show of it.'
+  const { cycles, cycle_time } = header.scenario
+  return header.duration < cycles * cycle_time - 0.01 ? 'Shown up to there.' : 'Shown in full.'
+}
+
+function sentence(text: string): string {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`
+}

@@ -1,0 +1,76 @@
+/** A small catalogue of the kind that the API lists. */
+
+import type { Catalogue } from '../src/submission/catalogue'
+import { fieldsOf, type OpenApiDocument } from '../src/submission/schema-fields'
+
+export const DOCUMENT: OpenApiDocument = {
+  components: {
+    schemas: {
+      JobSpec: {
+        properties: {
+          controller: { type: 'string', enum: ['pi', 'p'], default: 'pi' },
+          preference: { default: 'A' },
+          iterations: { type: 'integer', minimum: 1, maximum: 1_000_000, default: 25 },
+          seed: { type: 'integer', minimum: 0, exclusiveMaximum: 2 ** 63, default: 1 },
+        },
+      },
+      Scenario: {
+        properties: {
+          name: { type: 'string', description: 'Name of the scenario.' },
+          radius: {
+            type: 'number',
+            exclusiveMinimum: 0,
+            maximum: 1,
+            description: 'Lateral distance of the feet [m].',
+          },
+          load: { type: 'number', minimum: 0, maximum: 50, default: 0 },
+        },
+        required: ['name', 'radius'],
+      },
+      PsoSettings: {
+        properties: { particles: { type: 'integer', minimum: 1, maximum: 10_000, default: 25 } },
+      },
+      RobotVariant: {
+        properties: {
+          contact_law: { type: 'string', enum: ['linear_zone', 'stick'], default: 'linear_zone' },
+          gearlash: { default: [0, 0, 0] },
+        },
+      },
+    },
+  },
+}
+
+const variable = (name: string, low: number, high: number, kind = 'continuous') => ({
+  name,
+  low,
+  high,
+  kind,
+  unit: '1',
+  description: '',
+})
+
+export const CATALOGUE = {
+  controllers: [
+    {
+      name: 'pi',
+      description: '',
+      variables: [variable('P', 0, 1), variable('FOMF', 1, 3, 'integer')],
+      gait_variables: [variable('stride', 0.1, 0.2)],
+      published: { A: { P: 0.45, FOMF: 2 } },
+    },
+  ],
+  scenarios: [
+    { name: 'fast', radius: 0.16, load: 0, number: 1, simulated_seconds: 4.5 },
+    { name: 'loaded', radius: 0.145, load: 2, number: 2, simulated_seconds: 4.5 },
+  ],
+  preferences: [
+    { name: 'A', bias: [0.9, 0.8, 0.24, 0.5, 0.8], exponent: [0.1, 0.7, 0.3, 0.3, 0.1] },
+    { name: 'C', bias: [0, 0, 0, 0, 0], exponent: [1, 1, 1, 1, 1] },
+  ],
+  fields: {
+    job: fieldsOf(DOCUMENT, 'JobSpec'),
+    scenario: fieldsOf(DOCUMENT, 'Scenario'),
+    optimizer: fieldsOf(DOCUMENT, 'PsoSettings'),
+    variant: fieldsOf(DOCUMENT, 'RobotVariant'),
+  },
+} as unknown as Catalogue

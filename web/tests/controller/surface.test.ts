@@ -1,0 +1,126 @@
+import { describe, expect, test } from 'vitest'
+import {
+  cells,
+  extent,
+  firstCell,
+  layersOf,
+  moved,
+  nearest,
+  type Output,
+  type Rule,
+  ruleText,
+  type SurfaceView,
+  strength,
+} from '../../src/controller/surface'
+
+const output = {
+  name: 'FO',
+  unit: 'PWM counts',
+  range: [-10, 10],
+  values: [-10, 0, 10],
+  memberships: [],
+  rules: [],
+  inference: [
+    [-8, -2],
+    [0, 0],
+    [8, 2],
+  ],
+  table: [
+    [-8.5, -2],
+    [0, 0],
+    [8.25, 2],
+  ],
+  quantisation: {
+    error_bits: 10,
+    current_bits: 6,
+    velocity_bits: null,
+    output_bits: 8,
+    bytes: 65536,
+    largest_difference: 0.5,
+    rms_difference: 0.2,
+  },
+} satisfies Output
+
+const surface = {
+  controller: 'fuzzy-pi',
+  velocity_error: null,
+  outputs: [output],
+  inputs: [
+    {
+      name: 'error',
+      unit: 'counts',
+      range: [-100, 100],
+      values: [-100, 0, 100],
+      memberships: [{ name: 'positive', degrees: [0, 0, 1] }],
+    },
+    {
+      name: 'current',
+      unit: 'counts',
+      range: [0, 50],
+      values: [0, 50],
+      memberships: [{ name: 'large', degrees: [0, 0.4] }],
+    },
+  ],
+} satisfies SurfaceView
+
+const [inference, table, difference] = layersOf(surface, output)
+
+/** As it comes from the server; objects with a `then` are not to be written in code. */
+function ruleOf(json: string): Rule {
+  return JSON.parse(json) as Rule
+}
+
+describe('layers', () => {
+  test('inference and table share their colours, the difference has its own', () => {
+    expect([inference.limit, table.limit, difference.limit]).toEqual([8.5, 8.5, 0.5])
+  })
+
+  test('the difference is table less inference', () => {
+    expect(difference.values).toEqual([
+      [-0.5, 0],
+      [0, 0],
+      [0.25, 0],
+    ])
+  })
+
+  test('have least, greatest and number of values', () => {
+    expect(extent(inference.values)).toEqual([-8, 8])
+    expect(cells(inference.values)).toBe(6)
+  })
+})
+
+describe('rules', () => {
+  const rule = ruleOf(
+    '{"if": {"error": "positive", "current": "large"}, "then": "negative-extreme", "weight": 0.5}',
+  )
+
+  test('fire as far as the least of their conditions, times their weight', () => {
+    expect(strength(rule, surface, { error: 2, current: 1 })).toBeCloseTo(0.2)
+    expect(strength(rule, surface, { error: 2, current: 0 })).toBe(0)
+  })
+
+  test('without a condition on an input do not depend on it', () => {
+    const alone = ruleOf('{"if": {"error": "positive"}, "then": "positive", "weight": 0.9}')
+    expect(strength(alone, surface, { error: 2, current: 0 })).toBeCloseTo(0.9)
+  })
+
+  test('are told in words', () => {
+    expect(ruleText(rule, 'FO')).toBe(
+      'If error is positive and current is large, then FO is negative-extreme',
+    )
+  })
+})
+
+test('the chosen point stays within the grid', () => {
+  const cell = firstCell(inference)
+  expect(moved(cell, 99, 99, inference)).toEqual({ error: 2, current: 1 })
+  expect(moved(cell, -99, -99, inference)).toEqual({ error: 0, current: 0 })
+})
+
+test.each([
+  [-40, 1],
+  [-60, 0],
+  [1e9, 2],
+])('the value nearest to %d has index %d', (value, index) => {
+  expect(nearest([-100, 0, 100], value)).toBe(index)
+})

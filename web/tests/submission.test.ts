@@ -1,0 +1,174 @@
+import { describe, expect, test } from 'vitest'
+import type { JobSpec } from '../src/api/types'
+import { around } from '../src/submission/around-design'
+import { errorsByField, specOf, withKinds } from '../src/submission/build-spec'
+import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
+import { boundsInWords, fieldsOf } from '../src/submission/schema-fields'
+import { CATALOGUE, DOCUMENT } from './catalogue-example'
+
+const empty = emptyDraft(CATALOGUE)
+
+const withOwnScenario: Draft = {
+  ...empty,
+  presets: ['fast'],
+  own: [scenarioDraft(CATALOGUE.fields.scenario, CATALOGUE.scenarios[1], 'mine')],
+}
+
+describe('a draft', () => {
+  test('begins with the defaults that the API documents', () => {
+    expect(specOf(empty)).toEqual({
+      name: '',
+      robot: 'szabadka2',
+      controller: 'pi',
+      scenarios: ['fast', 'loaded'],
+      variables: [
+        { name: 'P', low: 0, high: 1 },
+        { name: 'FOMF', low: 1, high: 3 },
+      ],
+      fixed: {},
+      preference: 'A',
+      optimizer: { particles: 25 },
+      iterations: 25,
+      seed: 1,
+    })
+  })
+
+  test('sends fixed and gait variables as they were set', () => {
+    const { P, stride, ...rest } = empty.variables
+    const spec = specOf({
+      ...empty,
+      variables: {
+        ...rest,
+        P: { ...P, mode: 'fixed', value: '0.5' },
+        stride: { ...stride, mode: 'searched', low: '0.12' },
+      },
+    })
+    expect(spec.fixed).toEqual({ P: 0.5 })
+    expect(spec.variables).toContainEqual({ name: 'stride', low: 0.12, high: 0.2 })
+  })
+
+  test('leaves what is no number for the API to refuse', () => {
+    expect(specOf({ ...empty, iterations: 'many' }).iterations).toBe('many')
+    expect(specOf({ ...empty, seed: '' }).seed).toBe('')
+  })
+
+  test('keeps the kind of integer variables', () => {
+    const spec = withKinds(specOf(empty), CATALOGUE.controllers[0].variables)
+    expect(spec.variables).toContainEqual({ name: 'FOMF', low: 1, high: 3, kind: 'integer' })
+  })
+
+  test('sends a variant of the robot with numbers', () => {
+    const robot = { ...empty.robot, kind: 'variant' as const, gearlash: ['2.5', '1', '1'] }
+    expect(specOf({ ...empty, robot }).robot).toEqual({
+      name: 'szabadka2',
+      contact_law: 'linear_zone',
+      gearlash: [2.5, 1, 1],
+    })
+  })
+})
+
+describe('a clone', () => {
+  const resolved = {
+    ...specOf(empty),
+    name: 'first',
+    scenarios: [
+      { name: 'fast', radius: 0.16, load: 0 },
+      { name: 'mine', radius: 0.2, load: 1 },
+    ],
+    variables: [{ name: 'P', low: 0.1, high: 0.9 }],
+    fixed: { FOMF: 2 },
+    preference: {
+      bias: [0, 0, 0, 0, 0],
+      exponent: [1, 1, 1, 1, 1],
+    },
+    optimizer: { particles: 7 },
+    iterations: 3,
+    seed: 9,
+  } as unknown as JobSpec
+  const draft = draftOf(resolved, CATALOGUE)
+
+  test('knows presets by their values and keeps the others as they are', () => {
+    expect(draft.presets).toEqual(['fast'])
+    expect(draft.own).toEqual([{ name: 'mine', radius: '0.2', load: '1' }])
+    expect(draft.preference.kind).toBe('C')
+  })
+
+  test('asks for the same job again', () => {
+    const again = specOf(draft)
+    expect(again).toEqual({
+      ...resolved,
+      scenarios: ['fast', resolved.scenarios![1]],
+      preference: 'C',
+    })
+  })
+
+  test('of a preference of one’s own stays so', () => {
+    const own = { bias: [1, 1, 1, 1, 1], exponent: [1, 1, 1, 1, 0] } as JobSpec['preference']
+    expect(specOf(draftOf({ ...resolved, preference: own }, CATALOGUE)).preference).toEqual(own)
+  })
+})
+
+describe('the neighbourhood of a design', () => {
+  const near = (design: Record<string, number>) =>
+    around(empty, design, new Set(['FOMF'])).variables
+
+  test('is a part of the range around it', () => {
+    expect(near({ P: 0.5 }).P).toMatchObject({ low: '0.35', high: '0.65' })
+  })
+
+  test('stays within the bounds and keeps its width', () => {
+    expect(near({ P: 1 }).P).toMatchObject({ low: '0.7', high: '1' })
+  })
+
+  test('of an integer variable has whole bounds that differ', () => {
+    expect(near({ FOMF: 2 }).FOMF).toMatchObject({ low: '1', high: '3' })
+  })
+})
+
+describe('a problem', () => {
+  const found = (field: string) => [
+    ...errorsByField([{ field, message: 'is wrong' }], withOwnScenario).keys(),
+  ]
+
+  test.each([
+    ['iterations', 'iterations'],
+    ['optimizer.particles', 'optimizer.particles'],
+    ['variables.1.low', 'variables.FOMF.low'],
+    ['fixed.P', 'variables.P.value'],
+    ['scenarios.1.radius', 'own.0.radius'],
+    ['scenarios.0', 'scenarios'],
+    ['', ''],
+  ])('of %s is shown at %s', (field, shown) => {
+    expect(found(field)).toEqual([shown])
+  })
+
+  test('does not hide another one of the same field', () => {
+    const errors = errorsByField(
+      [
+        { field: 'seed', message: 'one' },
+        { field: 'seed', message: 'two' },
+      ],
+      empty,
+    )
+    expect(errors.get('seed')).toBe('one; two')
+  })
+})
+
+describe('fields of the schema', () => {
+  const scenario = fieldsOf(DOCUMENT, 'Scenario')
+
+  test('carry their unit, bounds and default', () => {
+    expect(scenario.get('radius')).toMatchObject({ unit: 'm', low: 0, high: 1, required: true })
+    expect(scenario.get('load')).toMatchObject({ unit: '1', default: 0, required: false })
+  })
+
+  test('say their bounds in words', () => {
+    expect(boundsInWords(scenario.get('radius')!)).toBe('above 0, at most 1')
+    expect(boundsInWords(scenario.get('load')!)).toBe('0 to 50')
+    expect(boundsInWords(fieldsOf(DOCUMENT, 'JobSpec').get('seed')!)).toBe('at least 0')
+  })
+
+  test('of a schema that is not there are an error', () => {
+    expect(() => fieldsOf(DOCUMENT, 'Nothing')).toThrow('no schema Nothing')
+  })
+})

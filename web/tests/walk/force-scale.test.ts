@@ -1,0 +1,18 @@
+import { expect, test } from 'vitest'
+import { newtonsPerCell, typicalLargest } from '../../src/walk/force-scale'
+
+test.each([
+  [0, 10],
+  [20, 10],
+  [48, 20],
+  [60, 50],
+  [0.02, 0.01],
+])('forces up to %d N are drawn with a cell for %d N', (largest, expected) => {
+  expect(newtonsPerCell(largest)).toBeCloseTo(expected)
+})
+
+test('a rare impact does not set the scale', () => {
+  const norms = new Float32Array(1000).fill(20)
+  norms[500] = 900
+  expect(typicalLargest(norms)).toBe(20)
+})

@@ -30,7 +30,7 @@ from api.routes import (
     simulations,
     walks,
 )
-from api.security import SecurityHeadersMiddleware
+from api.security import SameSiteMiddleware, SecurityHeadersMiddleware
 from api.settings import ApiSettings
 from api.views import PREFIX, ParticlesHeaderView
 from api.views.replay import ReplayHeaderView
@@ -95,6 +95,7 @@ def create_app(
     app.add_middleware(
         GZipMiddleware, minimum_size=1024, compresslevel=6, exclude_content_types=_UNCOMPRESSED
     )
+    app.add_middleware(SameSiteMiddleware)
     app.add_middleware(RequestIdMiddleware)
     # The outermost: an answer to a bug has the headers too.
     app.add_middleware(SecurityHeadersMiddleware)

@@ -5,6 +5,7 @@
 | RequestValidationError, body is not JSON      | 400    | malformed-json        |
 | RequestValidationError, InvalidRequest,       | 422    | invalid-request       |
 | SimulationInputError                          |        |                       |
+| to change something from another site's page  | 403    | cross-site            |
 | NotFound; no such route                       | 404    | not-found             |
 | Conflict, LeaseLost                           | 409    | conflict              |
 | IdempotencyConflict                           | 409    | idempotency-conflict  |
@@ -51,6 +52,7 @@ _MOST_ERRORS: Final = 20
 _TITLES: Final = {
     "malformed-json": "The body is not JSON",
     "invalid-request": "The request is not valid",
+    "cross-site": "The request comes from another site",
     "not-found": "There is no such thing",
     "method-not-allowed": "The method is not allowed here",
     "conflict": "The present state does not allow it",

@@ -13,7 +13,7 @@ from pydantic import Field
 from api.views.base import View, finite
 from api.views.evaluation import StatusName
 from sim.kernel.parameters import gravity_on
-from sim.outcome import OBJECTIVE_NAMES, Status
+from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from sim.replay import Replay
 from sim.robot import Robot
 from sim.robot.shapes import Role, Shape, Solid, VisibleLink
@@ -140,6 +140,9 @@ class ReplayHeaderView(View):
         description="Raw objectives f1..f6 of table 4.1 by name; null if the walk has none.",
         examples=[{"torque": 8.71}],
     )
+    objective_units: dict[str, str] = Field(
+        description="Unit of each of them.", examples=[{"torque": "N m"}]
+    )
     scenario: Scenario = Field(
         description="The walk in full, with what the design says of its gait."
     )
@@ -177,6 +180,7 @@ def encoded_replay(
         status=status.label,
         explanation=status.phrase,
         objectives=dict(zip(OBJECTIVE_NAMES, map(finite, objectives.tolist()), strict=True)),
+        objective_units={objective.name: objective.unit for objective in OBJECTIVES},
         scenario=scenario,
         robot=MovingRobotView(
             name=robot.description.name,

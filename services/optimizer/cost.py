@@ -56,7 +56,7 @@ def cost(
     one = duration(spec, trials)
     alike = [job for job in earlier if _alike(job, spec)][:_MOST_JOBS]
     if alike:
-        walked = sum(_simulated_seconds(job) for job in alike)
+        walked = sum(_simulated_seconds(job, one) for job in alike)
         rate: float | None = walked / sum(job.progress.compute_seconds for job in alike)
         jobs = "1 earlier job" if len(alike) == 1 else f"{len(alike)} earlier jobs"
         basis = f"the rate of {jobs} with the same kind of walks: {rate:.3g} simulated s/s"
@@ -145,11 +145,11 @@ def _shortened(trial: Trial) -> Trial:
 
 
 def _alike(job: Job, spec: Spec) -> bool:
-    """Whether a job that tunes a drive has run walks of the same kind."""
+    """Whether a job has run walks of the same kind; a fit, to the same recordings."""
     return (
-        isinstance(job.spec, JobSpec)
-        and job.progress.compute_seconds > 0.0
+        job.progress.compute_seconds > 0.0
         and _kind_of_walk(job.spec) == _kind_of_walk(spec)
+        and job.spec.recording_ids == spec.recording_ids
     )
 
 
@@ -159,9 +159,14 @@ def _kind_of_walk(spec: Spec) -> str:
     return f"{controller} {spec.model_dump_json(include={'robot'})}"
 
 
-def _simulated_seconds(job: Job) -> float:
-    """What the committed iterations of a job that tunes a drive have walked [s], as planned."""
-    return job.progress.evaluations * duration(job.spec, job.spec.trials({}))
+def _simulated_seconds(job: Job, fitted: float) -> float:
+    """What the committed iterations of a job that is like another have walked [s], as planned.
+
+    fitted: simulated time of one design of the other [s]; fits to the same recordings share it.
+    """
+    tuned = isinstance(job.spec, JobSpec)
+    one = duration(job.spec, job.spec.trials({})) if tuned else fitted
+    return job.progress.evaluations * one
 
 
 def _typical(space: DesignSpace, name: str) -> float | None:

@@ -191,7 +191,15 @@ class JobService:
         design that did not fail, and as `columns`.
         """
         first, *others = jobs
+        seeds = {first.spec.seed: first.id}
         for other in others:
+            if other.spec.seed in seeds:
+                raise InvalidRequest(
+                    f"job {other.id} has the seed of job {seeds[other.spec.seed]}, so that they"
+                    " agree whatever the walks say; compare runs of different seeds",
+                    field="also",
+                )
+            seeds[other.spec.seed] = other.id
             if _problem(other.spec) != _problem(first.spec):
                 raise InvalidRequest(
                     f"job {other.id} is of another problem than job {first.id}; runs that are"
@@ -200,7 +208,10 @@ class JobService:
                 )
         for job in jobs:
             if job.progress.best_fitness is None:
-                raise Conflict(f"job {job.id} has no design yet that did not fail")
+                raise Conflict(
+                    f"job {job.id} has no design yet that did not fail; ask again after its next"
+                    " iteration, or leave it out"
+                )
         runs = [self.columns(job) for job in jobs]
         return convergence(first.spec.design_space().variables, runs)
 

@@ -103,6 +103,8 @@ def test_objectives_and_columns_are_the_simulations(client: httpx2.Client) -> No
     header, channels = replayed(client, rate=500)
     assert header["objectives"] == result["objectives"]
     assert list(header["objectives"]) == list(OBJECTIVE_NAMES)
+    assert list(header["objective_units"]) == list(OBJECTIVE_NAMES)
+    assert header["objective_units"]["energy"] == "J/m"
     log = {name: np.array(column["values"]) for name, column in result["log"]["columns"].items()}
     for name in ("joint_angle", "desired_angle", "current", "voltage", "load_torque", "foot_force"):
         np.testing.assert_array_equal(channels[name], log[name].astype(np.float32), err_msg=name)

@@ -116,12 +116,22 @@ def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: SqlStore, twi
 def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin) -> None:
     recording, service = store.add_recording(twin.recording), JobService(store)
     first, _ = service.submit(spec(recording))
-    other, _ = service.submit(spec(recording, links=(1,)))
+    other, _ = service.submit(spec(recording, links=(1,), seed=2))
     with pytest.raises(InvalidRequest, match="another problem") as refused:
         service.convergence([first, other])
     assert refused.value.field == "also"
     with pytest.raises(Conflict, match="no design yet"):
         service.convergence([first])
+
+
+def test_a_run_is_no_evidence_for_itself(store: SqlStore, twin: Twin) -> None:
+    recording, service = store.add_recording(twin.recording), JobService(store)
+    first, _ = service.submit(spec(recording))
+    again, _ = service.submit(spec(recording, iterations=20))
+    for other in (first, again):
+        with pytest.raises(InvalidRequest, match="has the seed of job") as refused:
+            service.convergence([first, other])
+        assert refused.value.field == "also"
 
 
 @pytest.mark.parametrize(

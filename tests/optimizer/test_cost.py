@@ -8,9 +8,13 @@ from typing import Any
 import pytest
 
 from services.optimizer.cost import MeasuredRates, cost
+from services.optimizer.identification_spec import IdentificationSpec
 from services.optimizer.job import Job, Progress
 from services.optimizer.job_spec import JobSpec
+from services.optimizer.optimizers.pso import PsoSettings
 from services.optimizer.spec import Spec
+from services.optimizer.specs import AnySpec
+from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import RobotVariant
 from sim.scenario import Scenario
 from sim.simulate import Simulation, simulate
@@ -35,7 +39,7 @@ class NoMeasurement(MeasuredRates):
         return None, "nothing"
 
 
-def done(spec: JobSpec, evaluations: int, seconds: float) -> Job:
+def done(spec: AnySpec, evaluations: int, seconds: float) -> Job:
     progress = Progress(iterations=1, evaluations=evaluations, compute_seconds=seconds)
     return replace(job(spec), progress=progress)
 
@@ -115,3 +119,29 @@ def test_a_gait_beyond_reach_has_no_rate() -> None:
     found = cost(spec, spec.trials({}), (), MeasuredRates())
     assert found.seconds is None
     assert "reach" in found.basis
+
+
+def test_a_fit_is_timed_by_fits_to_the_same_recordings() -> None:
+    walk = RecordedWalk(
+        scenario=SPEC.resolved_scenarios()[0],
+        controller="pi",
+        design={"P": 0.4, "I": 0.1},
+        first_tick=0,
+        joints=("a",),
+        current=((0.1,),),
+    )
+    recordings = {"0" * 32: walk, "1" * 32: walk}
+    one, both = (
+        IdentificationSpec(
+            kind="identification", recordings=ids, optimizer=PsoSettings(particles=10), iterations=5
+        )
+        for ids in (tuple(recordings)[:1], tuple(recordings))
+    )
+
+    def seconds(spec: IdentificationSpec, *earlier: Job) -> float | None:
+        return cost(spec, spec.trials(recordings), earlier, NoMeasurement()).seconds
+
+    fitted = done(one.model_copy(update={"iterations": 99}), evaluations=20, seconds=4.0)
+    assert seconds(one, fitted) == pytest.approx(50 * 4.0 / 20)
+    assert seconds(both, fitted) is None
+    assert seconds(one, done(SPEC, evaluations=20, seconds=4.0)) is None

@@ -7,6 +7,7 @@ import {
   formatNumber,
   percent,
   quantity,
+  writtenUnit,
 } from '../src/format/number'
 import { formatAge, formatDuration, formatMoment } from '../src/format/time'
 
@@ -83,4 +84,12 @@ describe('times', () => {
   test('what is no moment is a dash', () => {
     expect(formatMoment('never')).toBe('–')
   })
+})
+
+test('units are written as they are printed', () => {
+  expect(writtenUnit('rad/s2')).toBe('rad/s²')
+  expect(writtenUnit('kg m2')).toBe('kg m²')
+  expect(writtenUnit('ohm')).toBe('Ω')
+  expect(writtenUnit('counts/s')).toBe('counts/s')
+  expect(quantity(0.4, 'ohm', 1)).toBe('0.4\u00a0Ω')
 })

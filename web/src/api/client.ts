@@ -74,17 +74,21 @@ export async function postBytes<P extends PathOf<'post'>>(
   return response.arrayBuffer()
 }
 
-/** The path with its parameters filled in, and what is not null or undefined as query. */
+/**
+ * The path with its parameters filled in, and what is not null or undefined as query; a list is
+ * written out, each of its values under the same name.
+ */
 export function url(path: string, params?: unknown, query?: unknown): string {
   const values = (params ?? {}) as Record<string, unknown>
   const filled = path.replace(/\{(\w+)\}/g, (_, name: string) =>
     encodeURIComponent(String(values[name])),
   )
-  const pairs = Object.entries(query ?? {}).filter(
-    ([, value]) => value !== undefined && value !== null,
+  const pairs = Object.entries(query ?? {}).flatMap(([name, value]) =>
+    [value].flat().map((each) => [name, each] as const),
   )
-  if (pairs.length === 0) return filled
-  return `${filled}?${new URLSearchParams(pairs.map(([name, value]) => [name, String(value)]))}`
+  const set = pairs.filter(([, value]) => value !== undefined && value !== null)
+  if (set.length === 0) return filled
+  return `${filled}?${new URLSearchParams(set.map(([name, value]) => [name, String(value)]))}`
 }
 
 function posted(

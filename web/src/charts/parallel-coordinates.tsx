@@ -1,7 +1,8 @@
 /** Rows as lines across one axis per column; dragging along an axis selects a stretch of it. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
-import { formatExact } from '../format/number'
+import { BrokenName } from '../components/broken-name'
+import { formatExact, writtenUnit } from '../format/number'
 import { themeColour, useTheme } from '../theme'
 import { type Brush, BUCKETS, type ParallelModel, selectRows, valueAt } from './parallel-model'
 import { type Palette, ProgressivePainter } from './progressive-painter'
@@ -60,13 +61,16 @@ export function ParallelCoordinates({
 
   const least = model.axes.length * AXIS_WIDTH_PX
   return (
-    <div class="parallel-scroll">
+    // A box that scrolls must take the keyboard.
+    <section class="parallel-scroll" tabIndex={0} aria-label={`${label}, by axis`}>
       <div class="parallel" ref={box} style={{ minWidth: `${least}px` }}>
         <div class="parallel-heads">
           {model.axes.map((axis) => (
             <span key={axis.name} class="small">
-              <strong>{axis.name}</strong>
-              <span class="unit">{axis.unit === '1' ? '\u00a0' : axis.unit}</span>
+              <strong>
+                <BrokenName name={axis.name} />
+              </strong>
+              <span class="unit">{axis.unit === '1' ? '\u00a0' : writtenUnit(axis.unit)}</span>
               <span class="muted">{formatExact(axis.high, 4)}</span>
             </span>
           ))}
@@ -91,7 +95,7 @@ export function ParallelCoordinates({
           ))}
         </div>
       </div>
-    </div>
+    </section>
   )
 }
 

@@ -37,7 +37,9 @@ export class ProgressivePainter {
     /** Told how many of the rows are drawn. */
     private readonly progress: (drawn: number, of: number) => void,
   ) {
-    this.context = canvas.getContext('2d')!
+    // Thousands of thin lines are slow on graphics processors that are not there: on the processor
+    // they take as long on every machine. This is how a canvas is kept there.
+    this.context = canvas.getContext('2d', { willReadFrequently: true })!
   }
 
   paint(model: ParallelModel, rows: Uint32Array, palette: Palette): void {

@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from 'preact'
 import { ApiProblem, messageOf } from '../api/problem'
+import { sentence } from '../format/words'
 
 /** Something is on its way. */
 export function Loading({ what }: { what: string }) {
@@ -46,9 +47,9 @@ export function ErrorNotice({
           ))}
         </ul>
       ) : (
-        <p>{messageOf(error)}</p>
+        <p>{sentence(messageOf(error))}</p>
       )}
-      {retry && (
+      {retry && !isFinal(error) && (
         <p>
           <button type="button" class="compact" onClick={retry}>
             Try again
@@ -57,4 +58,9 @@ export function ErrorNotice({
       )}
     </div>
   )
+}
+
+/** Whether asking the same again gets the same answer. */
+function isFinal(error: unknown): boolean {
+  return error instanceof ApiProblem && error.status === 422
 }

@@ -4,6 +4,7 @@ import type { ComponentChildren } from 'preact'
 import { useState } from 'preact/hooks'
 import { formatCount } from '../format/number'
 import { type Cell, paged, type SortOrder, sorted } from './rows'
+import { Unit } from './unit'
 
 export interface Column<R> {
   readonly key: string
@@ -76,6 +77,7 @@ export function Table<R>({
       </section>
       {page.pages > 1 && (
         <Pager
+          caption={caption}
           page={page.page}
           pages={page.pages}
           total={rows.length}
@@ -116,7 +118,7 @@ function Header<R>({
   const label = (
     <>
       {column.label}
-      {column.unit && column.unit !== '1' && <span class="unit"> [{column.unit}]</span>}
+      <Unit unit={column.unit} />
     </>
   )
   const mark = active ? (order.descending ? ' ↓' : ' ↑') : ''
@@ -144,12 +146,15 @@ function Header<R>({
 }
 
 export function Pager({
+  caption,
   page,
   pages,
   total,
   size,
   onPage,
 }: {
+  /** Of the table. */
+  caption: string
   /** From 0. */
   page: number
   pages: number
@@ -159,7 +164,8 @@ export function Pager({
 }) {
   const last = Math.min(total, (page + 1) * size)
   return (
-    <nav class="pager" aria-label="Pages of the table">
+    // A group, not a landmark: several tables of a page may have one.
+    <fieldset class="pager" aria-label={`Pages of ${caption}`}>
       <span>
         {formatCount(page * size + 1)}–{formatCount(last)} of {formatCount(total)}
       </span>
@@ -184,7 +190,7 @@ export function Pager({
           Next
         </button>
       </span>
-    </nav>
+    </fieldset>
   )
 }
 

@@ -2,7 +2,7 @@
 
 import type { Variable } from '../api/types'
 import { type Column, Table } from '../components/table'
-import { formatExact } from '../format/number'
+import { formatExact, writtenUnit } from '../format/number'
 import type { ResolvedDesign } from '../walk/resolve-design'
 
 interface Row {
@@ -17,26 +17,26 @@ export function DesignCard({ design }: { design: ResolvedDesign }) {
     .filter(({ name }) => name in design.design)
     .map((variable): Row => ({ variable, value: design.design[variable.name] }))
   const columns: Column<Row>[] = [
-    { key: 'name', label: 'variable', header: true, value: ({ variable }) => variable.name },
+    { key: 'name', label: 'Variable', header: true, value: ({ variable }) => variable.name },
     {
       key: 'value',
-      label: 'value',
+      label: 'Value',
       numeric: true,
       cell: ({ value }) => formatExact(value),
     },
     {
       key: 'unit',
-      label: 'unit',
-      cell: ({ variable }) => (variable.unit === '1' ? '' : variable.unit),
+      label: 'Unit',
+      cell: ({ variable }) => (variable.unit === '1' ? '' : writtenUnit(variable.unit)),
     },
     {
       key: 'bounds',
-      label: 'bounds of the search',
+      label: 'Bounds of the search',
       numeric: true,
       minor: true,
       cell: ({ variable }) => `${formatExact(variable.low)} to ${formatExact(variable.high)}`,
     },
-    { key: 'meaning', label: 'meaning', cell: ({ variable }) => variable.description },
+    { key: 'meaning', label: 'Meaning', cell: ({ variable }) => variable.description },
   ]
   return (
     <section class="card" data-design>

@@ -129,7 +129,7 @@ function LayerTable({ layer }: { layer: Layer }) {
   const columns: Column<number>[] = [
     {
       key: 'error',
-      label: 'error',
+      label: 'Error',
       unit: error.unit,
       numeric: true,
       header: true,

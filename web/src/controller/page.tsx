@@ -6,8 +6,8 @@ import { useResource } from '../api/resource'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { Tabs } from '../components/tabs'
 import { formatExact, quantity } from '../format/number'
-import { setQuery, usePlace } from '../router/navigation'
-import { jobPath, withQuery } from '../router/routes'
+import { setQuery } from '../router/navigation'
+import { DesignLinks, DesignPage } from '../walk/design-page'
 import { DesignPicker } from '../walk/design-picker'
 import { type DesignSource, queryOf, sourceOf, wordOf } from '../walk/design-source'
 import { type ResolvedDesign, resolveDesign } from '../walk/resolve-design'
@@ -21,26 +21,10 @@ import { inputOf, type SurfaceView } from './surface'
 const GRID = { error_points: 65, current_points: 33 }
 
 export default function ControllerPage() {
-  const { query } = usePlace()
-  const [source, wrong] = sourceIn(query)
   return (
-    <>
-      <div class="page-header">
-        <h1>Controller</h1>
-      </div>
-      {source ? (
-        <Controller source={source} query={query} />
-      ) : (
-        <>
-          <ErrorNotice what="This address names no controller." error={wrong} />
-          <p class="row">
-            <a class="button" href="/controller">
-              Show the published optimum A
-            </a>
-          </p>
-        </>
-      )}
-    </>
+    <DesignPage title="Controller" what="controller" path="/controller" read={sourceOf}>
+      {(source, query) => <Controller source={source} query={query} />}
+    </DesignPage>
   )
 }
 
@@ -57,7 +41,7 @@ function Controller({ source, query }: { source: DesignSource; query: URLSearchP
           chosenLabel={design?.label ?? 'This design'}
           onChoose={(chosen) => setQuery({ ...queryOf(chosen!), velocity: null })}
         />
-        {design && <Links source={source} />}
+        <DesignLinks source={design?.source ?? source} path={design && '/walk'} label="Its walk" />
       </div>
       {resolved.error && (
         <ErrorNotice
@@ -155,31 +139,4 @@ function VelocityChoice({ surface, velocity }: { surface: SurfaceView; velocity:
 /** As the query has it; none for zero. */
 function formatted(value: string): string | null {
   return Number(value) === 0 ? null : String(Number(value))
-}
-
-function Links({ source }: { source: DesignSource }) {
-  const set = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
-  return (
-    <div class="row">
-      <a
-        class="button"
-        href={withQuery('/walk', Object.fromEntries(set) as Record<string, string>)}
-      >
-        Its walk
-      </a>
-      {'job' in source && (
-        <a class="button" href={jobPath(source.job)}>
-          Its job
-        </a>
-      )}
-    </div>
-  )
-}
-
-function sourceIn(query: URLSearchParams): [DesignSource | null, unknown] {
-  try {
-    return [sourceOf(query), null]
-  } catch (error) {
-    return [null, error]
-  }
 }

@@ -23,18 +23,18 @@ export function RulesCard({
     (rule, k): Row => ({ number: k + 1, rule, fires: strength(rule, surface, cell) }),
   )
   const columns: Column<Row>[] = [
-    { key: 'number', label: 'rule', numeric: true, header: true, value: (row) => row.number },
-    { key: 'text', label: 'in words', cell: (row) => ruleText(row.rule, output.name) },
+    { key: 'number', label: 'Rule', numeric: true, header: true, value: (row) => row.number },
+    { key: 'text', label: 'In words', cell: (row) => ruleText(row.rule, output.name) },
     {
       key: 'weight',
-      label: 'weight',
+      label: 'Weight',
       numeric: true,
       value: (row) => row.rule.weight,
-      cell: (row) => formatExact(row.rule.weight),
+      cell: (row) => formatExact(row.rule.weight, 4),
     },
     {
       key: 'fires',
-      label: 'fires at the point',
+      label: 'Fires',
       numeric: true,
       value: (row) => row.fires,
       cell: (row) => (

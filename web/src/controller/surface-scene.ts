@@ -106,7 +106,7 @@ export class SurfaceScene {
 
   resetView(): void {
     const narrow = Math.min(1, this.camera.aspect / 1.5)
-    this.camera.position.set(-1.35, -2.75, 1.75).multiplyScalar(0.92 / narrow)
+    this.camera.position.set(-1.35, -2.75, 1.75).multiplyScalar(1 / narrow)
     this.controls.target.set(0, 0, -0.04)
     this.controls.update()
     this.request()

@@ -32,14 +32,12 @@ export function formatCount(value: number | null | undefined): string {
 
 /** A number with its unit; the unit `1` is not written. */
 export function quantity(value: number | null | undefined, unit: string, digits = 4): string {
-  const text = formatNumber(value, digits)
-  return text === NONE || unit === '1' || unit === '' ? text : text + NO_BREAK_SPACE + unit
+  return beside(formatNumber(value, digits), unit)
 }
 
 /** As quantity, without zeros at the end: 2, 0.5 s. */
 export function exactQuantity(value: number | null | undefined, unit: string, digits = 5): string {
-  const text = formatExact(value, digits)
-  return text === NONE || unit === '1' || unit === '' ? text : text + NO_BREAK_SPACE + unit
+  return beside(formatExact(value, digits), unit)
 }
 
 /** A share as per cent: 12.3 %. */
@@ -56,7 +54,20 @@ export function change(value: number | null | undefined, unit = '1', digits = 3)
 
 /** A label with its unit in brackets: `energy [J/m]`. */
 export function withUnit(label: string, unit: string): string {
-  return unit === '1' || unit === '' ? label : `${label} [${unit}]`
+  return unit === '1' || unit === '' ? label : `${label} [${writtenUnit(unit)}]`
+}
+
+/** A unit of the API as it is written: m/s² for m/s2, Ω for ohm. */
+export function writtenUnit(unit: string): string {
+  return unit
+    .replace(/(?<=[a-z])([23])\b/g, (_, power: string) => (power === '2' ? '²' : '³'))
+    .replace(/\bohm\b/, 'Ω')
+}
+
+function beside(text: string, unit: string): string {
+  return text === NONE || unit === '1' || unit === ''
+    ? text
+    : text + NO_BREAK_SPACE + writtenUnit(unit)
 }
 
 function grouped(text: string): string {

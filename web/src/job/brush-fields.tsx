@@ -2,6 +2,8 @@
 
 import { type Brushes, withBrush } from '../charts/parallel-coordinates'
 import { type Axis, type ParallelModel, placeOf, valueAt } from '../charts/parallel-model'
+import { BrokenName } from '../components/broken-name'
+import { Unit } from '../components/unit'
 
 export function BrushFields({
   model,
@@ -27,7 +29,8 @@ export function BrushFields({
           return (
             <fieldset key={axis.name}>
               <legend>
-                {axis.name} {axis.unit !== '1' && <span class="unit">[{axis.unit}]</span>}
+                <BrokenName name={axis.name} />
+                <Unit unit={axis.unit} />
               </legend>
               <Bound axis={axis} name="from" place={low} onChange={(text) => change('low', text)} />
               <Bound axis={axis} name="to" place={high} onChange={(text) => change('high', text)} />

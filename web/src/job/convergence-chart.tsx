@@ -4,9 +4,9 @@ import { useMemo, useState } from 'preact/hooks'
 import type { Iteration, Job } from '../api/types'
 import { type Band, LineChart, type Series } from '../charts/line-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
-import { Table } from '../components/table'
 import { formatNumber, withUnit } from '../format/number'
-import { fitnessUnit } from './header'
+import { ByIteration } from './by-iteration'
+import { fitnessUnit } from './fitness'
 import type { Distribution } from './use-distribution'
 
 export function ConvergenceChart({
@@ -108,14 +108,10 @@ function IterationTable({ iterations, unit }: { iterations: readonly Iteration[]
     cell: (i: Iteration) => formatNumber(i[key], 5),
   })
   return (
-    <Table
+    <ByIteration
       caption={withUnit('Fitness by iteration', unit)}
-      tall
       rows={iterations}
-      rowKey={(i) => String(i.index)}
-      order={{ column: 'index', descending: true }}
       columns={[
-        { key: 'index', label: 'Iteration', numeric: true, header: true, value: (i) => i.index },
         fitness('best_so_far', 'Best so far'),
         fitness('best', 'Best'),
         fitness('median', 'Median'),

@@ -5,11 +5,11 @@ import type uPlot from 'uplot'
 import type { DistributionItem, Job } from '../api/types'
 import { LineChart, withAlpha } from '../charts/line-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
-import { Table } from '../components/table'
 import { formatNumber, percent } from '../format/number'
 import { themeColour } from '../theme'
+import { ByIteration } from './by-iteration'
+import { fitnessUnit } from './fitness'
 import { grouped, type Strip } from './grouped'
-import { fitnessUnit } from './header'
 import type { Distribution } from './use-distribution'
 
 /** More could not be told apart on a common screen. */
@@ -46,20 +46,10 @@ export function DistributionChart({ job, distribution }: { job: Job; distributio
         </>
       }
       table={() => (
-        <Table
+        <ByIteration
           caption="Quantiles of fitness by iteration"
-          tall
           rows={items}
-          rowKey={(item) => String(item.index)}
-          order={{ column: 'index', descending: true }}
           columns={[
-            {
-              key: 'index',
-              label: 'Iteration',
-              numeric: true,
-              header: true,
-              value: (i) => i.index,
-            },
             ...quantiles.map((share, column) => ({
               key: String(share),
               label: share === 0 ? 'best' : share === 1 ? 'worst' : percent(share, 2),

@@ -3,8 +3,8 @@
 import { useMemo } from 'preact/hooks'
 import { LineChart } from '../charts/line-chart'
 import { ChartFrame } from '../components/chart-frame'
-import { Table } from '../components/table'
 import { percent } from '../format/number'
+import { ByIteration } from './by-iteration'
 import type { Distribution } from './use-distribution'
 
 export function DiversityChart({ distribution }: { distribution: Distribution }) {
@@ -27,20 +27,10 @@ export function DiversityChart({ distribution }: { distribution: Distribution })
       title="Diversity of the swarm"
       note="Spread of the designs as a share of each variable’s range: near zero, the swarm has gathered."
       table={() => (
-        <Table
+        <ByIteration
           caption="Diversity by iteration"
-          tall
           rows={items}
-          rowKey={(item) => String(item.index)}
-          order={{ column: 'index', descending: true }}
           columns={[
-            {
-              key: 'index',
-              label: 'Iteration',
-              numeric: true,
-              header: true,
-              value: (i) => i.index,
-            },
             {
               key: 'diversity',
               label: 'Diversity',

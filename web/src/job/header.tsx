@@ -7,6 +7,7 @@ import { STATE_TONES, StateBadge } from '../components/state-badge'
 import { formatCount, quantity } from '../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../format/time'
 import { JobActions } from './actions'
+import { fitnessUnit } from './fitness'
 import type { LiveJob } from './use-job'
 
 export function JobHeader({ live, job }: { live: LiveJob; job: Job }) {
@@ -68,7 +69,7 @@ function Figures({ job, committed }: { job: Job; committed: number }) {
         value={`${formatCount(job.evaluations)} of ${formatCount(job.evaluations_planned)}`}
       />
       <Figure label="Evaluation rate" value={quantity(job.evaluations_per_second, '1/s', 3)} />
-      <Figure label="Walks" value={quantity(job.simulations_per_second, '1/s', 3)} />
+      <Figure label="Walk rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
       <Figure
         label="Time left"
         value={job.state === 'succeeded' ? 'done' : formatDuration(job.eta_seconds)}
@@ -100,11 +101,6 @@ function StreamNote({ live }: { live: LiveJob }) {
   }
   if (connection === 'open') return <span class="muted small">live</span>
   return null
-}
-
-/** Unit of the job's fitness: the product of a tuning job has none, an identification fits amperes. */
-export function fitnessUnit(job: Job): string {
-  return job.kind === 'identification' ? 'A' : '1'
 }
 
 function subtitle(job: Job): string {

@@ -8,7 +8,7 @@ import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { jobPath, withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
-import { fitnessUnit } from './header'
+import { fitnessUnit, trialWords } from './fitness'
 
 export function IterationPanel({ job, index }: { job: Job; index: number }) {
   const evaluations = useResource(`${job.id} ${index}`, (signal) =>
@@ -91,7 +91,7 @@ function columns(job: Job): readonly Column<Evaluation>[] {
     ...scenarioNames(job).map(
       (scenario): Column<Evaluation> => ({
         key: `utility ${scenario}`,
-        label: `utility ${scenario}`,
+        label: `${trialWords(job.kind).worth} ${scenario}`,
         unit,
         numeric: true,
         value: (e) => e.scenarios[scenario]?.utility ?? null,
@@ -138,9 +138,7 @@ function Failure({ evaluation }: { evaluation: Evaluation }) {
 }
 
 function scenarioNames(job: Job): readonly string[] {
-  if (job.best) return Object.keys(job.best.scenarios)
-  if (job.spec.kind === 'identification') return []
-  return (job.spec.scenarios ?? []).map((s) => (typeof s === 'string' ? s : s.name))
+  return job.scenarios
 }
 
 function placeOf(job: Job, { iteration, particle }: Evaluation) {

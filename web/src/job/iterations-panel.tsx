@@ -7,7 +7,7 @@ import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { formatMoment } from '../format/time'
 import { jobPath } from '../router/routes'
-import { fitnessUnit } from './header'
+import { fitnessUnit } from './fitness'
 import type { LiveJob } from './use-job'
 
 export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {

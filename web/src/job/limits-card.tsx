@@ -1,6 +1,7 @@
 /** What limits the winner now, in words and numbers; and the winner itself. */
 
 import type { Job, JobSpec, Preference } from '../api/types'
+import { BrokenName } from '../components/broken-name'
 import { Table } from '../components/table'
 import { exactQuantity, formatNumber, percent, quantity } from '../format/number'
 import { inWords } from '../format/words'
@@ -76,7 +77,7 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
           },
         ]}
       />
-      <p class="muted small">
+      <p class="muted small table-note">
         Each number is e ln(b + f), dimensionless; the sums are the logarithms of the utilities.
       </p>
     </div>
@@ -119,7 +120,9 @@ export function BestCard({ job }: { job: Job }) {
       <dl class="design">
         {Object.entries(best.design).map(([name, value]) => (
           <div key={name}>
-            <dt>{name}</dt>
+            <dt>
+              <BrokenName name={name} />
+            </dt>
             <dd>{exactQuantity(value, units.get(name) ?? '1')}</dd>
           </div>
         ))}

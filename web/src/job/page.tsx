@@ -1,5 +1,6 @@
 /** One job, live: header, commands, and its parts under tabs. */
 
+import type { Job } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { jobPath } from '../router/routes'
 import { JobHeader } from './header'
@@ -7,6 +8,7 @@ import { IterationPanel } from './iteration-panel'
 import { IterationsPanel } from './iterations-panel'
 import './job.css'
 import { OverviewPanel } from './overview-panel'
+import { ParametersPanel } from './parameters/parameters-panel'
 import { PreferencesPanel } from './preferences-panel'
 import { ReproducePanel } from './reproduce-panel'
 import { ScenariosPanel } from './scenarios-panel'
@@ -16,11 +18,18 @@ import { VariablesPanel } from './variables-panel'
 const TABS = [
   { tab: '', label: 'Overview' },
   { tab: 'scenarios', label: 'Scenarios' },
+  { tab: 'parameters', label: 'Parameters' },
   { tab: 'variables', label: 'Variables' },
   { tab: 'iterations', label: 'Iterations' },
   { tab: 'preferences', label: 'What if' },
   { tab: 'reproduce', label: 'Spec' },
 ] as const
+
+/** Parts of jobs of one kind only. */
+const ONLY: Readonly<Partial<Record<string, Job['kind']>>> = {
+  parameters: 'identification',
+  preferences: 'tuning',
+}
 
 export default function JobPage({ id, tab }: { id: string; tab: string }) {
   // Another job is another page: nothing of the one before may stay.
@@ -42,7 +51,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       </div>
     )
   }
-  const tabs = TABS.filter((t) => t.tab !== 'preferences' || job.kind === 'tuning')
+  const tabs = TABS.filter(({ tab }) => !(tab in ONLY) || ONLY[tab] === job.kind)
   const [section] = tab.split('/')
   return (
     <div
@@ -77,17 +86,25 @@ function Panel({ live, tab }: { live: LiveJob; tab: string }) {
     case 'scenarios':
       return <ScenariosPanel job={job} />
     case 'variables':
-      return <VariablesPanel live={live} job={job} />
+      return <VariablesPanel job={job} />
     case 'iterations':
       if (detail) return <IterationPanel job={job} index={Number(detail)} />
       return <IterationsPanel live={live} job={job} />
+    case 'parameters':
+      if (job.kind === 'identification') return <ParametersPanel job={job} />
+      return <NoSuchPart />
     case 'preferences':
-      return <PreferencesPanel job={job} />
+      if (job.kind === 'tuning') return <PreferencesPanel job={job} />
+      return <NoSuchPart />
     case 'reproduce':
       return <ReproducePanel job={job} />
     default:
-      return <ErrorNotice what="The job has no such part." error="Choose one of those above." />
+      return <NoSuchPart />
   }
+}
+
+function NoSuchPart() {
+  return <ErrorNotice what="This job has no such part." error="Choose one of those above." />
 }
 
 /** As tests and other tools read it. */

@@ -1,6 +1,8 @@
 /** Biases and exponents of the five objectives to move, and the published preferences. */
 
+import { useState } from 'preact/hooks'
 import type { Preference, PreferencePreset } from '../api/types'
+import { writtenUnit } from '../format/number'
 import { inWords } from '../format/words'
 import { PREFERRED } from './preference'
 
@@ -89,6 +91,8 @@ function Weight({
   value: number
   onChange: (value: number) => void
 }) {
+  // What is being written must outlast the news that a running job brings.
+  const [written, setWritten] = useState<string | null>(null)
   return (
     <div class="weight">
       <span aria-hidden="true">{label}</span>
@@ -105,11 +109,13 @@ function Weight({
         type="number"
         min={0}
         step={0.01}
-        value={Number(value.toPrecision(6))}
+        value={written ?? Number(value.toPrecision(6))}
         aria-label={`${name}, number`}
+        onInput={(event) => setWritten(event.currentTarget.value)}
         onChange={(event) => onChange(event.currentTarget.valueAsNumber)}
+        onBlur={() => setWritten(null)}
       />
-      <span class="unit">{unit === '1' ? '' : unit}</span>
+      <span class="unit">{unit === '1' ? '' : writtenUnit(unit)}</span>
     </div>
   )
 }

@@ -4,16 +4,20 @@ import type { Job, Preference, ScenarioResult } from '../api/types'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { change, formatNumber } from '../format/number'
-import { inWords } from '../format/words'
+import { capitalized, inWords } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
 import { withQuery } from '../router/routes'
-import { fitnessUnit } from './header'
+import { fitnessUnit, trialWords } from './fitness'
+import { ObjectiveNotes } from './objective-notes'
 import { utilityOf } from './preference'
+import { type RecordingSummary, RecordingsCard, trialLabel, useRecordings } from './recordings'
 import { type Reference, ReferencePicker, useReference } from './reference'
 import { UtilityBars } from './utility-bars'
 
 interface Row {
   readonly scenario: string
+  /** What people call it. */
+  readonly label: string
   readonly own: ScenarioResult
   readonly other: ScenarioResult | null
   readonly utility: number | null
@@ -25,21 +29,25 @@ export function ScenariosPanel({ job }: { job: Job }) {
   const byDefault = job.kind === 'tuning' ? 'published:fuzzy-pi:A' : 'none'
   const choice = query.get('against') ?? byDefault
   const reference = useReference(job, choice)
+  const recordings = useRecordings(job)
+  const isFit = job.kind === 'identification'
+  const words = trialWords(job.kind)
   if (!job.best) {
     return (
       <section class="card">
         <Empty title="No winner yet">
           <p>
-            No design has walked in every scenario so far. Its results appear here as soon as one
+            No design has walked in every {words.one} so far. Its results appear here as soon as one
             has.
           </p>
         </Empty>
       </section>
     )
   }
-  const rows = rowsOf(job, reference.data)
+  const rows = rowsOf(job, reference.data, recordings.data)
   return (
     <div class="stack">
+      {isFit && <RecordingsCard recordings={recordings} />}
       <div class="row spread">
         <ReferencePicker job={job} choice={choice} onChoose={(against) => setQuery({ against })} />
         {reference.data && <Summary job={job} rows={rows} label={reference.data.label} />}
@@ -54,43 +62,56 @@ export function ScenariosPanel({ job }: { job: Job }) {
       )}
       <UtilityBars
         unit={fitnessUnit(job)}
-        rows={rows.map((r) => ({ name: r.scenario, own: r.utility, other: r.otherUtility }))}
+        words={words}
+        rows={rows.map((r) => ({ name: r.label, own: r.utility, other: r.otherUtility }))}
         label={reference.data?.label ?? null}
         table={() => <UtilityTable job={job} rows={rows} reference={reference.data} />}
       />
       <section class="card" aria-labelledby="objectives">
         <h2 id="objectives">Objectives of the winner</h2>
         <Table
-          caption="Objectives of the winner by scenario"
+          caption={`Objectives of the winner by ${words.one}`}
           rows={rows}
           rowKey={(row) => row.scenario}
           columns={objectiveColumns(job, reference.data)}
         />
         {reference.data && (
-          <p class="muted small">
+          <p class="muted small table-note">
             In each cell: the winner, then {reference.data.label} and how much the winner is above
             or below it. Less is better everywhere.
           </p>
         )}
+        <ObjectiveNotes job={job} />
       </section>
     </div>
   )
 }
 
-function rowsOf(job: Job, reference: Reference | null): readonly Row[] {
+function rowsOf(
+  job: Job,
+  reference: Reference | null,
+  recordings: readonly RecordingSummary[] | null,
+): readonly Row[] {
   const preference = job.spec.kind === 'identification' ? null : (job.spec.preference as Preference)
   return Object.entries(job.best!.scenarios).map(([scenario, own]) => {
     const other = reference?.scenarios[scenario] ?? null
     // Another job may have another preference: its utilities are not to be compared, its objectives are.
     const otherUtility = other && (preference ? utilityOf(other, preference) : other.utility)
-    return { scenario, own, other, utility: own.utility, otherUtility }
+    const label = trialLabel(scenario, recordings)
+    return { scenario, label, own, other, utility: own.utility, otherUtility }
   })
 }
 
 /** Fitness of both over the scenarios that both have walked in. */
 function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: string }) {
+  const words = trialWords(job.kind)
   const both = rows.filter((row) => row.utility !== null && row.otherUtility !== null)
-  if (both.length === 0) return <p>{label} has no scenario in common with this job.</p>
+  if (both.length === 0)
+    return (
+      <p>
+        {label} has no {words.one} in common with this job.
+      </p>
+    )
   const ratio =
     fitnessOf(
       job,
@@ -103,9 +124,9 @@ function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: 
   const share = Math.abs(ratio - 1) * 100
   return (
     <p data-ratio={ratio}>
-      Over {both.length === rows.length ? 'all' : `the ${both.length} common`} scenarios the winner
-      is <strong>{formatNumber(share, 3)}&nbsp;%</strong> {ratio < 1 ? 'better' : 'worse'} than{' '}
-      {label}.
+      Over {both.length === rows.length ? 'all' : `the ${both.length} common`} {words.many} the
+      winner is <strong>{formatNumber(share, 3)}&nbsp;%</strong> {ratio < 1 ? 'better' : 'worse'}{' '}
+      than {label}.
     </p>
   )
 }
@@ -126,8 +147,14 @@ function UtilityTable({
   reference: Reference | null
 }) {
   const unit = fitnessUnit(job)
+  const words = trialWords(job.kind)
   const columns: Column<Row>[] = [
-    { key: 'scenario', label: 'Scenario', header: true, value: (r) => r.scenario },
+    {
+      key: 'scenario',
+      label: capitalized(words.one),
+      header: true,
+      value: (r) => r.label,
+    },
     {
       key: 'own',
       label: 'Winner',
@@ -148,7 +175,12 @@ function UtilityTable({
     })
   }
   return (
-    <Table caption="Utility by scenario" rows={rows} rowKey={(r) => r.scenario} columns={columns} />
+    <Table
+      caption={`${capitalized(words.worth)} by ${words.one}`}
+      rows={rows}
+      rowKey={(r) => r.scenario}
+      columns={columns}
+    />
   )
 }
 
@@ -159,11 +191,11 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
   return [
     {
       key: 'scenario',
-      label: 'Scenario',
+      label: capitalized(trialWords(job.kind).one),
       header: true,
-      value: (row) => row.scenario,
+      value: (row) => row.label,
       cell: (row) =>
-        job.kind === 'tuning' ? <a href={walk(row.scenario)}>{row.scenario}</a> : row.scenario,
+        job.kind === 'tuning' ? <a href={walk(row.scenario)}>{row.label}</a> : row.label,
     },
     ...job.objectives.map(
       (objective): Column<Row> => ({

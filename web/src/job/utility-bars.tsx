@@ -3,6 +3,8 @@
 import type { ComponentChildren } from 'preact'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { quantity } from '../format/number'
+import { capitalized } from '../format/words'
+import type { TrialWords } from './fitness'
 
 interface Bar {
   readonly name: string
@@ -13,11 +15,13 @@ interface Bar {
 export function UtilityBars({
   rows,
   unit,
+  words,
   label,
   table,
 }: {
   rows: readonly Bar[]
   unit: string
+  words: TrialWords
   /** Name of the reference; null if there is none. */
   label: string | null
   table: () => ComponentChildren
@@ -25,8 +29,8 @@ export function UtilityBars({
   const most = Math.max(...rows.flatMap((row) => [row.own ?? 0, row.other ?? 0]), 1e-12)
   return (
     <ChartFrame
-      title="Utility by scenario"
-      note="What the fitness is the mean of; less is better. The longest bar is the scenario that limits the winner."
+      title={`${capitalized(words.worth)} by ${words.one}`}
+      note={`What the fitness is the mean of; less is better. The longest bar is the ${words.one} that limits the winner.`}
       legend={
         <>
           <LegendEntry colour="--series-1" label="winner" area />

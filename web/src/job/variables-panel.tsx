@@ -12,14 +12,13 @@ import { formatCount } from '../format/number'
 import { BrushFields } from './brush-fields'
 import { columnNamed, decodeParticles, type Particles } from './particles'
 import { SelectedDesigns } from './selected-designs'
-import type { LiveJob } from './use-job'
 
 const NONE: Brushes = new Map()
 /** How often a running job's particles are asked for again [ms]. */
 const RENEW_MS = 8000
 
-export function VariablesPanel({ live, job }: { live: LiveJob; job: Job }) {
-  const wanted = useSlowly(live.followed.iterations.length, RENEW_MS)
+export function VariablesPanel({ job }: { job: Job }) {
+  const wanted = useSlowly(job.iterations, RENEW_MS)
   const particles = useResource(`${job.id} ${wanted}`, (signal) =>
     getBytes('/v1/jobs/{job_id}/particles', { path: { job_id: job.id }, signal }).then(
       decodeParticles,
@@ -80,7 +79,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
                   setBrushes(NONE)
                 }}
               />
-              utilities too
+              {job.kind === 'tuning' ? 'utilities too' : 'errors by recording too'}
             </label>
             <button
               type="button"

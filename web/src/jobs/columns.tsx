@@ -4,8 +4,9 @@ import type { JobSummary } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
 import type { Column } from '../components/table'
-import { formatCount, formatNumber } from '../format/number'
+import { formatCount, formatNumber, quantity } from '../format/number'
 import { formatAge, formatDuration, formatMoment } from '../format/time'
+import { fitnessUnit } from '../job/fitness'
 import { jobPath } from '../router/routes'
 
 /** now: [ms], for ages. */
@@ -35,7 +36,7 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
       label: 'Best fitness',
       numeric: true,
       value: (job) => job.best_fitness,
-      cell: (job) => formatNumber(job.best_fitness, 5),
+      cell: (job) => quantity(job.best_fitness, fitnessUnit(job), 5),
     },
     {
       key: 'rate',

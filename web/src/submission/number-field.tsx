@@ -1,6 +1,7 @@
 /** A labelled number with unit, bounds and the problem that the API has with it. */
 
 import { useId } from 'preact/hooks'
+import { Unit } from '../components/unit'
 import { boundsInWords, describe, type SchemaField } from './schema-fields'
 
 export function NumberField({
@@ -21,7 +22,8 @@ export function NumberField({
   return (
     <div class="field">
       <label for={id}>
-        {label} {field.unit !== '1' && <span class="unit">[{field.unit}]</span>}
+        {label}
+        <Unit unit={field.unit} />
       </label>
       <input
         id={id}

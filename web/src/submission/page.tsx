@@ -45,7 +45,7 @@ export default function NewJobPage() {
       {start.loading && <Loading what="the catalogue" />}
       {start.data &&
         (from?.spec.kind === 'identification' ? (
-          <JsonForm spec={from.spec} />
+          <JsonForm key={String(query)} spec={from.spec} />
         ) : (
           <JobForm
             key={String(query)}
@@ -57,13 +57,17 @@ export default function NewJobPage() {
   )
 }
 
-/** `clone` names a job; `preference` replaces its own; `iteration`, `particle` a design to stay near. */
+/**
+ * `clone` names a job; `seed` and `preference` replace its own; `iteration`, `particle` name a
+ * design to stay near.
+ */
 async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Start> {
   const id = query.get('clone')
-  const [catalogue, from] = await Promise.all([
+  const [catalogue, cloned] = await Promise.all([
     loadCatalogue(signal),
     id === null ? null : get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }),
   ])
+  const from = cloned && withSeed(cloned, query.get('seed'))
   if (!from || from.spec.kind === 'identification') {
     return { catalogue, draft: emptyDraft(catalogue), from }
   }
@@ -73,6 +77,11 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   const design = await designIn(query, from.id, signal)
   if (design) draft = around(draft, design, wholeVariables(catalogue, draft.controller))
   return { catalogue, draft, from }
+}
+
+function withSeed(job: Job, seed: string | null): Job {
+  if (seed === null || !/^\d+$/.test(seed)) return job
+  return { ...job, spec: { ...job.spec, seed: Number(seed) } }
 }
 
 function preferenceIn(query: URLSearchParams): Preference | undefined {

@@ -86,16 +86,16 @@ function GaitTable({ rows, comparing }: { rows: readonly Row[]; comparing: boole
       rows={rows}
       rowKey={(row) => row.key}
       columns={[
-        { key: 'leg', label: 'leg', header: true, value: (row) => row.leg },
-        ...(comparing ? [{ key: 'walk', label: 'walk', value: (row: Row) => row.label }] : []),
+        { key: 'leg', label: 'Leg', header: true, value: (row) => row.leg },
+        ...(comparing ? [{ key: 'walk', label: 'Walk', value: (row: Row) => row.label }] : []),
         {
           key: 'share',
-          label: 'stands for',
+          label: 'Stands for',
           numeric: true,
           value: (row) => row.share,
           cell: (row) => percent(row.share),
         },
-        { key: 'spans', label: 'from, to', cell: (row) => text(row.spans) },
+        { key: 'spans', label: 'From, to', cell: (row) => text(row.spans) },
       ]}
     />
   )

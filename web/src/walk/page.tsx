@@ -5,8 +5,8 @@ import { get } from '../api/client'
 import { useResource } from '../api/resource'
 import type { Scenario } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
-import { setQuery, usePlace } from '../router/navigation'
-import { jobPath, withQuery } from '../router/routes'
+import { setQuery } from '../router/navigation'
+import { DesignLinks, DesignPage } from './design-page'
 import { DesignPicker } from './design-picker'
 import { type DesignSource, queryOf, sourceOf, sourceOfWord, wordOf } from './design-source'
 import { Playback } from './playback'
@@ -27,26 +27,10 @@ interface Address {
 }
 
 export default function WalkPage() {
-  const { query } = usePlace()
-  const [address, wrong] = addressOf(query)
   return (
-    <>
-      <div class="page-header">
-        <h1>Walk</h1>
-      </div>
-      {address ? (
-        <Walk address={address} query={query} />
-      ) : (
-        <>
-          <ErrorNotice what="This address names no walk." error={wrong} />
-          <p class="row">
-            <a class="button" href="/walk">
-              Show the published optimum A
-            </a>
-          </p>
-        </>
-      )}
-    </>
+    <DesignPage title="Walk" what="walk" path="/walk" read={addressOf}>
+      {(address, query) => <Walk address={address} query={query} />}
+    </DesignPage>
   )
 }
 
@@ -90,7 +74,11 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
           onChoose={(chosen) => setQuery({ against: chosen && wordOf(chosen) })}
         />
         <RatePicker rate={rate} />
-        <Links design={first.data} />
+        <DesignLinks
+          source={first.data?.source ?? source}
+          path={first.data && '/controller'}
+          label="Its controller"
+        />
       </div>
       {failed?.error && (
         <ErrorNotice what="This walk cannot be shown." error={failed.error} retry={failed.reload} />
@@ -154,29 +142,7 @@ function RatePicker({ rate }: { rate: number }) {
   )
 }
 
-function Links({ design }: { design: ResolvedDesign | null }) {
-  if (!design) return null
-  const { source } = design
-  const set = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
-  const query = Object.fromEntries(set) as Record<string, string>
-  return (
-    <div class="row">
-      <a class="button" href={withQuery('/controller', query)}>
-        Its controller
-      </a>
-      {'job' in source && (
-        <a class="button" href={jobPath(source.job)}>
-          Its job
-        </a>
-      )}
-    </div>
-  )
-}
-
-function addressOf(query: URLSearchParams): [Address | null, unknown] {
-  try {
-    return [{ source: sourceOf(query), against: sourceOfWord(query.get('against')) }, null]
-  } catch (error) {
-    return [null, error]
-  }
+/** Throws AddressError. */
+function addressOf(query: URLSearchParams): Address {
+  return { source: sourceOf(query), against: sourceOfWord(query.get('against')) }
 }

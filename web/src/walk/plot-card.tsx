@@ -111,7 +111,7 @@ function PlotTable({
   const columns: Column<number>[] = [
     {
       key: 'time',
-      label: 'time',
+      label: 'Time',
       unit: 's',
       numeric: true,
       header: true,

@@ -44,6 +44,7 @@ export interface ReplayHeader {
   readonly status: string
   readonly explanation: string
   readonly objectives: Readonly<Record<string, number | null>>
+  readonly objective_units: Readonly<Record<string, string>>
   readonly scenario: Scenario
   readonly robot: {
     readonly name: string

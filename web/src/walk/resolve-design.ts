@@ -3,7 +3,7 @@
 import { get } from '../api/client'
 import { ApiProblem } from '../api/problem'
 import type { Controller, Evaluation, Job, JobSpec, Scenario } from '../api/types'
-import { type DesignSource, wordOf } from './design-source'
+import type { DesignSource } from './design-source'
 
 /** A design with all that a walk of it needs. */
 export interface ResolvedDesign {
@@ -118,11 +118,13 @@ function published(
     }
   }
   const known = controllers.flatMap((c) =>
-    Object.keys(c.published).map((study) =>
-      wordOf({ kind: 'published', controller: c.name, study }),
-    ),
+    Object.keys(c.published).map((study) => `${study} of ${c.name}`),
   )
-  throw new ApiProblem(404, `no published design ${wordOf(source)}; known are ${known.join(', ')}`)
+  const of = source.controller ? ` of ${source.controller}` : ''
+  throw new ApiProblem(
+    404,
+    `there is no published design ${source.study}${of}; known are ${known.join(', ')}`,
+  )
 }
 
 function named(controllers: readonly Controller[], name: string): Controller {

@@ -1,18 +1,20 @@
 /** How the walks ended and what they are worth. */
 
 import { Table } from '../components/table'
+import { Unit } from '../components/unit'
 import { change, formatNumber, NONE } from '../format/number'
+import { inWords, sentence } from '../format/words'
 import type { Recorded } from './recorded'
 import type { Replay } from './replay'
 
-/** Objectives of a walk as the simulator lists them (thesis table 4.1), all to be minimized. */
-const OBJECTIVES: Readonly<Record<string, { unit: string; meaning: string }>> = {
-  torque: { unit: 'N m', meaning: 'rms of the summed gear torques' },
-  acceleration: { unit: 'm/s²', meaning: "rms of the body's acceleration" },
-  angular_acceleration: { unit: 'rad/s²', meaning: "rms of the body's angular acceleration" },
-  energy: { unit: 'J/m', meaning: 'electrical energy per metre' },
-  reciprocal_speed: { unit: 's/m', meaning: 'one over the mean speed' },
-  height_loss: { unit: 'm', meaning: "body's height at the end less that at the start" },
+/** What the objectives of a walk mean (thesis table 4.1). */
+const MEANINGS: Readonly<Record<string, string>> = {
+  torque: 'rms of the summed gear torques',
+  acceleration: "rms of the body's acceleration",
+  angular_acceleration: "rms of the body's angular acceleration",
+  energy: 'electrical energy per metre',
+  reciprocal_speed: 'one over the mean speed',
+  height_loss: "body's height at the end less that at the start",
 }
 
 /** A notice for every walk that did not get to its end. */
@@ -38,25 +40,28 @@ export function FailureNotices({ walks }: { walks: readonly Recorded[] }) {
 
 interface Row {
   readonly name: string
+  readonly unit: string
   readonly values: readonly (number | null)[]
 }
 
 export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
-  const rows: Row[] = Object.keys(walks[0].replay.header.objectives).map((name) => ({
+  const { objectives, objective_units } = walks[0].replay.header
+  const rows: Row[] = Object.keys(objectives).map((name) => ({
     name,
+    unit: objective_units[name] ?? '1',
     values: walks.map(({ replay }) => replay.header.objectives[name] ?? null),
   }))
   const numbers = walks.map(({ label }, k) => ({
     key: `walk-${k}`,
-    label: walks.length > 1 ? label : 'value',
+    label: walks.length > 1 ? label : 'Value',
     numeric: true,
     cell: (row: Row) => formatNumber(row.values[k]),
   }))
   const compared = {
     key: 'difference',
-    label: 'second against first',
+    label: 'Second against first',
     numeric: true,
-    cell: ({ name, values: [first, second] }: Row) => difference(name, first, second),
+    cell: ({ unit, values: [first, second] }: Row) => difference(unit, first, second),
   }
   return (
     <section class={walks.length > 1 ? 'card wide' : 'card'} data-objectives>
@@ -71,13 +76,13 @@ export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
         columns={[
           {
             key: 'name',
-            label: 'objective',
+            label: 'Objective',
             header: true,
-            cell: ({ name }) => (
+            cell: ({ name, unit }) => (
               <>
-                {name.replaceAll('_', ' ')}{' '}
-                <span class="unit">{OBJECTIVES[name] ? `[${OBJECTIVES[name].unit}]` : ''}</span>
-                <span class="muted small block">{OBJECTIVES[name]?.meaning}</span>
+                {inWords(name)}
+                <Unit unit={unit} />
+                <span class="muted small block">{MEANINGS[name]}</span>
               </>
             ),
           },
@@ -90,11 +95,11 @@ export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
 }
 
 /** In per cent; in the objective's unit where it may be of either sign. */
-function difference(name: string, first: number | null, second: number | null): string {
+function difference(unit: string, first: number | null, second: number | null): string {
   if (first === null || second === null) return NONE
   return first > 0 && second > 0
     ? change(100 * (second / first - 1), '%')
-    : change(second - first, OBJECTIVES[name]?.unit)
+    : change(second - first, unit)
 }
 
 /** How much of a failed walk there is to see. */
@@ -102,8 +107,4 @@ function extentOf({ frames, header }: Replay): string {
   if (frames === 0) return 'There is nothing to show of it.'
   const { cycles, cycle_time } = header.scenario
   return header.duration < cycles * cycle_time - 0.01 ? 'Shown up to there.' : 'Shown in full.'
-}
-
-function sentence(text: string): string {
-  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`
 }

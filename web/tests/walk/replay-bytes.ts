@@ -32,6 +32,7 @@ export function header(count: number, changes: Partial<ReplayHeader> = {}): Repl
     status: 'ok',
     explanation: 'walked to the end',
     objectives: { torque: 8.7 },
+    objective_units: { torque: 'N m' },
     scenario: { name: 'normal-fast' } as ReplayHeader['scenario'],
     robot: {
       name: 'box',

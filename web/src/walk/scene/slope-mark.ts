@@ -22,6 +22,8 @@ export class SlopeMark {
   /** Stands on the level, so it belongs to the scene, not to the tilted ground. */
   readonly object = new Group()
   private readonly material = new LineBasicMaterial({ depthTest: false })
+  /** Where the angle is, from what is looked at [m]. */
+  private readonly corner = new Vector3()
   private readonly label = new Sprite(
     new SpriteMaterial({ depthTest: false, transparent: false, alphaTest: 0.4 }),
   )
@@ -30,8 +32,6 @@ export class SlopeMark {
     private readonly degrees: number,
     /** Up the ground, a unit vector of the scene. */
     uphill: Vector3,
-    /** Where the angle is, from what is looked at [m]. */
-    private readonly corner: Vector3,
   ) {
     const level = uphill.clone().setZ(0).normalize()
     const angle = (Math.abs(degrees) * Math.PI) / 180
@@ -46,6 +46,11 @@ export class SlopeMark {
     this.object.add(this.label)
     // The level lies under the ground: over it, but behind robots.
     for (const part of this.object.children) part.renderOrder = -1
+  }
+
+  /** Put the angle there, from what is looked at [m]. */
+  placeAt(corner: Vector3): void {
+    this.corner.copy(corner)
   }
 
   /** Stay beside what is looked at. */

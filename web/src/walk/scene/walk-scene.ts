@@ -37,7 +37,7 @@ const MIDDLE = 0.09
 
 /** Half the height that the camera shows of one robot, and of two side by side [m]. */
 const REACH = 0.3
-const REACH_BESIDE = 0.46
+const REACH_BESIDE = 0.54
 
 const LIGHT = new Vector3(0.7, -1.1, 2.2)
 const DOWN = new Vector3(0, 0, -1)
@@ -82,7 +82,7 @@ export class WalkScene {
       this.renderer.shadowMap.enabled,
     )
     this.world.add(this.ground.object, ...this.lanes.map((lane) => lane.group))
-    this.slope = slopeMark(ground, tilt, replays.length > 1 ? BESIDE / 2 : 0)
+    this.slope = slopeMark(ground, tilt)
     this.scene.add(this.world, this.sky, this.sun, this.sun.target)
     if (this.slope) this.scene.add(this.slope.object)
     this.prepareShadows()
@@ -131,6 +131,10 @@ export class WalkScene {
       feet.setForces(options.forces && (beside || k === 0))
       trail.object.visible = options.trail
     })
+    const { ground } = this.lanes[0].replay.header
+    const room = beside ? BESIDE / 2 : 0
+    this.slope?.placeAt(slopeCorner(ground, this.world.quaternion, room))
+    this.slope?.moveTo(this.centre)
     this.rig.follow = options.follow
     const reach = beside ? REACH_BESIDE : REACH
     if (reach === this.rig.reach) return
@@ -213,20 +217,25 @@ function laneOf(replay: Replay, metresPerNewton: number, discs: number): Lane {
   return { replay, group, figure, feet, trail }
 }
 
-/** None on level ground. tilt: from the ground's world to the scene; room: for robots [m]. */
-function slopeMark(
-  ground: Replay['header']['ground'],
-  tilt: Quaternion,
-  room: number,
-): SlopeMark | null {
+/** None on level ground. tilt: from the ground's world to the scene. */
+function slopeMark(ground: Replay['header']['ground'], tilt: Quaternion): SlopeMark | null {
   if (ground.slope_deg === 0) return null
-  const direction = (ground.slope_direction_deg * Math.PI) / 180
-  const rises = new Vector3(Math.cos(direction), Math.sin(direction), 0)
-  if (ground.slope_deg < 0) rises.negate()
-  const beside = new Vector3(-rises.y, rises.x, 0).multiplyScalar(0.34 + room)
-  const corner = beside
-    .addScaledVector(rises, room > 0 ? 0.08 : -0.1)
+  return new SlopeMark(ground.slope_deg, uphill(ground).applyQuaternion(tilt))
+}
+
+/** Where the mark stands clear of the robots, from what is looked at. room: for robots [m]. */
+function slopeCorner(ground: Replay['header']['ground'], tilt: Quaternion, room: number): Vector3 {
+  const rises = uphill(ground)
+  return new Vector3(-rises.y, rises.x, 0)
+    .multiplyScalar(0.34 + room)
+    .addScaledVector(rises, -0.1)
     .setZ(0.003 - MIDDLE)
     .applyQuaternion(tilt)
-  return new SlopeMark(ground.slope_deg, rises.applyQuaternion(tilt), corner)
+}
+
+/** Up the ground, in the ground's world. */
+function uphill({ slope_deg, slope_direction_deg }: Replay['header']['ground']): Vector3 {
+  const direction = (slope_direction_deg * Math.PI) / 180
+  const rises = new Vector3(Math.cos(direction), Math.sin(direction), 0)
+  return slope_deg < 0 ? rises.negate() : rises
 }

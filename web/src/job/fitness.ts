@@ -1,0 +1,33 @@
+/** What a job's fitness is, by the kind of job. */
+
+import type { Job } from '../api/types'
+
+/**
+ * Unit of a job's fitness: the product that tunes a drive has none, an identification's is a mean
+ * of its objectives, which are currents.
+ */
+export function fitnessUnit({
+  kind,
+  objectives,
+}: {
+  readonly kind: Job['kind']
+  /** Summaries are without them. */
+  readonly objectives?: Job['objectives']
+}): string {
+  return kind === 'tuning' ? '1' : (objectives?.[0]?.unit ?? 'A')
+}
+
+/** What the parts of a fitness are called. */
+export interface TrialWords {
+  /** One walk of which several are judged, and several. */
+  readonly one: string
+  readonly many: string
+  /** What a walk is worth. */
+  readonly worth: string
+}
+
+export function trialWords(kind: Job['kind']): TrialWords {
+  return kind === 'tuning'
+    ? { one: 'scenario', many: 'scenarios', worth: 'utility' }
+    : { one: 'recording', many: 'recordings', worth: 'error' }
+}

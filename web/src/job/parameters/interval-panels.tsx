@@ -1,0 +1,146 @@
+/** Small charts of the intervals, one for each parameter (fig. 2.14). */
+
+import type { Convergence, FittedParameter } from '../../api/types'
+import { BrokenName } from '../../components/broken-name'
+import { ChartFrame } from '../../components/chart-frame'
+import { type Column, Table } from '../../components/table'
+import { Unit } from '../../components/unit'
+import { exactQuantity, formatExact, formatNumber, percent, quantity } from '../../format/number'
+import { DECISIVE, outline, placeOf, shareOf } from './intervals'
+import { TrustBadge } from './verdicts'
+
+/** Of a chart's own coordinates, which are stretched to its box. */
+const WIDTH = 100
+const HEIGHT = 60
+
+export function IntervalPanels({
+  found,
+  shown,
+  labels,
+}: {
+  found: Convergence
+  shown: readonly FittedParameter[]
+  labels: readonly string[]
+}) {
+  const { thresholds } = found
+  const [least, most] = [Math.min(...thresholds), Math.max(...thresholds)]
+  const runs = labels.length > 1 ? `${labels.length} runs` : 'the run'
+  return (
+    <ChartFrame
+      title="Intervals against the threshold"
+      note={
+        `Values among the designs of ${runs} whose fitness lies within a threshold of their run’s` +
+        ` best. Across: the threshold from ${percent(least, 1)} to ${percent(most, 1)}, logarithmic;` +
+        ' upwards: the whole range that was searched.'
+      }
+      legend={
+        <>
+          <span>
+            <i class="swatch interval-area" aria-hidden="true" />
+            interval
+          </span>
+          <span>
+            <i class="interval-best" aria-hidden="true" />
+            best of all
+          </span>
+          {labels.length > 1 && (
+            <span>
+              <i class="interval-run" aria-hidden="true" />
+              best of each run
+            </span>
+          )}
+          <span>dotted: {percent(DECISIVE, 1)}, where it is judged</span>
+        </>
+      }
+      table={() => <IntervalTable found={found} shown={shown} />}
+    >
+      <div class="intervals">
+        {shown.map((parameter) => (
+          <Panel key={parameter.name} found={found} parameter={parameter} />
+        ))}
+      </div>
+    </ChartFrame>
+  )
+}
+
+function Panel({ found, parameter }: { found: Convergence; parameter: FittedParameter }) {
+  const { name, unit, low, high, best, bests, trust } = parameter
+  const { thresholds } = found
+  const decisive = parameter.intervals[thresholds.indexOf(DECISIVE)]
+  const middle = placeOf(DECISIVE, thresholds) * WIDTH
+  const y = (value: number) => (1 - shareOf(value, parameter)) * HEIGHT
+  const text = decisive && `${formatNumber(decisive.low, 3)} – ${formatNumber(decisive.high, 3)}`
+  return (
+    <figure class="interval" data-trust={trust ?? 'none'}>
+      <figcaption>
+        <strong>
+          <BrokenName name={name} />
+        </strong>
+        {trust && <TrustBadge trust={trust} />}
+      </figcaption>
+      <div class="interval-plot">
+        <span class="interval-bound">{formatExact(high, 3)}</span>
+        <svg
+          viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
+          preserveAspectRatio="none"
+          role="img"
+          aria-label={`${name}: best ${quantity(best, unit)}, at 5 % ${text ?? 'unknown'}`}
+        >
+          <path class="area" d={outline(found, parameter, WIDTH, HEIGHT)} />
+          <line class="decisive" x1={middle} x2={middle} y1={0} y2={HEIGHT} />
+          {bests.length > 1 &&
+            bests.map((value, run) => (
+              <line key={run} class="run" x1={0} x2={6} y1={y(value)} y2={y(value)} />
+            ))}
+          <line class="best" x1={0} x2={WIDTH} y1={y(best)} y2={y(best)} />
+        </svg>
+        <span class="interval-bound">{formatExact(low, 3)}</span>
+      </div>
+      <p class="muted small">
+        {exactQuantity(best, unit, 4)}
+        {text && <> (5&nbsp;%: {text})</>}
+      </p>
+    </figure>
+  )
+}
+
+function IntervalTable({
+  found,
+  shown,
+}: {
+  found: Convergence
+  shown: readonly FittedParameter[]
+}) {
+  const columns: Column<FittedParameter>[] = [
+    {
+      key: 'name',
+      label: 'Parameter',
+      header: true,
+      value: (p) => p.name,
+      cell: (p) => (
+        <>
+          <BrokenName name={p.name} />
+          <Unit unit={p.unit} />
+        </>
+      ),
+    },
+    ...found.thresholds.map(
+      (threshold, k): Column<FittedParameter> => ({
+        key: String(threshold),
+        label: `within ${formatExact(threshold * 100)} %`,
+        numeric: true,
+        cell: ({ intervals }) =>
+          `${formatNumber(intervals[k].low, 3)} – ${formatNumber(intervals[k].high, 3)}`,
+      }),
+    ),
+  ]
+  return (
+    <Table
+      caption="Intervals by threshold"
+      rows={shown}
+      rowKey={({ name }) => name}
+      columns={columns}
+      pageSize={60}
+    />
+  )
+}

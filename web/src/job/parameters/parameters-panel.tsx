@@ -1,0 +1,127 @@
+/** Which fitted parameters can be trusted: how far runs of the same problem agree (fig. 2.14). */
+
+import { useState } from 'preact/hooks'
+import { get } from '../../api/client'
+import { ApiProblem } from '../../api/problem'
+import { usePolling, useResource } from '../../api/resource'
+import type { Convergence, FittedParameter, Job } from '../../api/types'
+import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { matching } from '../../components/rows'
+import { setQuery, usePlace } from '../../router/navigation'
+import { IntervalPanels } from './interval-panels'
+import type { Trust } from './intervals'
+import './parameters.css'
+import { ParametersTable } from './parameters-table'
+import { RunPicker } from './run-picker'
+import { labelsOf, runsOf, wordOfRuns } from './runs'
+import { Verdicts } from './verdicts'
+
+/** How often the parameters of a job that runs are asked for again [ms]. */
+const RENEW_MS = 15_000
+
+export function ParametersPanel({ job }: { job: Job }) {
+  const { query } = usePlace()
+  if (!job.best) {
+    return (
+      <section class="card">
+        <Empty title="No parameters yet">
+          <p>
+            No set of parameters has walked through every recording so far. The first one that does
+            appears here.
+          </p>
+        </Empty>
+      </section>
+    )
+  }
+  return <Fitted job={job} also={runsOf(query, job.id)} />
+}
+
+function Fitted({ job, also }: { job: Job; also: readonly string[] }) {
+  const key = [job.id, ...also].join()
+  const found = useResource(key, (signal) =>
+    get('/v1/jobs/{job_id}/parameters', {
+      path: { job_id: job.id },
+      query: { also: [...also] },
+      signal,
+    }),
+  )
+  const runs = useResource(key, (signal) =>
+    Promise.all(also.map((id) => get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }))),
+  )
+  const isMoving = job.state === 'running' || job.state === 'pausing'
+  usePolling(found.reload, RENEW_MS, isMoving)
+  const choose = (ids: readonly string[]) => setQuery({ also: wordOfRuns(ids) })
+  const compared = [job, ...(runs.data ?? [])]
+  return (
+    <div class="stack">
+      <RunPicker job={job} runs={compared} also={also} onChoose={choose} />
+      {found.error && (
+        <>
+          <ErrorNotice
+            what="These runs cannot be compared."
+            error={found.error}
+            retry={isMissing(found.error) ? undefined : found.reload}
+          />
+          {also.length > 0 && (
+            <p class="row">
+              <button type="button" onClick={() => choose([])}>
+                Leave the other runs out
+              </button>
+              <span class="muted">
+                Or take out of the list above what does not belong here or has no parameters yet.
+              </span>
+            </p>
+          )}
+        </>
+      )}
+      {!found.data && found.loading && <Loading what="all designs of these runs" />}
+      {found.data && <Parameters found={found.data} labels={labelsOf(found.data.jobs, compared)} />}
+    </div>
+  )
+}
+
+/** A job that is not there will not come. */
+function isMissing(error: Error): boolean {
+  return error instanceof ApiProblem && error.status === 404
+}
+
+function Parameters({ found, labels }: { found: Convergence; labels: readonly string[] }) {
+  const [text, setText] = useState('')
+  const [trust, setTrust] = useState<Trust | null>(null)
+  const judged = found.jobs.length > 1
+  const wanted = found.parameters.filter((p) => !judged || trust === null || p.trust === trust)
+  const shown: readonly FittedParameter[] = matching(wanted, text, ({ name }) =>
+    name.replaceAll('_', ' '),
+  )
+  return (
+    <>
+      <Verdicts
+        found={found}
+        chosen={judged ? trust : null}
+        onChoose={setTrust}
+        text={text}
+        onText={setText}
+      />
+      {shown.length === 0 ? (
+        <section class="card">
+          <Empty title="No parameter fits the filter">
+            <button
+              type="button"
+              onClick={() => {
+                setText('')
+                setTrust(null)
+              }}
+            >
+              Show all parameters
+            </button>
+          </Empty>
+        </section>
+      ) : (
+        <div class="fitted">
+          <ParametersTable found={found} shown={shown} labels={labels} />
+          <IntervalPanels found={found} shown={shown} labels={labels} />
+        </div>
+      )}
+    </>
+  )
+}

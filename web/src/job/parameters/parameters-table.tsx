@@ -1,0 +1,115 @@
+/** The fitted parameters as a table: values, widths of their intervals, verdicts. */
+
+import type { Convergence, FittedParameter } from '../../api/types'
+import { BrokenName } from '../../components/broken-name'
+import { type Column, Table } from '../../components/table'
+import { formatExact, formatNumber, percent, writtenUnit } from '../../format/number'
+import { LISTED, rankOf, widthAt } from './intervals'
+import { TrustBadge } from './verdicts'
+
+export function ParametersTable({
+  found,
+  shown,
+  labels,
+}: {
+  found: Convergence
+  shown: readonly FittedParameter[]
+  /** Of the runs. */
+  labels: readonly string[]
+}) {
+  return (
+    <section class="card" aria-labelledby="fitted">
+      <header>
+        <h2 id="fitted">Parameters</h2>
+        <p class="muted small">
+          Widths are shares of the range that was searched, among all designs whose fitness lies
+          within 20, 10, 5 and 2&nbsp;% of their run’s best. The verdict is about agreement at
+          5&nbsp;%, not about truth.
+        </p>
+      </header>
+      <Table
+        caption="Fitted parameters"
+        rows={shown}
+        rowKey={({ name }) => name}
+        columns={columns(found, labels)}
+        rowData={({ name, trust }) => ({ 'data-parameter': name, 'data-verdict': trust ?? 'none' })}
+        pageSize={60}
+      />
+    </section>
+  )
+}
+
+function columns(
+  found: Convergence,
+  labels: readonly string[],
+): readonly Column<FittedParameter>[] {
+  const several = labels.length > 1
+  return [
+    {
+      key: 'name',
+      label: 'Parameter',
+      header: true,
+      value: (p) => p.name,
+      cell: (p) => (
+        <span class="parameter-name">
+          <BrokenName name={p.name} />
+        </span>
+      ),
+    },
+    {
+      key: 'unit',
+      label: 'Unit',
+      minor: true,
+      value: (p) => (p.unit === '1' ? '' : p.unit),
+      cell: (p) => <span class="nowrap">{p.unit === '1' ? '' : writtenUnit(p.unit)}</span>,
+    },
+    ...(several
+      ? [
+          {
+            key: 'verdict',
+            label: 'Verdict',
+            value: rankOf,
+            cell: (p: FittedParameter) =>
+              p.trust && (
+                <span title={p.explanation ?? undefined}>
+                  <TrustBadge trust={p.trust} />
+                </span>
+              ),
+          },
+        ]
+      : []),
+    {
+      key: 'best',
+      label: 'Best',
+      numeric: true,
+      value: (p) => p.best,
+      cell: (p) => <strong>{formatNumber(p.best)}</strong>,
+    },
+    ...LISTED.map(
+      (threshold): Column<FittedParameter> => ({
+        key: `width ${threshold}`,
+        label: `Width ${threshold * 100} %`,
+        numeric: true,
+        value: (p) => widthAt(found, p, threshold),
+        cell: (p) => percent(widthAt(found, p, threshold), 2),
+      }),
+    ),
+    ...(several
+      ? labels.map(
+          (label, run): Column<FittedParameter> => ({
+            key: `run ${run}`,
+            label: label,
+            numeric: true,
+            value: (p) => p.bests[run],
+            cell: (p) => formatNumber(p.bests[run]),
+          }),
+        )
+      : []),
+    {
+      key: 'range',
+      label: 'Searched',
+      numeric: true,
+      cell: (p) => `${formatExact(p.low, 3)} – ${formatExact(p.high, 3)}`,
+    },
+  ]
+}

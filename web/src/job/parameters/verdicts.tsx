@@ -1,0 +1,112 @@
+/** What the runs say of the parameters as a whole, and which of them are to be shown. */
+
+import type { ComponentChildren } from 'preact'
+import type { Convergence } from '../../api/types'
+import { formatCount } from '../../format/number'
+import { type Trust, verdicts } from './intervals'
+
+export const TONES: Readonly<Record<Trust, 'good' | 'warn' | 'muted'>> = {
+  trusted: 'good',
+  rough: 'warn',
+  unknown: 'muted',
+}
+
+export function TrustBadge({ trust }: { trust: Trust }) {
+  return (
+    <span class="badge" data-tone={TONES[trust]} data-trust={trust}>
+      {trust}
+    </span>
+  )
+}
+
+export function Verdicts({
+  found,
+  chosen,
+  onChoose,
+  text,
+  onText,
+}: {
+  found: Convergence
+  /** The verdict that is shown alone; null for all. */
+  chosen: Trust | null
+  onChoose: (trust: Trust | null) => void
+  /** Words that the names shown must have. */
+  text: string
+  onText: (text: string) => void
+}) {
+  const count = found.parameters.length
+  return (
+    <section class="card stack verdict-card" aria-labelledby="verdicts">
+      <h2 id="verdicts">Which parameters can be trusted</h2>
+      {found.jobs.length === 1 ? (
+        <OneRun />
+      ) : (
+        <dl class="verdicts">
+          {verdicts(found)
+            .filter((verdict) => verdict.count > 0)
+            .map(({ trust, count, explanation }) => (
+              <div key={trust} data-verdict={trust} data-count={count}>
+                <dt>
+                  <TrustBadge trust={trust} /> <strong>{formatCount(count)}</strong>
+                </dt>
+                <dd>{explanation}</dd>
+              </div>
+            ))}
+        </dl>
+      )}
+      <search class="row">
+        <label>
+          <span class="visually-hidden">Find a parameter</span>
+          <input
+            type="search"
+            placeholder="Find a parameter"
+            value={text}
+            onInput={(event) => onText(event.currentTarget.value)}
+          />
+        </label>
+        {found.jobs.length > 1 && (
+          <fieldset class="segmented" aria-label="Verdict">
+            <Choice on={chosen === null} onClick={() => onChoose(null)}>
+              all {formatCount(count)}
+            </Choice>
+            {verdicts(found).map(({ trust, count }) => (
+              <Choice key={trust} on={chosen === trust} onClick={() => onChoose(trust)}>
+                {trust} {formatCount(count)}
+              </Choice>
+            ))}
+          </fieldset>
+        )}
+      </search>
+    </section>
+  )
+}
+
+function Choice({
+  on,
+  onClick,
+  children,
+}: {
+  on: boolean
+  onClick: () => void
+  children: ComponentChildren
+}) {
+  return (
+    <button type="button" class="compact" aria-pressed={on} onClick={onClick}>
+      {children}
+    </button>
+  )
+}
+
+function OneRun() {
+  return (
+    <div class="notice" data-tone="warn" data-single-run>
+      <strong>One run cannot tell.</strong>
+      <p>
+        A swarm gathers at some value of every parameter, whether or not the recorded walks depend
+        on it, so one run always narrows down. Only runs that differ in their seed and still find
+        the same value show that it can be trusted: choose some above, or run this job with another
+        seed.
+      </p>
+    </div>
+  )
+}

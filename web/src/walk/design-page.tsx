@@ -1,0 +1,84 @@
+/** What the pages of walks and of controllers share: a design that the address names. */
+
+import type { ComponentChildren } from 'preact'
+import { ErrorNotice } from '../components/feedback'
+import { usePlace } from '../router/navigation'
+import { jobPath, withQuery } from '../router/routes'
+import { type DesignSource, queryOf } from './design-source'
+
+/** A page about what its address names, or about what is wrong with the address. */
+export function DesignPage<A>({
+  title,
+  what,
+  path,
+  read,
+  children,
+}: {
+  title: string
+  /** As in "this address names no walk". */
+  what: string
+  /** Of the page, which without a query shows the published optimum. */
+  path: string
+  /** Throws AddressError. */
+  read: (query: URLSearchParams) => A
+  children: (address: A, query: URLSearchParams) => ComponentChildren
+}) {
+  const { query } = usePlace()
+  const [address, wrong] = attempt(() => read(query))
+  return (
+    <>
+      <div class="page-header">
+        <h1>{title}</h1>
+      </div>
+      {address !== null ? (
+        children(address, query)
+      ) : (
+        <>
+          <ErrorNotice what={`This address names no ${what}.`} error={wrong} />
+          <p class="row">
+            <a class="button" href={path}>
+              Show the published optimum A
+            </a>
+          </p>
+        </>
+      )}
+    </>
+  )
+}
+
+/** The ways to the same design's other page, and to its job. */
+export function DesignLinks({
+  source,
+  path,
+  label,
+}: {
+  source: DesignSource
+  /** The other page, and what its link says; null if the design has none. */
+  path: string | null
+  label: string
+}) {
+  const set = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
+  const query = Object.fromEntries(set) as Record<string, string>
+  return (
+    <div class="row">
+      {path !== null && (
+        <a class="button" href={withQuery(path, query)}>
+          {label}
+        </a>
+      )}
+      {'job' in source && (
+        <a class="button" href={jobPath(source.job)}>
+          Its job
+        </a>
+      )}
+    </div>
+  )
+}
+
+function attempt<A>(read: () => A): [A | null, unknown] {
+  try {
+    return [read(), null]
+  } catch (error) {
+    return [null, error]
+  }
+}

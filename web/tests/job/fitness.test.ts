@@ -1,0 +1,18 @@
+import { expect, test } from 'vitest'
+import { fitnessUnit, trialWords } from '../../src/job/fitness'
+
+const currents = [{ name: 'current_link_1', unit: 'mA', description: 'error' }]
+
+test('the fitness of a tuning has no unit, that of an identification the unit of its objectives', () => {
+  expect(fitnessUnit({ kind: 'tuning', objectives: currents })).toBe('1')
+  expect(fitnessUnit({ kind: 'identification', objectives: currents })).toBe('mA')
+})
+
+test('summaries, which have no objectives, have currents in ampere', () => {
+  expect(fitnessUnit({ kind: 'identification' })).toBe('A')
+})
+
+test('what is judged is called by its name', () => {
+  expect(trialWords('tuning').many).toBe('scenarios')
+  expect(trialWords('identification').worth).toBe('error')
+})

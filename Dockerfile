@@ -1,6 +1,6 @@
 # One image for every service: API, optimizer, Ray head and Ray workers.
 
-FROM python:3.13-slim-bookworm AS build
+FROM python:3.13-slim-bookworm AS code
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
 RUN python -m venv /opt/gaitswarm
 ENV PATH=/opt/gaitswarm/bin:$PATH
@@ -12,6 +12,18 @@ COPY sim /src/sim
 COPY services /src/services
 COPY api /src/api
 COPY cli /src/cli
+RUN cd /src && python -m api.document > /openapi.json
+
+FROM node:24-bookworm-slim AS page
+# The packages first, as above.
+COPY web/package.json web/package-lock.json web/.npmrc /src/web/
+RUN cd /src/web && npm ci
+COPY web /src/web
+COPY --from=code /openapi.json /src/web/openapi.json
+RUN cd /src/web && npm run types && npm run build
+
+FROM code AS build
+COPY --from=page /src/api/page /src/api/page
 RUN pip install --no-deps --no-build-isolation /src
 
 FROM python:3.13-slim-bookworm

@@ -13,22 +13,27 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve bench test unit lint format lock clean setup setup-dev
+.PHONY: help demo serve page bench test unit lint format pictures lock clean setup setup-dev page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 
-demo: setup ## Optimize the chapter-4 job (25 x 25, six scenarios) and compare it with the thesis.
+demo: setup page-if-possible ## Optimize the chapter-4 job (25 x 25, six scenarios) and compare it with the thesis.
 	@$(BIN)/gaitswarm optimize --name "chapter 4, preference A" --particles 25 --iterations 25 \
 	    --preference A --seed 1 --compare-published $(DB_OPTION) $(ARGS)
 
-serve: setup ## Serve the REST API on 127.0.0.1:8000, with a runner (http://127.0.0.1:8000/docs).
+serve: setup page-if-possible ## Serve page and REST API on http://127.0.0.1:8000, with a runner.
 	@$(BIN)/gaitswarm serve $(DB_OPTION) $(ARGS)
+
+page: setup ## Build the page that is served (with node and npm, or those of a wheel).
+	@scripts/page.sh
 
 bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)
 
-test: setup-dev ## Run all tests.
+test: setup-dev ## Run all tests; those of the page need node with npm, and Chromium.
+	@scripts/npm.sh --if-possible test
+	@scripts/page.sh --if-possible
 	@$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
 
 unit: setup-dev ## Run the fast tests only.
@@ -40,19 +45,27 @@ lint: setup-dev ## Check style, types, imports between packages and declared dep
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 	@$(BIN)/deptry .
+	@scripts/npm.sh --if-possible run check
+	@scripts/npm.sh --if-possible run lint
 
 format: setup-dev ## Format the code and fix what can be fixed.
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
+	@scripts/npm.sh --if-possible run format
+
+pictures: setup-dev ## Draw the pictures of the page in docs/images anew.
+	@scripts/page.sh
+	@GAITSWARM_REQUIRE_PAGE=1 GAITSWARM_SCREENSHOTS=docs/images $(BIN)/python -m pytest -q tests/web/test_pictures.py $(ARGS)
 
 lock: ## Choose versions anew, after a change of the dependencies in pyproject.toml (needs uv).
 	$(COMPILE) pyproject.toml --extra postgres --group build -o requirements/run.lock
 	$(COMPILE) pyproject.toml --extra postgres --group dev -c requirements/run.lock -o requirements/dev.lock
 	$(COMPILE) pyproject.toml --extra postgres --extra cluster --group build -c requirements/run.lock -o requirements/image.lock
 	sed -n 's/^compiler = \["\(.*\)"\]/\1/p' pyproject.toml | $(COMPILE) - -o requirements/compiler.lock
+	$(COMPILE) --group node -o requirements/node.lock
 
 clean: ## Remove the virtual environment and caches; jobs in the user's database stay.
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis .benchmarks build dist
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis .benchmarks build dist api/page web/node_modules web/openapi.json web/src/api/schema.d.ts
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 setup:
@@ -60,3 +73,6 @@ setup:
 
 setup-dev:
 	@scripts/setup.sh dev
+
+page-if-possible: setup
+	@scripts/page.sh --if-possible

@@ -1,0 +1,97 @@
+"""A real browser before a real server: processes, contexts, and what every visit must keep to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from api.page_folder import is_built
+from tests.web.chromium import ARGUMENTS, find_chromium
+from tests.web.server import ServerProcess
+from tests.web.visit import Visit
+
+# Read here: the tests themselves see none of the user's settings.
+REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_PAGE"))
+SCREENSHOTS = os.environ.get("GAITSWARM_SCREENSHOTS", "")
+
+SHORT_WALK = {"name": "short", "cycle_time": 1.0, "radius": 0.16, "withers": 0.15, "cycles": 1}
+
+SMALL_JOB: dict[str, Any] = {
+    "name": "small",
+    "scenarios": [SHORT_WALK, {**SHORT_WALK, "name": "loaded", "load": 5.0}],
+    "optimizer": {"particles": 8},
+    "iterations": 6,
+    "seed": 5,
+}
+"""Walked to its end within seconds."""
+
+
+@pytest.fixture(scope="session")
+def _chromium() -> str:
+    """Path of the browser; skips all tests of the page where browser or page are missing."""
+    found = find_chromium()
+    missing = []
+    if found is None:
+        missing.append("Chromium is not installed (Debian: apt install chromium)")
+    if not is_built():
+        missing.append("the page is not built (make page)")
+    if missing and REQUIRED:
+        pytest.fail("the tests of the page must run here, but " + " and ".join(missing))
+    if missing:
+        pytest.skip("THE PAGE IS NOT TESTED: " + " and ".join(missing))
+    return str(found)
+
+
+@pytest.fixture(scope="module")
+def browser(_chromium: str) -> Iterator[Browser]:
+    """Of a module: its event loop must not outlast it, other tests run loops of their own."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=_chromium, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory, _chromium: str) -> Iterator[ServerProcess]:
+    """`gaitswarm serve` with a runner, on a database of its own."""
+    server = ServerProcess(tmp_path_factory.mktemp("server") / "jobs.db")
+    yield server
+    server.close()
+
+
+@pytest.fixture(scope="session")
+def finished_job(server: ServerProcess) -> str:
+    """A job that the server has walked to its end."""
+    job_id = server.submit(SMALL_JOB)
+    server.wait_for(job_id, "succeeded")
+    return job_id
+
+
+@pytest.fixture
+def start_server(tmp_path: Path) -> Iterator[Callable[..., ServerProcess]]:
+    """For a server of one test's own; to be asked for before `visit`, which ends first then."""
+    with ExitStack() as stack:
+
+        def start(*options: str) -> ServerProcess:
+            server = ServerProcess(tmp_path / "jobs.db", *options)
+            stack.callback(server.close)
+            return server
+
+        yield start
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
+    """Open the page of a server; at the end nothing may have gone wrong in the browser."""
+    with ExitStack() as stack:
+
+        def start(url: str, **options: Any) -> Visit:
+            return stack.enter_context(Visit(browser, url, **options))
+
+        yield start

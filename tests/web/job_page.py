@@ -1,0 +1,26 @@
+"""What the page of a job tells tests by its data- attributes."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Locator, Page, expect
+
+_REACHED = "wanted => Number(document.querySelector('[data-stream]')?.dataset.iteration) >= wanted"
+
+
+def job_element(page: Page) -> Locator:
+    return page.locator("[data-stream]")
+
+
+def shown_iteration(page: Page) -> int:
+    """Index of the last iteration that is shown; -1 before the first."""
+    text = job_element(page).get_attribute("data-iteration")
+    return int(text) if text else -1
+
+
+def wait_for_iteration(page: Page, index: int) -> None:
+    """Until this iteration is shown, or a later one."""
+    page.wait_for_function(_REACHED, arg=index)
+
+
+def expect_state(page: Page, state: str) -> None:
+    expect(page.get_by_role("status").get_by_text(state, exact=True)).to_be_visible()

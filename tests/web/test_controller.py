@@ -1,0 +1,57 @@
+"""One controller: its surface, drawn and in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from tests.web.pixels import colours, pixels
+from tests.web.server import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_surface_is_drawn_and_its_numbers_are_the_apis(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    controllers = server.client.get("/v1/controllers").json()["items"]
+    design = next(c["published"]["A"] for c in controllers if c["name"] == "fuzzy-pi")
+    grid = {"error_points": 65, "current_points": 33}
+    surface = server.client.post(
+        "/v1/controllers/fuzzy-pi/surface", json=grid | {"design": design}
+    ).json()
+    inference = np.array(surface["outputs"][0]["inference"])
+    page = visit(server.url).go("/controller?published=A")
+
+    drawn = page.locator("[data-surface]")
+    expect(drawn.locator("canvas")).to_be_visible()
+    expect(drawn).to_have_attribute("data-cells", str(inference.size))
+    for name, value in (("min", inference.min()), ("max", inference.max())):
+        assert float(drawn.get_attribute(f"data-{name}") or "nan") == pytest.approx(value)
+    # The scene's chunk may draw a moment after its canvas is there.
+    page.wait_for_load_state("networkidle")
+    assert colours(pixels(drawn.locator("canvas"))) > 200
+
+    heat = page.locator('canvas[data-layer="inference"]')
+    assert colours(pixels(heat)) > 50
+    box = page.get_by_role("application", name="Inference over error and current")
+    before = heat.get_attribute("data-value")
+    box.hover(position={"x": 80, "y": 60})
+    expect(heat).not_to_have_attribute("data-value", before or "")
+    under_pointer = float(heat.get_attribute("data-value") or "nan")
+    assert np.isclose(inference, under_pointer).any()
+    box.focus()
+    page.keyboard.press("ArrowRight")
+    assert float(heat.get_attribute("data-value") or "nan") != under_pointer
+
+
+def test_a_controller_without_rules_is_shown_by_its_gains(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/controller?controller=pi")
+
+    expect(page.locator('[data-linear="pi"]')).to_be_visible()

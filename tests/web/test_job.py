@@ -1,0 +1,159 @@
+"""A job from the form to its end, as people go about it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.web.conftest import SMALL_JOB
+from tests.web.job_page import (
+    expect_state,
+    job_element,
+    shown_iteration,
+    wait_for_iteration,
+)
+from tests.web.server import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+OTHER_SCENARIOS = ("normal-slow", "loaded-fast", "loaded-slow", "slope-fast", "turn-right-fast")
+
+
+def fill_in(page: Page, name: str, *, iterations: int) -> None:
+    """The form of a job of one scenario and eight particles."""
+    page.get_by_label("Name", exact=True).fill(name)
+    page.get_by_label(re.compile("^Iterations")).fill(str(iterations))
+    page.get_by_label(re.compile("^particles", re.IGNORECASE)).fill("8")
+    for scenario in OTHER_SCENARIOS:
+        page.get_by_label(re.compile(f"^[1-6] {scenario}$")).uncheck()
+
+
+def submitted(page: Page) -> str:
+    """Id of the job whose page the form has led to."""
+    expect(page).to_have_url(re.compile(r"/jobs/(?!new)\w+$"))
+    return page.url.rpartition("/")[2]
+
+
+def test_a_job_is_submitted_watched_paused_reloaded_and_resumed(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/jobs/new")
+    fill_in(page, "from the form", iterations=5000)
+    # The API's own estimate, before anything is submitted.
+    expect(page.locator("[data-walks]")).to_have_attribute("data-walks", "40000")
+    page.get_by_role("button", name="Submit the job").click()
+    job_id = submitted(page)
+
+    # It advances without being reloaded.
+    page.evaluate("window.notReloaded = true")
+    wait_for_iteration(page, 2)
+    wait_for_iteration(page, shown_iteration(page) + 3)
+    assert page.evaluate("window.notReloaded")
+    expect(job_element(page)).to_have_attribute("data-stream", "open")
+
+    page.get_by_role("button", name="Pause").click()
+    expect_state(page, "paused")
+    committed = server.wait_for(job_id, "paused")["iterations"]
+    expect(job_element(page)).to_have_attribute("data-iteration", str(committed - 1))
+
+    page.reload()
+    expect_state(page, "paused")
+    expect(job_element(page)).to_have_attribute("data-iteration", str(committed - 1))
+    assert server.job(job_id)["iterations"] == committed
+
+    page.get_by_role("button", name="Resume").click()
+    wait_for_iteration(page, committed + 1)
+    expect_state(page, "running")
+
+    # What is lost is asked about first.
+    page.get_by_role("button", name="Cancel…").click()
+    page.get_by_role("button", name="Keep it").click()
+    assert server.job(job_id)["state"] == "running"
+    page.get_by_role("button", name="Cancel…").click()
+    page.get_by_role("button", name="Cancel the job").click()
+    expect_state(page, "cancelled")
+    assert server.job(job_id)["state"] == "cancelled"
+
+
+def test_a_spec_that_makes_no_sense_is_not_submitted_and_the_field_is_named(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    jobs_before = server.client.get("/v1/jobs").json()["items"]
+    page = visit(server.url, allowed="status of 422").go("/jobs/new")
+    fill_in(page, "wrong", iterations=0)
+
+    page.get_by_role("button", name="Submit the job").click()
+
+    iterations = page.get_by_label(re.compile("^Iterations"))
+    expect(iterations).to_have_attribute("aria-invalid", "true")
+    expect(iterations).to_be_focused()
+    assert page.url.endswith("/jobs/new")
+    assert server.client.get("/v1/jobs").json()["items"] == jobs_before
+
+
+def test_a_job_is_submitted_and_followed_by_keyboard_alone(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/jobs")
+    new_job = page.get_by_role("link", name="New job").first
+    expect(new_job).to_be_visible()
+
+    press_until_focused(page, "New job")
+    page.keyboard.press("Enter")
+    expect(page.get_by_label("Name", exact=True)).to_be_visible()
+    press_until_focused(page, "Name")
+    page.keyboard.type("by keyboard")
+    press_until_focused(page, "Iterations")
+    page.keyboard.press("ControlOrMeta+a")
+    page.keyboard.type("2")
+    page.keyboard.press("Enter")
+    submitted(page)
+    expect(page.get_by_role("heading", name="by keyboard")).to_be_visible()
+    wait_for_iteration(page, 1)
+    expect_state(page, "succeeded")
+
+    press_until_focused(page, "Iterations")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("table", name="Iterations")).to_be_visible()
+    press_until_focused(page, "0")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("table", name="Particles of iteration 0")).to_be_visible()
+
+
+FOCUSED = """() => {
+    const element = document.activeElement
+    const label = element.labels?.[0] ?? element
+    return (element.getAttribute('aria-label') ?? label.textContent).trim()
+}"""
+
+
+def press_until_focused(page: Page, name: str) -> None:
+    """Press Tab until the element whose name begins so has the focus."""
+    seen: list[str] = []
+    for _ in range(150):
+        page.keyboard.press("Tab")
+        seen.append(page.evaluate(FOCUSED))
+        if re.match(rf"{name}\b", seen[-1]):
+            return
+    raise AssertionError(f"{name} was not reached: {seen}")
+
+
+def test_a_job_is_extended_and_cloned(server: ServerProcess, visit: Callable[..., Visit]) -> None:
+    job_id = server.submit(SMALL_JOB)
+    done = server.wait_for(job_id, "succeeded")["iterations"]
+    page = visit(server.url).go(f"/jobs/{job_id}")
+
+    page.get_by_role("button", name="Extend…").click()
+    page.get_by_label(re.compile("^Iterations in all")).fill(str(done + 2))
+    page.get_by_role("button", name=f"Run {done + 2} iterations in all").click()
+    wait_for_iteration(page, done + 1)
+    expect_state(page, "succeeded")
+
+    page.get_by_role("link", name="Clone").click()
+    expect(page.get_by_label("Name", exact=True)).to_have_value("small")
+    expect(page.get_by_label(re.compile("^particles", re.IGNORECASE))).to_have_value("8")
+    expect(page.locator("[data-own]")).to_have_count(2)

@@ -1,0 +1,83 @@
+"""What a job's page shows when the network breaks, and when the job fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from services.optimizer.job import JobState
+from services.runtime import open_store
+from tests.web.conftest import SMALL_JOB
+from tests.web.job_page import expect_state, job_element, shown_iteration, wait_for_iteration
+from tests.web.proxy import CuttableProxy
+from tests.web.server import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+BROKEN = "ERR_CONNECTION|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED|ERR_SOCKET|ERR_NETWORK"
+
+
+@pytest.fixture
+def proxy(server: ServerProcess) -> Iterator[CuttableProxy]:
+    proxy = CuttableProxy(server.url)
+    yield proxy
+    proxy.close()
+
+
+def test_a_broken_stream_is_said_to_be_stale_and_goes_on_without_a_gap(
+    server: ServerProcess, proxy: CuttableProxy, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"iterations": 5000})
+    page = visit(proxy.url, allowed=BROKEN).go(f"/jobs/{job_id}")
+    wait_for_iteration(page, 2)
+
+    proxy.cut()
+
+    expect(job_element(page)).to_have_attribute("data-stream", "stale")
+    expect(page.get_by_text("data is stale since")).to_be_visible()
+    last = shown_iteration(page)
+    # The job goes on meanwhile.
+    while server.job(job_id)["iterations"] < last + 10:
+        page.wait_for_timeout(50)
+    assert shown_iteration(page) == last
+
+    proxy.mend()
+
+    wait_for_iteration(page, last + 12)
+    expect(job_element(page)).to_have_attribute("data-stream", "open")
+    expect(page.get_by_text("data is stale since")).to_be_hidden()
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+    expect_state(page, "cancelled")
+    committed = server.job(job_id)["iterations"]
+    assert shown_iteration(page) == committed - 1
+    page.get_by_role("link", name="Iterations", exact=True).click()
+    expect(page.get_by_text(f"{committed} of {committed}", exact=True)).to_be_visible()
+
+
+def test_a_job_that_fails_is_shown_with_its_reason(
+    start_server: Callable[..., ServerProcess], tmp_path: Path, visit: Callable[..., Visit]
+) -> None:
+    server = start_server("--no-runner")
+    job_id = server.submit(SMALL_JOB)
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    expect_state(page, "queued")
+
+    # As a runner does that takes the job up and has to give it up.
+    with closing(open_store(str(tmp_path / "jobs.db"))) as store:
+        claim = store.claim("test", lease_seconds=60.0, job_id=job_id)
+        assert claim is not None
+        expect_state(page, "running")
+        store.release(claim, JobState.FAILED, error="the workers are gone; start them, resume")
+
+    expect_state(page, "failed")
+    expect(page.get_by_role("alert")).to_contain_text("the workers are gone; start them, resume")
+    expect(page.get_by_role("button", name="Resume")).to_be_visible()
+    page.goto("/jobs")
+    row = page.locator(f'[data-job="{job_id}"]')
+    expect(row).to_have_attribute("data-state", "failed")
+    expect(row).to_contain_text("the workers are gone")

@@ -1,0 +1,128 @@
+"""One walk: from a particle to its replay, whose numbers are the simulator's."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Locator, Page, expect
+
+from tests.web.pixels import colours, pixels
+from tests.web.server import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+@dataclass(frozen=True)
+class Recording:
+    """header: as the API sends it. frames: (n, floats)."""
+
+    header: dict[str, Any]
+    frames: NDArray[np.float32]
+
+    def body(self, frame: int) -> list[float]:
+        """Place of the body [m]."""
+        offset = next(c["offset"] for c in self.header["channels"] if c["name"] == "link_pose")
+        return [float(value) for value in self.frames[frame, offset : offset + 3]]
+
+
+def replay(client: httpx2.Client, **request: Any) -> Recording:
+    content = client.post("/v1/replays", json=request | {"rate": 100}).content
+    length = int.from_bytes(content[:4], "little")
+    header = json.loads(content[4 : 4 + length])
+    frames = np.frombuffer(content, dtype="<f4", offset=4 + length)
+    return Recording(header, frames.reshape(header["frames"], -1))
+
+
+def player(page: Page) -> Locator:
+    """The replay, once it can be played."""
+    found = page.locator("[data-player]")
+    expect(found.locator("canvas")).to_be_visible()
+    return found
+
+
+def expect_frame(page: Page, frame: int, recording: Recording) -> None:
+    """The page shows this frame, with the body where the simulator had it."""
+    shown = player(page)
+    expect(shown).to_have_attribute("data-frame", str(frame))
+    place = [float(shown.get_attribute(f"data-{axis}") or "nan") for axis in "xyz"]
+    assert place == pytest.approx(recording.body(frame), abs=1e-4)
+
+
+def test_a_row_leads_to_its_particles_and_a_particle_to_its_walk(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    where = f"/v1/jobs/{finished_job}/iterations/2/evaluations"
+    evaluation = server.client.get(where).json()["items"][3]
+    page = visit(server.url).go(f"/jobs/{finished_job}/iterations")
+    page.locator('[data-index="2"]').get_by_role("link").click()
+    page.locator('[data-particle="3"]').get_by_role("link", name="3", exact=True).click()
+
+    expect(page).to_have_url(re.compile(r"/walk\?"))
+    scenario = server.job(finished_job)["spec"]["scenarios"][0]
+    design = evaluation["design"]
+    recording = replay(server.client, controller="fuzzy-pi", design=design, scenario=scenario)
+    expect_frame(page, 0, recording)
+    worth = page.get_by_role("table", name="Objectives of the walk")
+    energy = worth.get_by_role("row").filter(has_text="energy").get_by_role("cell")
+    expected = evaluation["scenarios"]["short"]["objectives"]["energy"]
+    assert float(energy.inner_text()) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_replay_is_scrubbed_stepped_and_played(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    published = server.client.get("/v1/controllers").json()["items"]
+    design = next(c["published"]["A"] for c in published if c["name"] == "fuzzy-pi")
+    recording = replay(server.client, controller="fuzzy-pi", design=design, scenario="normal-fast")
+    page = visit(server.url).go("/walk?published=A&scenario=normal-fast")
+    expect_frame(page, 0, recording)
+    stage = player(page).locator("canvas")
+    first = pixels(stage)
+    assert colours(first) > 200
+
+    moment = page.get_by_label("Moment of the walk")
+    moment.fill("150")
+    expect_frame(page, 150, recording)
+    page.get_by_label("One frame ahead").click()
+    expect_frame(page, 151, recording)
+    assert not np.array_equal(pixels(stage), first)
+
+    # Played, it moves by itself and ends at the end.
+    page.get_by_label("Speed").select_option("4")
+    page.get_by_role("button", name="Play").click()
+    expect(player(page)).to_have_attribute("data-playing", "true")
+    expect(player(page)).to_have_attribute("data-playing", "false")
+    expect_frame(page, recording.header["frames"] - 1, recording)
+
+
+def test_two_walks_are_shown_together(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/walk?job={finished_job}&against=published:A")
+    player(page)
+
+    worth = page.get_by_role("table", name="Objectives of the walk")
+    expect(worth.get_by_role("row").filter(has_text="energy").get_by_role("cell")).to_have_count(3)
+    ghost = pixels(player(page).locator("canvas"))
+    page.get_by_role("button", name="Side by side").click()
+    expect(page.get_by_role("button", name="Side by side")).to_have_attribute(
+        "aria-pressed", "true"
+    )
+    assert not np.array_equal(pixels(player(page).locator("canvas")), ghost)
+
+
+def test_a_walk_that_ends_in_a_fall_says_so(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go('/walk?controller=p&design={"P":0}')
+
+    expect(page.locator("[data-status]")).not_to_have_attribute("data-status", "ok")

@@ -1,0 +1,84 @@
+"""Other preferences over a job's history, and its designs across their variables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.web.server import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+OBJECTIVES = ("torque", "acceleration", "angular acceleration", "energy", "reciprocal speed")
+
+
+def test_another_preference_ranks_the_history_anew_without_a_walk(
+    server: ServerProcess,
+    finished_job: str,
+    visit: Callable[..., Visit],
+) -> None:
+    best = server.job(finished_job)["best"]
+    bias = server.job(finished_job)["spec"]["preference"]["bias"]
+    exponents = [0.0, 1.0, 0.0, 0.0, 0.0]
+    wanted = {"bias": bias, "exponent": exponents}
+    ranking = server.client.post(
+        f"/v1/jobs/{finished_job}/ranking", json={"preference": wanted}
+    ).json()
+    winner = ranking["top"][0]
+    assert (winner["iteration"], winner["particle"]) != (best["iteration"], best["particle"])
+
+    visited = visit(server.url)
+    page = visited.go(f"/jobs/{finished_job}/preferences")
+    shown = page.locator("[data-winner]")
+    expect(shown).to_have_attribute("data-winner", f"{best['iteration']}/{best['particle']}")
+    expect(shown).to_have_attribute("data-evaluations", str(ranking["evaluations"]))
+    asked_before = len(visited.requested)
+    # Only smooth walks count.
+    for objective, exponent in zip(OBJECTIVES, exponents, strict=True):
+        page.get_by_label(f"exponent of {objective}, number").fill(str(exponent))
+        page.keyboard.press("Tab")
+
+    expect(shown).to_have_attribute("data-winner", f"{winner['iteration']}/{winner['particle']}")
+    expect(page.get_by_role("heading", name="Another design wins")).to_be_visible()
+    asked = {urlsplit(url).path for url in visited.requested[asked_before:]}
+    assert f"/v1/jobs/{finished_job}/ranking" in asked
+    assert not asked & {"/v1/simulations", "/v1/replays"}
+
+    page.get_by_role("link", name="Start a job from here").click()
+    query = parse_qs(urlsplit(page.url).query)
+    assert query["clone"] == [finished_job]
+    assert json.loads(query["preference"][0])["exponent"] == exponents
+    page.get_by_label("Name", exact=True).fill("smooth")
+    page.get_by_role("button", name="Submit the job").click()
+    expect(page.get_by_role("heading", name="smooth")).to_be_visible()
+    job_id = page.url.rpartition("/")[2]
+    assert server.job(job_id)["spec"]["preference"]["exponent"] == exponents
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+
+
+def test_brushing_an_axis_selects_designs(
+    server: ServerProcess,
+    finished_job: str,
+    visit: Callable[..., Visit],
+) -> None:
+    every = str(server.job(finished_job)["evaluations"])
+    page = visit(server.url).go(f"/jobs/{finished_job}/variables")
+    selected = page.locator("[data-selected]")
+    expect(selected).to_have_attribute("data-selected", every)
+
+    axis = page.locator(".axis").last.bounding_box()
+    x, bottom = axis["x"] + axis["width"] / 2, axis["y"] + axis["height"]
+    page.mouse.move(x, bottom - 1)
+    page.mouse.down()
+    page.mouse.move(x, bottom - axis["height"] / 2, steps=5)
+    page.mouse.up()
+
+    expect(selected).not_to_have_attribute("data-selected", every)
+    assert 0 < int(selected.get_attribute("data-selected") or "0") < int(every)
+    page.get_by_role("button", name="Select all").click()
+    expect(selected).to_have_attribute("data-selected", every)

@@ -1,0 +1,36 @@
+"""The main views of the page, by name."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from playwright.sync_api import Page, expect
+
+from tests.web.visit import Visit
+
+VIEWS: Final = {
+    "jobs": "/jobs",
+    "new-job": "/jobs/new",
+    "job": "/jobs/{job}",
+    "scenarios": "/jobs/{job}/scenarios",
+    "variables": "/jobs/{job}/variables",
+    "iterations": "/jobs/{job}/iterations",
+    "particles": "/jobs/{job}/iterations/1",
+    "what-if": "/jobs/{job}/preferences",
+    "spec": "/jobs/{job}/reproduce",
+    "walk": "/walk?job={job}",
+    "two-walks": "/walk?job={job}&against=published:A",
+    "controller": "/controller?job={job}",
+    "linear-controller": "/controller?controller=pi",
+    "no-such-job": "/jobs/none",
+    "no-such-page": "/walk/none",
+}
+"""Paths; {job} is a job that has ended well."""
+
+
+def open_view(visited: Visit, name: str, job: str) -> Page:
+    """A view with all that it asks the server for."""
+    page = visited.go(VIEWS[name].format(job=job))
+    expect(page.get_by_role("main")).not_to_be_empty()
+    page.wait_for_load_state("networkidle")
+    return page

@@ -40,7 +40,7 @@ SPEC = JobSpec.model_validate(
             },
         ],
         "optimizer": {"name": "pso", "particles": 5},
-        "iterations": 8,
+        "iterations": 12,
         "seed": 4,
     }
 )
@@ -116,9 +116,10 @@ def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: 
     job_id = queue(store)
     chance = random.Random(7)
     progress = []
-    for _ in range(5):
+    # Five lives, or fewer where the machine becomes so fast that they would reach the end.
+    while len(progress) < 5 and (not progress or progress[-1] < SPEC.iterations - 4):
         process = start(url, job_id)
-        # The first life begins at the first commit, so that start-up is not all that is killed.
+        # A life begins at its first commit, so that start-up is not all that is killed.
         assert process.stdout is not None
         process.stdout.readline()
         time.sleep(chance.uniform(0.0, 1.5 * one_iteration))
@@ -129,7 +130,7 @@ def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: 
 
     assert last.returncode == 0
     assert store.job(job_id).state is JobState.SUCCEEDED
-    assert progress[0] >= 1 and progress == sorted(progress)
+    assert len(progress) >= 2 and progress[0] >= 1 and progress == sorted(progress)
     assert history(store, job_id) == history(store, whole)
 
 

@@ -23,6 +23,10 @@ const NOTHING_YET: Followed = {
   staleSince: null,
 }
 
+/** Iterations that are asked for first, so that there is something to see at once, and then. */
+const FIRST = 100
+const FURTHER = 1000
+
 /** Rates and times are worth a question at most this often [ms]. */
 const ASK_MS = 1000
 
@@ -101,7 +105,7 @@ async function committedSoFar(
     for (;;) {
       const page = await get('/v1/jobs/{job_id}/iterations', {
         path: { job_id: id },
-        query: { after: known.at(-1)?.index, limit: 1000 },
+        query: { after: known.at(-1)?.index, limit: known.length === 0 ? FIRST : FURTHER },
       })
       known.push(...page.items)
       show([...known])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from typing import Final
 
@@ -12,6 +11,7 @@ from pydantic import Field
 
 from api.views.base import View, finite
 from api.views.evaluation import StatusName
+from api.views.framing import framed
 from sim.kernel.parameters import gravity_on
 from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from sim.replay import Replay
@@ -193,9 +193,7 @@ def encoded_replay(
         load_kg=scenario.load,
         channels=channels,
     )
-    text = header.model_dump_json().encode()
-    text += b" " * (-len(text) % 4)
-    return struct.pack("<I", len(text)) + text + frames.tobytes()
+    return framed(header, frames)
 
 
 def _channels(walk: Replay, joints: Sequence[str], legs: Sequence[str]) -> list[ChannelView]:

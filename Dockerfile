@@ -10,6 +10,7 @@ RUN pip install --no-deps --require-hashes --only-binary :all: -r /src/requireme
 COPY pyproject.toml README.md /src/
 COPY sim /src/sim
 COPY services /src/services
+COPY gaitswarm /src/gaitswarm
 COPY api /src/api
 COPY cli /src/cli
 RUN cd /src && python -m api.document > /openapi.json

@@ -32,8 +32,8 @@ from api.routes import (
 )
 from api.security import SameSiteMiddleware, SecurityHeadersMiddleware
 from api.settings import ApiSettings
-from api.views import PREFIX, ParticlesHeaderView
-from api.views.replay import ReplayHeaderView
+from gaitswarm.views import PREFIX, ParticlesHeaderView
+from gaitswarm.views.replay import ReplayHeaderView
 from services.optimizer.service import JobService
 
 _REDIRECTIONS: Final = {

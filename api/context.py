@@ -11,7 +11,7 @@ from fastapi import Depends, Path, Request
 from pydantic import Field
 
 from api.settings import ApiSettings
-from services.optimizer.job import Job
+from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 
 

@@ -10,9 +10,9 @@ from anyio.to_thread import run_sync
 from fastapi.sse import ServerSentEvent
 
 from api.context import ApiContext
-from api.views import IterationView, StateView
+from gaitswarm.views import IterationView, StateView
 from services.optimizer.errors import StoreUnavailable
-from services.optimizer.job import Iteration, Job, JobState
+from services.optimizer.jobs.job import Iteration, Job, JobState
 from services.optimizer.service import JobService
 
 _PAGE: Final = 200

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from api.problems import MEDIA_TYPE
-from api.views import ProblemView
+from gaitswarm.views import ProblemView
 
 DESCRIPTION: Final = """
 Finds robust drive controllers for walking robots: a controller is tried in several walking

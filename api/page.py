@@ -7,6 +7,7 @@ served from then on.
 from __future__ import annotations
 
 import mimetypes
+import re
 from http import HTTPStatus
 from pathlib import Path
 from typing import Final
@@ -15,9 +16,12 @@ from fastapi import FastAPI, Request, Response
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
 
 from api.problems import problem
+from gaitswarm.views import PREFIX
 
 PAGES: Final = ("/jobs", "/walk", "/controller")
 """With everything below them: the page itself tells its views apart by their paths."""
+
+_JOB_PAGE: Final = re.compile(r"/jobs/([a-z0-9]{12})")
 
 _UNBUILT: Final = "the page is not built; `make page` builds it, and /docs explains the API"
 
@@ -26,7 +30,7 @@ _MEDIA_TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "im
 
 
 def add_page(app: FastAPI, folder: Path) -> None:
-    """Serve a built page; without one, `/` leads to /docs.
+    """Serve a built page; without one, `/` leads to /docs and a job's page to the job as JSON.
 
     folder: index.html, and files named by a hash of their content in assets/.
     """
@@ -35,8 +39,9 @@ def add_page(app: FastAPI, folder: Path) -> None:
         try:
             text = (folder / "index.html").read_text(encoding="utf-8")
         except FileNotFoundError:
-            if request.url.path == f"{request.scope.get('root_path', '')}/":
-                return RedirectResponse(request.scope.get("root_path", "") + "/docs")
+            instead = _without_page(request)
+            if instead is not None:
+                return RedirectResponse(instead)
             return problem(request.url.path, HTTPStatus.NOT_FOUND, "not-found", _UNBUILT)
         # It names assets that a newer build no longer has: ask every time.
         return HTMLResponse(text, headers={"Cache-Control": "no-cache"})
@@ -55,3 +60,13 @@ def add_page(app: FastAPI, folder: Path) -> None:
     for path in ("/", *PAGES, *(f"{known}/{{rest:path}}" for known in PAGES)):
         app.add_route(path, page, include_in_schema=False)
     app.add_route("/assets/{name}", asset, include_in_schema=False)
+
+
+def _without_page(request: Request) -> str | None:
+    """Path of what the API itself has to show in place of a page that is not built, if anything."""
+    root = request.scope.get("root_path", "")
+    path = request.url.path.removeprefix(root)
+    if path == "/":
+        return f"{root}/docs"
+    job = _JOB_PAGE.fullmatch(path)
+    return f"{root}{PREFIX}/jobs/{job[1]}" if job else None

@@ -26,8 +26,8 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
-from api.field_errors import field_error, field_errors
-from api.views import FieldErrorView, ProblemView
+from gaitswarm.field_errors import field_error, field_errors
+from gaitswarm.views import FieldErrorView, ProblemView
 from services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,

@@ -16,12 +16,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.large_store import fill
-from services.optimizer.distribution import distribution
-from services.optimizer.evaluation_columns import EvaluationColumns
-from services.optimizer.history_cache import HistoryCache
-from services.optimizer.job import Job, JobOrder
-from services.optimizer.preference import PREFERENCES, judge
-from services.optimizer.ranking import rank
+from services.optimizer.analysis.distribution import distribution
+from services.optimizer.analysis.history_cache import HistoryCache
+from services.optimizer.analysis.ranking import rank
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job, JobOrder
+from services.optimizer.jobs.preference import PREFERENCES, judge
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
 

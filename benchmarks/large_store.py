@@ -16,11 +16,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.job import Ask, Claim, Command, CompletedIteration, Job
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.optimizers.base import Optimizer
-from services.optimizer.optimizers.registry import create_optimizer
-from services.optimizer.spec import judge_outcomes
+from services.optimizer.jobs.job import Ask, Claim, Command, CompletedIteration, Job
+from services.optimizer.jobs.spec import create_optimizer, judge_outcomes
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
 from sim.outcome import Outcome, Status
@@ -84,7 +83,7 @@ def run(store: Store, job: Job) -> None:
 def _step(store: Store, claim: Claim, optimizer: Optimizer, ask: Ask) -> Ask | None:
     spec = claim.job.spec
     designs = spec.design_space().designs(ask.positions)
-    outcomes = walk(ask.positions, optimizer_bounds(claim.job), len(spec.trial_names))
+    outcomes = walk(ask.positions, optimizer_bounds(claim.job), len(spec.case_names))
     fitness = judge_outcomes(spec, outcomes).fitness
     optimizer.tell(fitness)
     following = _ask(optimizer) if optimizer.iteration < spec.iterations else None

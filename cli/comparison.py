@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from api.simulation import SimulationRequest, run_simulation
-from api.views import SimulationView
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.preference import PREFERENCES
-from services.optimizer.spec import Spec
+from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.views import SimulationView
+from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.tuning import JobSpec
 from sim.controllers import CONTROLLERS
 
 

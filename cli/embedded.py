@@ -10,15 +10,15 @@ from cli.exit_codes import JobEnded
 from cli.output import note, print_json, stdout_console
 from cli.progress import show_progress
 from services.optimizer.errors import Conflict
-from services.optimizer.job import Command, Job, JobState
+from services.optimizer.jobs.job import Command, Job, JobState
 from services.runtime import EvaluatorKind, open_evaluator, run_embedded, stop_on_signals
 
 if TYPE_CHECKING:
-    from api.views import JobView
-    from cli.jobs.local import LocalJobs
-    from services.optimizer.job import CompletedIteration
+    from gaitswarm.jobs.local import LocalJobs
+    from gaitswarm.views import JobView
+    from services.optimizer.jobs.job import CompletedIteration
+    from services.optimizer.jobs.spec import Spec
     from services.optimizer.service import JobService
-    from services.optimizer.spec import Spec
     from services.optimizer.store.base import Store
 
 _TAKEN_UP = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
@@ -119,7 +119,6 @@ def finish(
 
 
 def _report(job: JobView, place: str, *, compare: bool) -> None:
-    from api.page_folder import is_built
     from cli.comparison import published_beside
     from cli.tables import design_table, number, results_table
 
@@ -134,7 +133,6 @@ def _report(job: JobView, place: str, *, compare: bool) -> None:
         for name, evaluation in evaluations.items():
             console.print(f"fitness of {name}: {number(evaluation.fitness)}", markup=False)
     speed = f" at {job.simulations_per_second:.0f} walks/s" if job.simulations_per_second else ""
-    note(f"{job.evaluations} designs in {len(job.spec.trial_names)} walks each{speed}")
+    note(f"{job.evaluations} designs in {len(job.spec.case_names)} walks each{speed}")
     note(f"its history: gaitswarm history {job.id}{place}")
-    way, path = ("look at it", "jobs") if is_built() else ("over REST", "v1/jobs")
-    note(f"{way}: gaitswarm serve{place}, then http://127.0.0.1:8000/{path}/{job.id}")
+    note(f"look at it: gaitswarm serve{place}, then http://127.0.0.1:8000/jobs/{job.id}")

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
-    from api.views.convergence import ConvergenceView, ParameterView
+    from gaitswarm.views.identification import IdentifiabilityView, ParameterView
 
 _SHOWN: Final = (0.2, 0.1, 0.05, 0.02)
 """Of the twelve thresholds, those that a table has room for; JSON and the picture have all."""
@@ -31,7 +31,9 @@ def read_truth(path: Path | None) -> dict[str, float]:
     return values
 
 
-def show_parameters(found: ConvergenceView, truth: Mapping[str, float], *, as_json: bool) -> None:
+def show_parameters(
+    found: IdentifiabilityView, truth: Mapping[str, float], *, as_json: bool
+) -> None:
     """The command's result."""
     from cli.output import note, print_json, stdout_console
 
@@ -46,7 +48,7 @@ def show_parameters(found: ConvergenceView, truth: Mapping[str, float], *, as_js
         note("note: one run always narrows down; run others with other seeds to see what to trust")
 
 
-def parameters_table(found: ConvergenceView, truth: Mapping[str, float]) -> Table:
+def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> Table:
     """Parameters as rows: best value, true one, and widths of the intervals in percent."""
     from rich.table import Table
     from rich.text import Text
@@ -75,7 +77,7 @@ def parameters_table(found: ConvergenceView, truth: Mapping[str, float]) -> Tabl
     return table
 
 
-def draw_parameters(found: ConvergenceView, truth: Mapping[str, float]) -> Figure:
+def draw_parameters(found: IdentifiabilityView, truth: Mapping[str, float]) -> Figure:
     """A small panel a parameter: its interval against the threshold (fig. 2.14)."""
     from matplotlib.figure import Figure
 
@@ -106,7 +108,7 @@ def draw_parameters(found: ConvergenceView, truth: Mapping[str, float]) -> Figur
     return figure
 
 
-def _width(found: ConvergenceView, p: ParameterView, threshold: float) -> float:
+def _width(found: IdentifiabilityView, p: ParameterView, threshold: float) -> float:
     """Share of the range that was searched."""
     interval = p.intervals[found.thresholds.index(threshold)]
     return (interval.high - interval.low) / (p.high - p.low)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-    from api.views import IterationView
+    from gaitswarm.views import IterationView
     from sim.controllers.surface import Surface
     from sim.studies.drives import WalkFigures
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Bar
     from rich.progress import TaskID
 
-    from api.views import StateView
-    from cli.jobs.port import Jobs
+    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.views import StateView
 
 _LINE_SECONDS: Final = 2.0
 """Plain lines come at most this often, and for the last iteration."""
@@ -63,7 +63,7 @@ def show_progress(*, iterations: int, particles: int, done: int = 0) -> Iterator
 
 def watch_with_progress(jobs: Jobs, job_id: str) -> None:
     """Follow a job until it ends. Raises JobEnded unless it succeeds."""
-    from api.views import IterationView
+    from gaitswarm.views import IterationView
 
     job = jobs.job(job_id)
     with show_progress(
@@ -81,7 +81,7 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
 
 def watch_as_json(jobs: Jobs, job_id: str) -> None:
     """The same as JSON lines: `{"event": "iteration"|"state", "data": {...}}`."""
-    from api.views import IterationView
+    from gaitswarm.views import IterationView
 
     last: StateView | None = None
     for event in jobs.follow(job_id):

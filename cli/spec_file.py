@@ -14,7 +14,7 @@ from services.optimizer.errors import InvalidRequest
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-    from services.optimizer.specs import AnySpec
+    from services.optimizer.jobs.documents import AnySpec
 
 LARGEST_FILE: Final = 1 << 20
 """Largest JSON file that is read [B]; a spec takes a few kilobytes."""
@@ -93,8 +93,8 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
     """A checked spec that can be simulated. Raises InvalidRequest that names every bad field."""
     from pydantic import ValidationError
 
+    from services.optimizer.jobs.documents import SPECS
     from services.optimizer.service import check_can_be_simulated
-    from services.optimizer.specs import SPECS
 
     try:
         spec = SPECS.validate_python(data)
@@ -106,7 +106,7 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
 
 def invalid_request(error: ValidationError, data: Mapping[str, Any]) -> InvalidRequest:
     """What pydantic found wrong, in the words of the input: paths as in the file."""
-    from api.field_errors import field_errors
+    from gaitswarm.field_errors import field_errors
 
     first, *others = field_errors(error.errors(include_url=False), data)
     more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)

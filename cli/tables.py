@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from api.views import (
+    from gaitswarm.views import (
         IterationView,
         JobSummaryView,
         JobView,
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         RankingView,
         ScenarioResultView,
     )
-    from services.optimizer.spec import Spec
+    from services.optimizer.jobs.spec import Spec
     from sim.outcome import Objective
 
 MISSING: Final = "–"

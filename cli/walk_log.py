@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from api.views import WalkLogView
 from cli.atomic_file import replacing
+from gaitswarm.views import WalkLogView
 
 
 def write_walk_logs(path: Path, logs: Mapping[str, WalkLogView | None]) -> None:

@@ -3,4 +3,4 @@
 # take the seconds that deriving the document takes.
 set -eu
 cd "$(dirname "$0")/.."
-find api services sim \( -name '*.py' -o -name '*.toml' \) -type f | LC_ALL=C sort | xargs cksum | cksum
+find api gaitswarm services sim \( -name '*.py' -o -name '*.toml' \) -type f | LC_ALL=C sort | xargs cksum | cksum

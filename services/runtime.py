@@ -10,18 +10,18 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Final, Literal
 
-from services.optimizer.backoff import Backoff
 from services.optimizer.errors import Conflict
-from services.optimizer.evaluator import Evaluator
-from services.optimizer.job import Claim, Job, JobState
-from services.optimizer.run_claim import (
+from services.optimizer.jobs.job import Claim, Job, JobState
+from services.optimizer.run.coordinator import Backoff
+from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.run.runner import (
     OnCommit,
     OnRetry,
+    Runner,
     Surroundings,
     run_claim,
     runner_name,
 )
-from services.optimizer.runner import Runner
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store

@@ -74,9 +74,9 @@ N_OBJECTIVES: Final = len(OBJECTIVES)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """Results of a batch of designs in one trial.
+    """Results of a batch of designs in one case.
 
-    objectives: (n, m) float64, columns as in the trial's `objectives` (`OBJECTIVES` for a walk);
+    objectives: (n, m) float64, columns as in the case's `objectives` (`OBJECTIVES` for a walk);
         a value that does not exist (the design did not walk) is NaN.
     statuses: (n,) uint8, values of `Status`.
     """

@@ -26,7 +26,7 @@ def watch(event, arguments):
 
 sys.addaudithook(watch)
 names = []
-for package in ("sim", "services", "api", "cli"):
+for package in ("sim", "services", "gaitswarm", "api", "cli"):
     root = importlib.import_module(package)
     names += [package, *(m.name for m in pkgutil.walk_packages(root.__path__, f"{package}."))]
 for name in names:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from api.context import ExistingJob, JobIdText, Service
 from api.openapi import problems
-from api.views import (
+from gaitswarm.views import (
     PREFIX,
     DistributionView,
     RankingRequest,
@@ -16,8 +16,8 @@ from api.views import (
     View,
     encoded_particles,
 )
-from api.views.convergence import ConvergenceView
-from api.views.framing import MEDIA_TYPE
+from gaitswarm.views.base import MEDIA_TYPE
+from gaitswarm.views.identification import IdentifiabilityView
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
 
@@ -117,11 +117,13 @@ def get_parameters(
         list[JobIdText] | None,
         Query(max_length=31, description="Further runs of the same problem, of other seeds."),
     ] = None,
-) -> ConvergenceView:
+) -> IdentifiabilityView:
     """The interval of every variable among designs within twelve thresholds of the best.
 
     For jobs of kind `identification` above all. A single run always narrows down; only runs of
     different seeds that narrow down to the same values show that a parameter can be trusted.
     """
     jobs = [job, *(service.job(other) for other in also or ())]
-    return ConvergenceView.from_convergence([j.id for j in jobs], service.convergence(jobs))
+    return IdentifiabilityView.from_identifiability(
+        [j.id for j in jobs], service.identifiability(jobs)
+    )

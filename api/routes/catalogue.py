@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from api.openapi import problems
-from api.views import (
+from gaitswarm.views import (
     PREFIX,
     CatalogueView,
     ControllerView,

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from api.context import Service
 from api.openapi import problems
-from api.views import PREFIX, View
+from gaitswarm.views import PREFIX, View
 
 router = APIRouter(prefix=PREFIX, tags=["health"])
 

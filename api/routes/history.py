@@ -10,10 +10,10 @@ from fastapi.responses import StreamingResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from api.context import Context, ExistingJob, JobId, Service
-from api.evaluation_table import MEDIA_TYPES, TableFormat, encoded_table
 from api.events import job_events
 from api.openapi import problems
-from api.views import (
+from gaitswarm.tables import MEDIA_TYPES, TableFormat, encoded_table
+from gaitswarm.views import (
     PREFIX,
     BestView,
     CatalogueView,

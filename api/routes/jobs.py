@@ -8,10 +8,10 @@ from fastapi import APIRouter, Header, Query, Response, status
 
 from api.context import JobId, Service
 from api.openapi import problems
-from api.views import PREFIX, ExtensionRequest, JobSummaryView, JobView, PageView
-from services.optimizer.job import Command, Job, JobOrder, JobState
+from gaitswarm.views import PREFIX, ExtensionRequest, JobSummaryView, JobView, PageView
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from services.optimizer.service import JobService
-from services.optimizer.specs import AnySpec
 
 router = APIRouter(prefix=f"{PREFIX}/jobs", tags=["jobs"])
 

@@ -8,8 +8,8 @@ from fastapi import APIRouter, Path, Response, status
 
 from api.context import Service
 from api.openapi import problems
-from api.views import PREFIX
-from api.views.recording import RecordingView
+from gaitswarm.views import PREFIX
+from gaitswarm.views.identification import RecordingView
 from sim.identification.recorded_walk import RecordedWalk
 
 router = APIRouter(prefix=f"{PREFIX}/recordings", tags=["recordings"])

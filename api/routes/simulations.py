@@ -9,8 +9,8 @@ from fastapi import APIRouter, Response
 from api.context import Context
 from api.limits import check_length, computed
 from api.openapi import problems
-from api.simulation import SimulationRequest, run_simulation
-from api.views import PREFIX, SimulationView
+from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.views import PREFIX, SimulationView
 
 router = APIRouter(prefix=f"{PREFIX}/simulations", tags=["simulations"])
 

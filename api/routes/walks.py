@@ -10,11 +10,11 @@ from fastapi import APIRouter, Path, Response
 from api.context import Context
 from api.limits import check_length, computed
 from api.openapi import problems
-from api.replay import ReplayRequest, run_replay
-from api.surface import SurfaceRequest, run_surface
-from api.views import PREFIX
-from api.views.surface import SurfaceView
-from api.walk_request import resolved
+from gaitswarm.requests.replay import ReplayRequest, run_replay
+from gaitswarm.requests.surface import SurfaceRequest, run_surface
+from gaitswarm.requests.walk import resolved
+from gaitswarm.views import PREFIX
+from gaitswarm.views.surface import SurfaceView
 from services.optimizer.errors import NotFound
 from sim.controllers import CONTROLLERS, ControllerName
 

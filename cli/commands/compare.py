@@ -59,9 +59,9 @@ def compare(
 
 def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     from cli.design_file import read_design
-    from cli.jobs.open import open_jobs
+    from gaitswarm.jobs.open import open_jobs
     from services.optimizer.errors import InvalidRequest
-    from services.optimizer.job_spec import JobSpec
+    from services.optimizer.jobs.tuning import JobSpec
     from sim.controllers import CONTROLLERS
     from sim.studies.drives import drive_of_design, find_drive
 

@@ -10,7 +10,7 @@ import typer
 from cli.options import Db, JobId, Server
 
 if TYPE_CHECKING:
-    from api.evaluation_table import TableFormat
+    from gaitswarm.tables import TableFormat
 
 
 def register(app: typer.Typer) -> None:
@@ -28,8 +28,8 @@ def export(
 ) -> None:
     """Write one row per evaluated design: fitness, variables, and results by scenario."""
     from cli.atomic_file import replacing
-    from cli.jobs.open import open_jobs
     from cli.output import note
+    from gaitswarm.jobs.open import open_jobs
 
     file_format = _format(output)
     with open_jobs(server, db) as jobs:

@@ -10,7 +10,7 @@ import typer
 from cli.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from api.views import HistoryIterationView, JobView
+    from gaitswarm.views import HistoryIterationView, JobView
 
 
 def register(app: typer.Typer) -> None:
@@ -24,9 +24,9 @@ def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json =
 
     With --json also every particle: its design, fitness, statuses and raw objectives.
     """
-    from cli.jobs.open import open_jobs
     from cli.output import stdout_console
     from cli.tables import iterations_table
+    from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
         if as_json:
@@ -38,9 +38,9 @@ def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json =
 
 def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show the best design that a job has found so far, scenario by scenario."""
-    from cli.jobs.open import open_jobs
     from cli.output import print_json, stdout_console
     from cli.tables import design_table, results_table
+    from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
         found = jobs.best(job_id)

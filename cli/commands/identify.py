@@ -48,9 +48,9 @@ def record(
     as_json: Json = False,
 ) -> None:
     """Keep a measured walk where jobs can fit a robot to it; prints the recording's id."""
-    from cli.jobs.open import open_jobs
     from cli.measured_walk import read_measured, read_walk, simulated_walk, synchronised
     from cli.output import note, print_json, stdout_console
+    from gaitswarm.jobs.open import open_jobs
     from sim.identification.record import record as recorded
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
@@ -102,14 +102,14 @@ def identify(
     from contextlib import closing
 
     from cli.embedded import Embedded
-    from cli.jobs.local import LocalJobs
-    from cli.jobs.open import database_url
     from cli.options import evaluator_kind
     from cli.output import note
     from cli.parameters_table import read_truth, show_parameters
     from cli.robots import chosen_robot
     from cli.spec_file import parse_spec
-    from services.optimizer.job import JobState
+    from gaitswarm.jobs.local import LocalJobs
+    from gaitswarm.jobs.open import database_url
+    from services.optimizer.jobs.job import JobState
     from services.optimizer.service import JobService
     from services.runtime import open_store
 
@@ -158,10 +158,10 @@ def parameters(
     as_json: Json = False,
 ) -> None:
     """Say which fitted parameters can be trusted: intervals at twelve fitness thresholds."""
-    from cli.jobs.open import open_jobs
     from cli.output import note
     from cli.parameters_table import draw_parameters, read_truth, show_parameters
     from cli.plots import save
+    from gaitswarm.jobs.open import open_jobs
 
     known = read_truth(truth)
     with open_jobs(server, db) as jobs:

@@ -56,9 +56,9 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Queue a job for a running server; see `optimize` to run one here and now."""
-    from cli.jobs.open import open_jobs
     from cli.output import note, print_json, stdout_console
     from cli.spec_file import Overrides, build_spec
+    from gaitswarm.jobs.open import open_jobs
 
     overrides = Overrides(
         iterations, particles, seed, preference, scenarios, controller, name, robot
@@ -93,10 +93,10 @@ def list_jobs(
     as_json: Json = False,
 ) -> None:
     """List jobs, newest first unless another order is chosen."""
-    from cli.jobs.open import open_jobs
     from cli.output import print_json_list, stdout_console
     from cli.tables import jobs_table
-    from services.optimizer.job import JobOrder, JobState
+    from gaitswarm.jobs.open import open_jobs
+    from services.optimizer.jobs.job import JobOrder, JobState
 
     in_state = None if state is None else _one_of(JobState, state, "state")
     sorted_by = _one_of(JobOrder, order, "order")
@@ -110,9 +110,9 @@ def list_jobs(
 
 def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show a job: state, progress, best design, and why it failed if it did."""
-    from cli.jobs.open import open_jobs
     from cli.output import print_json
     from cli.tables import print_job
+    from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
         job = jobs.job(job_id)
@@ -127,8 +127,8 @@ def watch(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = F
 
     With --json every committed iteration is one line, as is every change of the job's state.
     """
-    from cli.jobs.open import open_jobs
     from cli.progress import watch_as_json, watch_with_progress
+    from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
         follow = watch_as_json if as_json else watch_with_progress
@@ -153,8 +153,8 @@ def extend(
     as_json: Json = False,
 ) -> None:
     """Give a job another budget; one that has succeeded is queued and goes on from its end."""
-    from cli.jobs.open import open_jobs
     from cli.output import print_json, stdout_console
+    from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
         job = jobs.extend(job_id, iterations)
@@ -187,9 +187,9 @@ def _one_of(kind: type[S], text: str, option: str) -> S:
 def _command(
     command: str, job_id: str, server: str | None, db: str | None, *, as_json: bool
 ) -> None:
-    from cli.jobs.open import open_jobs
     from cli.output import print_json, stdout_console
-    from services.optimizer.job import Command
+    from gaitswarm.jobs.open import open_jobs
+    from services.optimizer.jobs.job import Command
 
     with open_jobs(server, db) as jobs:
         job = jobs.command(job_id, Command(command))

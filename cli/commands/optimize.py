@@ -62,11 +62,11 @@ def optimize(
     from contextlib import closing
 
     from cli.embedded import Embedded, finish, resumed_job
-    from cli.jobs.local import LocalJobs
-    from cli.jobs.open import database_url
     from cli.options import evaluator_kind
     from cli.output import note
     from cli.spec_file import Overrides, build_spec
+    from gaitswarm.jobs.local import LocalJobs
+    from gaitswarm.jobs.open import database_url
     from services.optimizer.errors import InvalidRequest
     from services.optimizer.service import JobService
     from services.runtime import open_store

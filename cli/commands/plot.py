@@ -24,9 +24,9 @@ def register(app: typer.Typer) -> None:
 
 def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
     """Draw a job's fitness over its iterations: best so far, and the swarm around it."""
-    from cli.jobs.open import open_jobs
     from cli.output import note
     from cli.plots import draw_convergence, save
+    from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
         job = jobs.job(job_id)

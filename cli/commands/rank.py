@@ -9,7 +9,7 @@ import typer
 from cli.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from api.views import RankingRequest, RankingView
+    from gaitswarm.views import RankingRequest, RankingView
 
 
 def register(app: typer.Typer) -> None:
@@ -32,8 +32,8 @@ def rank(
     as_json: Json = False,
 ) -> None:
     """Rank all designs of a job by another preference, from what is stored: no walk is run."""
-    from cli.jobs.open import open_jobs
     from cli.output import print_json
+    from gaitswarm.jobs.open import open_jobs
 
     request = _request(preference, top)
     with open_jobs(server, db) as jobs:
@@ -50,8 +50,8 @@ def _request(preference: str, top: int) -> RankingRequest:
 
     from pydantic import ValidationError
 
-    from api.views import RankingRequest
     from cli.spec_file import invalid_request
+    from gaitswarm.views import RankingRequest
     from services.optimizer.errors import InvalidRequest
 
     chosen: object = preference

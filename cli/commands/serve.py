@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cli.options import Cpus, Db, EvaluatorOption, RayAddress
+
+if TYPE_CHECKING:
+    from api.settings import ApiSettings
 
 
 def register(app: typer.Typer) -> None:
@@ -40,15 +43,14 @@ def serve(
     from api.app import create_app
     from api.page_folder import is_built
     from api.server import ApiServer
-    from cli.jobs.open import database_url
     from cli.options import evaluator_kind
     from cli.output import log_to_stderr, note
-    from cli.settings import api_settings
+    from gaitswarm.jobs.open import database_url
     from services.optimizer.errors import EvaluatorUnavailable
     from services.runtime import RuntimeSettings, open_runtime
 
     log_to_stderr()
-    settings = api_settings(host=host, port=port)
+    settings = _api_settings(host=host, port=port)
     runtime = RuntimeSettings(
         database_url(db),
         evaluator=None if no_runner else evaluator_kind(evaluator),
@@ -70,3 +72,24 @@ def serve(
             note("there is no page, only the API: in a checkout, `make page` builds the page")
         note(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
         server.run()
+
+
+def _api_settings(*, host: str | None, port: int | None) -> ApiSettings:
+    """The server's settings from the environment, with options laid over them.
+
+    Raises InvalidRequest that names the variable.
+    """
+    from pydantic import ValidationError
+
+    from api.settings import ApiSettings
+    from services.optimizer.errors import InvalidRequest
+
+    given: dict[str, Any] = {
+        name: v for name, v in (("host", host), ("port", port)) if v is not None
+    }
+    try:
+        return ApiSettings(**given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = "_".join(str(part) for part in first["loc"]).upper()
+        raise InvalidRequest(first["msg"], field=f"GAITSWARM_API_{name}") from error

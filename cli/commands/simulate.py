@@ -10,7 +10,7 @@ import typer
 from cli.options import Json, RobotOption
 
 if TYPE_CHECKING:
-    from api.views import SimulationView
+    from gaitswarm.views import SimulationView
 
 
 def register(app: typer.Typer) -> None:
@@ -48,11 +48,11 @@ def simulate(
     """Let one design walk and say what it is worth; a fall is a result, not an error."""
     from pydantic import ValidationError
 
-    from api.simulation import SimulationRequest, run_simulation
     from cli.design_file import read_design
     from cli.output import note
     from cli.robots import chosen_robot, scenario_data
     from cli.spec_file import invalid_request
+    from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
     data = {
         "robot": chosen_robot(robot),

@@ -7,19 +7,19 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Final
 
-from services.optimizer.convergence import Convergence, convergence
-from services.optimizer.cost import Cost, MeasuredRates, cost
-from services.optimizer.design_space import DesignSpace
-from services.optimizer.distribution import Distribution, distribution
+from services.optimizer.analysis.distribution import Distribution, distribution
+from services.optimizer.analysis.history_cache import HistoryCache
+from services.optimizer.analysis.identifiability import Identifiability, identifiability
+from services.optimizer.analysis.ranking import Ranking, rank
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from services.optimizer.evaluation_columns import EvaluationColumns
-from services.optimizer.history_cache import HistoryCache
-from services.optimizer.job import Command, Evaluation, Iteration, Job, JobOrder, JobState
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.optimizers.pso import PsoSettings
-from services.optimizer.preference import Preference
-from services.optimizer.ranking import Ranking, rank
-from services.optimizer.spec import Spec
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
+from services.optimizer.jobs.job import Command, Evaluation, Iteration, Job, JobOrder, JobState
+from services.optimizer.jobs.preference import Preference
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.pso import PsoSettings
 from services.optimizer.store.base import Page, Store
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
@@ -75,14 +75,14 @@ class JobService:
         """Raises NotFound."""
         return self.store.recordings([recording_id])[recording_id]
 
-    def cost(self, spec: Spec) -> Cost:
+    def estimate(self, spec: Spec) -> Estimate:
         """What a job would cost, by the rate of jobs like it or a walk that is measured here.
 
         Raises InvalidRequest as `submit` does.
         """
         self._check(spec)
-        trials = spec.trials(self.store.recordings(spec.recording_ids))
-        return cost(spec, trials, self.store.jobs(limit=_EARLIER).items, self._rates)
+        cases = spec.cases(self.store.recordings(spec.recording_ids))
+        return estimate(spec, cases, self.store.jobs(limit=_EARLIER).items, self._rates)
 
     def job(self, job_id: str) -> Job:
         """Raises NotFound."""
@@ -184,8 +184,8 @@ class JobService:
         columns = self.columns(job)
         return RankedJob(job.spec, columns, rank(columns, preference, top=top))
 
-    def convergence(self, jobs: Sequence[Job]) -> Convergence:
-        """How the parameters of jobs that differ in seed and budget alone converge.
+    def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
+        """Which parameters jobs that differ in seed and budget alone agree on.
 
         Raises InvalidRequest for jobs of different problems, Conflict while one of them has no
         design that did not fail, and as `columns`.
@@ -213,7 +213,7 @@ class JobService:
                     " iteration, or leave it out"
                 )
         runs = [self.columns(job) for job in jobs]
-        return convergence(first.spec.design_space().variables, runs)
+        return identifiability(first.spec.design_space().variables, runs)
 
     def _check(self, spec: Spec) -> None:
         """Raise InvalidRequest for a job that cannot be run."""

@@ -10,10 +10,9 @@ from typing import Final
 import numpy as np
 
 from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.evaluator import EvaluationRequest, EvaluationStopped
-from services.worker.chunks import Chunk, cut
+from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from services.worker.fair_queue import FairQueue
-from services.worker.task import Task
+from services.worker.tasks import Chunk, Task, cut
 from sim.outcome import Outcome
 
 _GLANCE: Final = 0.1
@@ -52,7 +51,7 @@ class Work:
         """What is sent to the worker."""
         request, chunk = self.batch.request, self.chunk
         return Task(
-            trial=request.trials[chunk.trial],
+            case=request.cases[chunk.case],
             designs=np.ascontiguousarray(request.designs[chunk.start : chunk.stop]),
         )
 
@@ -75,14 +74,12 @@ class Dispatcher:
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
         """See `Evaluator.evaluate`."""
-        durations = [trial.duration for trial in request.trials]
+        durations = [case.duration for case in request.cases]
         count = len(request.designs)
         chunks = cut(durations, count, slots=self.slots, lanes=self.lanes())
         blank = tuple(
-            Outcome(
-                np.full((count, len(trial.objectives)), np.nan), np.zeros(count, dtype=np.uint8)
-            )
-            for trial in request.trials
+            Outcome(np.full((count, len(case.objectives)), np.nan), np.zeros(count, dtype=np.uint8))
+            for case in request.cases
         )
         batch = Batch(request, blank, missing=len(chunks))
         with self._changed:
@@ -105,7 +102,7 @@ class Dispatcher:
         with self._changed:
             if batch.ended:
                 return
-            into = batch.outcomes[chunk.trial]
+            into = batch.outcomes[chunk.case]
             into.objectives[chunk.start : chunk.stop] = outcome.objectives
             into.statuses[chunk.start : chunk.stop] = outcome.statuses
             batch.missing -= 1

@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable
 
-from services.optimizer.evaluator import EvaluationRequest
+from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.dispatch import Dispatcher
 from sim import simulate
 from sim.outcome import Outcome

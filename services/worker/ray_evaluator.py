@@ -10,10 +10,10 @@ from concurrent.futures import Future
 from typing import Any, Final
 
 from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.evaluator import EvaluationRequest
+from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.dispatch import Dispatcher, Work
 from services.worker.ray_session import RaySession, open_ray
-from services.worker.task import Failure, run_in_worker, warm_up
+from services.worker.tasks import Failure, run_in_worker, warm_up
 from sim import simulate
 from sim.outcome import Outcome
 
@@ -66,7 +66,7 @@ class RayEvaluator:
     ) -> tuple[Outcome, ...]:
         """See `Evaluator.evaluate`."""
         # Built here, the kernel lies in the cache when this machine's workers look for it.
-        for robot in {trial.robot for trial in request.trials}:
+        for robot in {case.robot for case in request.cases}:
             simulate.prepare(robot)
         return self._living_dispatcher().evaluate(request, should_stop)
 

@@ -47,16 +47,16 @@ class CurrentFit:
 
     @property
     def duration(self) -> float:
-        """See `Trial.duration`."""
+        """See `Case.duration`."""
         return self.walk.walked_seconds
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """See `Trial.objectives`: one mean absolute error a link."""
+        """See `Case.objectives`: one mean absolute error a link."""
         return LINK_CURRENTS
 
     def run(self, designs: Floats) -> Outcome:
-        """See `Trial.run`. A design that does not walk to the end has failed."""
+        """See `Case.run`. A design that does not walk to the end has failed."""
         described = load_robot(self.robot)
         if self.walk.joints != described.joint_names:
             raise SimulationInputError(

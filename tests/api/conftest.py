@@ -16,9 +16,9 @@ import pytest
 from api.app import create_app
 from api.server import ApiServer
 from api.settings import ApiSettings
-from services.optimizer.job import Ask, Claim, CompletedIteration, Job
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.optimizers.pso import PsoSettings
+from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, Job
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.pso import PsoSettings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore, open_store
 from sim.outcome import N_OBJECTIVES, Outcome, Status

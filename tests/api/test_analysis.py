@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.identification_spec import IdentificationSpec
-from services.optimizer.job import Job
-from services.optimizer.preference import PREFERENCES
+from services.optimizer.jobs.identification import IdentificationSpec
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx2
 
-from services.optimizer.preference import PREFERENCES
+from services.optimizer.jobs.preference import PREFERENCES
 from sim.controllers import CONTROLLERS
 from sim.scenario import GAIT_VARIABLES, SCENARIOS
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import httpx2
 import pytest
 
-from services.optimizer.runner import Runner
+from services.optimizer.run.runner import Runner
 from services.optimizer.store.sql_store import SqlStore
 from services.worker.in_process import InProcessEvaluator
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx2
 import pytest
 
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 
 pytestmark = pytest.mark.slow

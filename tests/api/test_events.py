@@ -14,7 +14,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from services.optimizer.job import Command, Job
+from services.optimizer.jobs.job import Command, Job
 from services.optimizer.store.sql_store import SqlStore
 
 pytestmark = pytest.mark.slow

@@ -10,8 +10,8 @@ import httpx2
 import pyarrow.parquet as pq
 import pytest
 
-from api.evaluation_table import encoded_table
-from services.optimizer.job import Job
+from gaitswarm.tables import encoded_table
+from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import OBJECTIVE_NAMES

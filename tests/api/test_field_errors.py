@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from api.field_errors import field_errors
-from services.optimizer.specs import SPECS
+from gaitswarm.field_errors import field_errors
+from services.optimizer.jobs.documents import SPECS
 
 
 def told(document: dict[str, Any]) -> dict[str, str]:

@@ -7,7 +7,7 @@ import math
 import httpx2
 import pytest
 
-from services.optimizer.job import Job
+from services.optimizer.jobs.job import Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import OBJECTIVE_NAMES
 

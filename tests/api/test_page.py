@@ -15,7 +15,7 @@ import httpx2
 import pytest
 
 from api.page_folder import is_built
-from services.optimizer.job import Job
+from services.optimizer.jobs.job import Job
 from tests.api.conftest import Serve, Server
 
 HTML = '<!doctype html><script type="module" src="/assets/index-A1b2.js"></script><p>Grüße</p>'
@@ -138,6 +138,12 @@ def test_without_a_page_the_root_leads_to_the_documentation(client: httpx2.Clien
     assert (root.status_code, root.headers["location"]) == (307, "/docs")
     assert deep.status_code == 404
     assert "`make page`" in deep.json()["detail"]
+
+
+def test_without_a_page_a_jobs_page_leads_to_the_job_as_json(client: httpx2.Client) -> None:
+    answer = client.get("/jobs/k2q7zr5dm9xw")
+
+    assert (answer.status_code, answer.headers["location"]) == (307, "/v1/jobs/k2q7zr5dm9xw")
 
 
 def test_a_page_that_is_built_while_the_server_runs_is_served(serve: Serve, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import httpx2
 import pytest
 
 from services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnavailable
-from services.optimizer.job import Job
+from services.optimizer.jobs.job import Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.errors import KernelBuildError
 

@@ -17,7 +17,7 @@ import pytest
 from api.app import create_app
 from api.server import ApiServer
 from api.settings import ApiSettings
-from services.optimizer.job import Job
+from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 
 PROGRAM = """
@@ -92,7 +92,7 @@ def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
 @pytest.mark.slow
 def test_the_api_brings_in_neither_ray_nor_a_database() -> None:
     program = (
-        "import sys, api.app, api.server, api.simulation\n"
+        "import sys, api.app, api.server, gaitswarm.requests.walk\n"
         "print(*{'ray', 'sqlalchemy', 'alembic'} & set(sys.modules))"
     )
 

@@ -12,16 +12,16 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from api.views import (
+from gaitswarm.views import (
     HistoryIterationView,
     JobView,
     SimulationView,
     WalkLogView,
     evaluation_views,
 )
-from api.views.evaluation import StatusName
-from services.optimizer.job import Evaluation, Job
-from services.optimizer.preference import PREFERENCES
+from gaitswarm.views.evaluation import StatusName
+from services.optimizer.jobs.job import Evaluation, Job
+from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
 from sim.kernel.observation import WalkLog
 from sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
@@ -111,7 +111,7 @@ def test_a_job_views_json_reads_back_as_the_same_view(store: SqlStore, job: Job,
 @pytest.mark.slow
 def test_views_can_be_had_without_a_web_framework() -> None:
     program = (
-        "import sys, api.views, api.simulation\n"
+        "import sys, gaitswarm.views, gaitswarm.requests.walk\n"
         "print(*{'fastapi', 'starlette', 'uvicorn'} & set(sys.modules))"
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cli.jobs.event_stream import Event, read_events
+from gaitswarm.jobs.event_stream import Event, read_events
 
 
 def test_an_event_has_the_name_and_the_data_of_its_lines() -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.identification_spec import IdentificationSpec
-from services.optimizer.job import JobState
-from services.optimizer.judgement import Judgement
-from services.optimizer.optimizers.pso import PsoSettings
+from services.optimizer.jobs.identification import IdentificationSpec
+from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.spec import Judgement
+from services.optimizer.search.pso import PsoSettings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore, open_store
 from services.runtime import open_evaluator, run_embedded
@@ -106,11 +106,11 @@ def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: SqlStore, twi
         store.job(finished(store, spec(recording, seed=seed, name=f"run {seed}", **brief)))
         for seed in (1, 2)
     ]
-    found = service.convergence(jobs)
+    found = service.identifiability(jobs)
     assert [p.variable.name for p in found.parameters] == list(VARIABLES)
     assert found.fitness == tuple(job.progress.best_fitness for job in jobs)
     assert all(p.trust is not None and len(p.intervals) == 12 for p in found.parameters)
-    assert service.convergence(jobs[:1]).parameters[0].trust is None
+    assert service.identifiability(jobs[:1]).parameters[0].trust is None
 
 
 def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin) -> None:
@@ -118,10 +118,10 @@ def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin
     first, _ = service.submit(spec(recording))
     other, _ = service.submit(spec(recording, links=(1,), seed=2))
     with pytest.raises(InvalidRequest, match="another problem") as refused:
-        service.convergence([first, other])
+        service.identifiability([first, other])
     assert refused.value.field == "also"
     with pytest.raises(Conflict, match="no design yet"):
-        service.convergence([first])
+        service.identifiability([first])
 
 
 def test_a_run_is_no_evidence_for_itself(store: SqlStore, twin: Twin) -> None:
@@ -130,7 +130,7 @@ def test_a_run_is_no_evidence_for_itself(store: SqlStore, twin: Twin) -> None:
     again, _ = service.submit(spec(recording, iterations=20))
     for other in (first, again):
         with pytest.raises(InvalidRequest, match="has the seed of job") as refused:
-            service.convergence([first, other])
+            service.identifiability([first, other])
         assert refused.value.field == "also"
 
 

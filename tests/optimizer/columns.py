@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.evaluation_columns import EvaluationColumns
-from services.optimizer.preference import Preference, judge
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.preference import Preference, judge
 from sim.outcome import Status
 
 

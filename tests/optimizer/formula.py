@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from services.optimizer.evaluator import EvaluationRequest, EvaluationStopped
-from services.optimizer.job import Job, JobState
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.jobs.job import Job, JobState
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from sim.outcome import Outcome, Status
 
 SPEC = JobSpec.model_validate(
@@ -33,8 +33,8 @@ def job(spec: JobSpec = SPEC, state: JobState = JobState.RUNNING) -> Job:
 def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:
     """Objectives that depend on every variable and scenario; one design in seven falls."""
     outcomes = []
-    for trial in request.trials:
-        scenario = trial.scenario
+    for case in request.cases:
+        scenario = case.scenario
         scale = scenario.cycle_time + scenario.slope + np.arange(1.0, 7.0)
         objectives = np.abs(request.designs.sum(axis=1, keepdims=True) - 0.7) * scale + 0.01
         statuses = np.full(len(request.designs), Status.OK, dtype=np.uint8)

@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from services.optimizer.backoff import Backoff
-from services.optimizer.coordinator import (
+from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, JobState
+from services.optimizer.jobs.spec import judge_outcomes
+from services.optimizer.run.coordinator import Backoff, Coordination, Phase, handle
+from services.optimizer.run.events import (
     Action,
     Begin,
     Claimed,
     Commit,
     Committed,
-    Coordination,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -22,15 +23,11 @@ from services.optimizer.coordinator import (
     Event,
     LeaseWasLost,
     PauseSeen,
-    Phase,
     Release,
     StopRequested,
     Wait,
     Waited,
-    handle,
 )
-from services.optimizer.job import Ask, Claim, CompletedIteration, JobState
-from services.optimizer.spec import judge_outcomes
 from tests.optimizer.formula import SPEC, job, walk
 
 
@@ -109,7 +106,7 @@ def test_the_ask_is_stored_before_it_is_sent_out() -> None:
     np.testing.assert_array_equal(
         sent.request.designs, SPEC.design_space().designs(first.ask.positions)
     )
-    assert sent.request.trials == SPEC.trials({})
+    assert sent.request.cases == SPEC.cases({})
 
 
 @pytest.mark.parametrize("crash_before", range(2 * SPEC.iterations + 1))

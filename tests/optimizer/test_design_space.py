@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.design_space import DesignSpace
+from services.optimizer.jobs.design_space import DesignSpace
 from sim.variables import Variable
 
 GAIN = Variable(name="gain", low=0.0, high=2.0, unit="1")

@@ -9,9 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.optimizer.design_space import DesignSpace
-from services.optimizer.distribution import QUANTILES, distribution, finite_quantiles
-from services.optimizer.thinning import thinned
+from services.optimizer.analysis.distribution import (
+    QUANTILES,
+    distribution,
+    finite_quantiles,
+    thinned,
+)
+from services.optimizer.jobs.design_space import DesignSpace
 from sim.variables import Variable
 from tests.optimizer.columns import columns_of, fitness_only
 

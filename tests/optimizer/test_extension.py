@@ -8,17 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.coordinator import (
-    Claimed,
-    Commit,
-    Coordination,
-    Evaluate,
-    Evaluated,
-    Extended,
-    handle,
-)
 from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.job import (
+from services.optimizer.jobs.job import (
     LARGEST_BUDGET,
     Claim,
     Command,
@@ -27,7 +18,9 @@ from services.optimizer.job import (
     JobState,
     extended,
 )
-from services.optimizer.run_claim import OnCommit, Surroundings, run_claim
+from services.optimizer.run.coordinator import Coordination, handle
+from services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
+from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
 from tests.optimizer.formula import SPEC, FormulaEvaluator, job, walk

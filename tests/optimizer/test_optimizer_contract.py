@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.optimizers.base import Optimizer
-from services.optimizer.optimizers.registry import create_optimizer
+from services.optimizer.jobs.spec import create_optimizer
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.optimizer import Optimizer
 
 JOBS = {
     "pso, reflecting": {"name": "pso", "particles": 6, "bounds": "reflect"},

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.optimizer.design_space import DesignSpace
-from services.optimizer.optimizers.pso import ParticleSwarm, PsoSettings, absorb, reflect
-from services.optimizer.optimizers.random_stream import uniform
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.search.pso import ParticleSwarm, PsoSettings, absorb, reflect
+from services.optimizer.search.random_stream import uniform
 from sim.variables import Variable
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from services.optimizer.preference import PREFERENCES, Preference, judge, log_utilities
-from services.optimizer.single_scenario_fitness import general_fitness, single_scenario_fitness
+from services.optimizer.jobs.preference import PREFERENCES, Preference, judge, log_utilities
 from sim.outcome import Outcome, Status
 
 TABLE_3_6 = (8.71, 1.77, 16.09, 41.96)
@@ -112,16 +111,3 @@ def test_a_preference_that_cannot_rank_is_refused(field: str, values: tuple[floa
     sound = {"bias": (0.0,) * 5, "exponent": (1.0,) * 5}
     with pytest.raises(ValidationError, match=field):
         Preference.model_validate(sound | {field: values})
-
-
-def test_single_scenario_fitness_matches_the_published_row() -> None:
-    row = np.array([*TABLE_3_6, 1.0 / SPEED, HEIGHT_LOSS])
-    assert single_scenario_fitness(row) == pytest.approx(6.92, abs=0.005)
-
-
-def test_single_scenario_fitness_is_a_case_of_the_general_form() -> None:
-    row = (*TABLE_3_6, 1.0 / SPEED, HEIGHT_LOSS)
-    general = 1e5 * general_fitness(
-        (*TABLE_3_6, SPEED, abs(HEIGHT_LOSS)), (0.0,) * 5 + (0.03,), (-1.0,) * 4 + (2.0, -1.0)
-    )
-    assert general == pytest.approx(float(single_scenario_fitness(np.array(row))), rel=1e-12)

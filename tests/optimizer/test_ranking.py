@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
-from services.optimizer.fast_preference import fitness_of, log_utilities, utilities
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.preference import PREFERENCES, Preference, judge
-from services.optimizer.ranking import best_so_far, rank
+from services.optimizer.analysis.ranking import best_so_far, rank
+from services.optimizer.analysis.utilities import fitness_of, log_utilities, utilities
+from services.optimizer.jobs.preference import PREFERENCES, Preference, judge
+from services.optimizer.jobs.tuning import JobSpec
 from sim.outcome import Status
 from tests.optimizer.columns import columns_of, fitness_only
 

@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.optimizer.backoff import Backoff
 from services.optimizer.errors import Conflict, EvaluatorUnavailable
-from services.optimizer.job import Command, CompletedIteration, Job, JobState
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.run_claim import Surroundings, run_claim
-from services.optimizer.runner import Runner
+from services.optimizer.jobs.job import Command, CompletedIteration, Job, JobState
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.run.coordinator import Backoff
+from services.optimizer.run.runner import Runner, Surroundings, run_claim
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
 from services.runtime import run_embedded

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.evaluator import Evaluator
-from services.optimizer.job import JobState
-from services.optimizer.job_spec import JobSpec
-from services.optimizer.runner import Runner
+from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.run.runner import Runner
 from services.optimizer.store.base import Store
 from services.runtime import open_evaluator, open_store, run_embedded
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.job import JobState
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.tuning import JobSpec
 from services.runtime import open_store
 
 pytestmark = pytest.mark.slow

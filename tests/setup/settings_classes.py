@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from api.settings import ApiSettings
-from cli.settings import CliSettings
+from gaitswarm.settings import CliSettings
 from services.__main__ import Settings as RunnerSettings
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from api.app import create_app
 from api.settings import ApiSettings
+from services.optimizer.jobs.documents import SPECS
 from services.optimizer.service import JobService
-from services.optimizer.specs import SPECS
 from sim.scenario import SCENARIOS
 from tests.setup import command_line, settings_classes
 from tests.setup.documents import ROOT, blocks, documentation, shell_commands

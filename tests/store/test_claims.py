@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import LeaseLost
-from services.optimizer.job import Claim, Command, JobState
+from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from services.optimizer.analysis.history_cache import HistoryCache
 from services.optimizer.errors import Conflict, NotFound
-from services.optimizer.evaluation_columns import EvaluationColumns
-from services.optimizer.history_cache import HistoryCache
-from services.optimizer.job import Claim, CompletedIteration
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Claim, CompletedIteration
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome, Status
 from tests.store.examples import LEASE, ask, begun, completed, spec

@@ -11,7 +11,7 @@ from alembic.config import Config
 from sqlalchemy import text
 
 from services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, NotFound
-from services.optimizer.job import Command, JobState
+from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.store import migrate
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from services.optimizer.job import Claim, JobState
+from services.optimizer.jobs.job import Claim, JobState
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Status

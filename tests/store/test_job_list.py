@@ -7,7 +7,7 @@ from datetime import UTC
 import pytest
 
 from services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
-from services.optimizer.job import Command, Job, JobOrder, JobState
+from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, completed, spec
 

@@ -16,7 +16,7 @@ import pytest
 from sqlalchemy import text
 
 from services.optimizer.errors import Conflict
-from services.optimizer.job import Claim, Command, Job, JobState
+from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import LEASE, Clock, ask, spec

@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.estimate import Estimate, estimate
-from services.optimizer.job import Job, JobState, Progress
-from services.optimizer.job_spec import JobSpec
+from services.optimizer.jobs.job import Job, JobState, Progress, TimeLeft, time_left
+from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 from tests.store.examples import spec
@@ -27,43 +26,43 @@ def job(state: JobState, *, iterations: int, seconds: float = 8.0) -> Job:
 
 
 def test_the_rest_takes_as_long_as_what_was_done() -> None:
-    found = estimate(job(JobState.RUNNING, iterations=4), NOW)
-    assert found == Estimate(12.0, 2.5, 5.0)
+    found = time_left(job(JobState.RUNNING, iterations=4), NOW)
+    assert found == TimeLeft(12.0, 2.5, 5.0)
 
 
 def test_the_iteration_under_way_counts_for_the_time_it_has_run() -> None:
     running = job(JobState.RUNNING, iterations=4)
-    assert estimate(running, NOW + timedelta(seconds=1.5)).eta_seconds == 10.5
+    assert time_left(running, NOW + timedelta(seconds=1.5)).eta_seconds == 10.5
 
 
 def test_a_late_iteration_counts_for_no_more_than_one() -> None:
     running = job(JobState.RUNNING, iterations=4)
-    assert estimate(running, NOW + timedelta(hours=1)).eta_seconds == 10.0
-    assert estimate(replace(running, progress=Progress(10, 50, compute_seconds=8.0)), NOW) == (
-        Estimate(0.0, 6.25, 12.5)
+    assert time_left(running, NOW + timedelta(hours=1)).eta_seconds == 10.0
+    assert time_left(replace(running, progress=Progress(10, 50, compute_seconds=8.0)), NOW) == (
+        TimeLeft(0.0, 6.25, 12.5)
     )
 
 
 def test_a_clock_that_lags_behind_the_database_adds_nothing() -> None:
     running = job(JobState.RUNNING, iterations=4)
-    assert estimate(running, NOW - timedelta(hours=1)).eta_seconds == 12.0
+    assert time_left(running, NOW - timedelta(hours=1)).eta_seconds == 12.0
 
 
 @pytest.mark.parametrize(
     "state", [s for s in JobState if s not in (JobState.RUNNING, JobState.SUCCEEDED)]
 )
 def test_a_job_that_does_not_run_has_rates_but_no_end(state: JobState) -> None:
-    assert estimate(job(state, iterations=4), NOW) == Estimate(None, 2.5, 5.0)
+    assert time_left(job(state, iterations=4), NOW) == TimeLeft(None, 2.5, 5.0)
 
 
 def test_a_finished_job_has_no_time_left() -> None:
-    assert estimate(job(JobState.SUCCEEDED, iterations=10), NOW).eta_seconds == 0.0
+    assert time_left(job(JobState.SUCCEEDED, iterations=10), NOW).eta_seconds == 0.0
 
 
 @pytest.mark.parametrize(("iterations", "seconds"), [(0, 0.0), (3, 0.0)])
 def test_before_anything_was_measured_nothing_is_estimated(iterations: int, seconds: float) -> None:
     running = job(JobState.RUNNING, iterations=iterations, seconds=seconds)
-    assert estimate(running, NOW) == Estimate(None, None, None)
+    assert time_left(running, NOW) == TimeLeft(None, None, None)
 
 
 HIGH_LEGS = {"name": "mine", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "stride": 0.5}

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from services.optimizer.evaluator import Evaluator
+from services.optimizer.run.evaluator import Evaluator
 from services.worker.in_process import InProcessEvaluator
 from services.worker.ray_evaluator import RayEvaluator
 

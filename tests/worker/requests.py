@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.optimizer.evaluator import EvaluationRequest
+from services.optimizer.run.evaluator import EvaluationRequest
+from sim.case import Walk
 from sim.outcome import Outcome
 from sim.scenario import Scenario
 from sim.simulate import simulate
-from sim.trial import Walk
 
 SCENARIOS = (
     Scenario(name="level", cycle_time=1.0, radius=0.16, withers=0.15, cycles=1),
@@ -20,15 +20,15 @@ def request(
     count: int, *, job_id: str = "job", scenarios: tuple[Scenario, ...] = SCENARIOS, seed: int = 1
 ) -> EvaluationRequest:
     gains = np.random.default_rng(seed).uniform((0.1, 0.0), (0.5, 0.5), (count, 2))
-    trials = tuple(Walk("szabadka2", "pi", scenario, ("P", "I")) for scenario in scenarios)
-    return EvaluationRequest(job_id, trials, gains)
+    cases = tuple(Walk("szabadka2", "pi", scenario, ("P", "I")) for scenario in scenarios)
+    return EvaluationRequest(job_id, cases, gains)
 
 
 def walked_at_once(wanted: EvaluationRequest) -> tuple[Outcome, ...]:
     """The same walks without any evaluator: one batch per scenario."""
     return tuple(
-        simulate(trial.scenario, trial.controller, trial.variables, wanted.designs).outcome
-        for trial in wanted.trials
+        simulate(case.scenario, case.controller, case.variables, wanted.designs).outcome
+        for case in wanted.cases
     )
 
 

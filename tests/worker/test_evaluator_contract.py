@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.evaluator import EvaluationStopped, Evaluator
+from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from services.worker.in_process import InProcessEvaluator
 from sim.errors import SimulationInputError
 from sim.outcome import Outcome

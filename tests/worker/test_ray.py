@@ -19,7 +19,7 @@ import pytest
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.worker.ray_evaluator import RayEvaluator
-from services.worker.task import transportable
+from services.worker.tasks import transportable
 from sim.errors import SimulationError, SimulationInputError, UnreachablePose
 from tests.worker.processes import Process, descendants, walkers
 from tests.worker.requests import bits, request

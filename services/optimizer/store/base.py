@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from services.optimizer.evaluation_columns import EvaluationColumns
-from services.optimizer.job import (
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import (
     Ask,
     Claim,
     Command,
@@ -18,7 +18,7 @@ from services.optimizer.job import (
     JobOrder,
     JobState,
 )
-from services.optimizer.spec import Spec
+from services.optimizer.jobs.spec import Spec
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 T = TypeVar("T")

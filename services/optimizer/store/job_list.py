@@ -1,4 +1,4 @@
-"""The job list in other orders than by time, and searched.
+"""The job list: its orders, its search, and the cursors of its pages.
 
 Names are compared in Python: case folding is then the same on every database, and right for more
 than ASCII. Of every job only what is compared is read, some microseconds each.
@@ -7,26 +7,76 @@ than ASCII. Of every job only what is compared is read, some microseconds each.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
-from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from datetime import UTC, datetime, timedelta
+from typing import Any, Final, NamedTuple
 
 from sqlalchemy import Connection, select
 
-from services.optimizer.errors import NotFound
-from services.optimizer.job import JobOrder, JobState
-from services.optimizer.store.cursors import (
-    from_cursor,
-    from_fitness_cursor,
-    from_name_cursor,
-    no_cursor,
-    to_cursor,
-    to_fitness_cursor,
-    to_name_cursor,
-)
-from services.optimizer.store.records import job_row
+from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.jobs.job import JobOrder, JobState
+from services.optimizer.store.records import ID_ALPHABET, job_row
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import jobs
+
+_CURSOR: Final = re.compile(rf"([0-9]{{1,18}})\.([{ID_ALPHABET}]{{12}})", re.ASCII)
+_FITNESS_CURSOR: Final = re.compile(rf"fitness:([0-9.e+-]*):([{ID_ALPHABET}]{{12}})", re.ASCII)
+_NAME_CURSOR: Final = re.compile(rf"name:([{ID_ALPHABET}]{{12}})", re.ASCII)
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def to_cursor(created_at: datetime, job_id: str) -> str:
+    """Place of a job in the list: microseconds since 1970, then the id among equals."""
+    return f"{(created_at - _EPOCH) // timedelta(microseconds=1)}.{job_id}"
+
+
+def from_cursor(text: str) -> tuple[datetime, str]:
+    """Inverse of `to_cursor`; InvalidRequest (field `after`) for anything else."""
+    match = _CURSOR.fullmatch(text)
+    try:
+        if match is not None:
+            return _EPOCH + timedelta(microseconds=int(match[1])), match[2]
+    except OverflowError:
+        pass
+    raise no_cursor()
+
+
+def to_fitness_cursor(fitness: float | None, job_id: str) -> str:
+    """Place of a job in the list by fitness; a job without one is among the last."""
+    return f"fitness:{'' if fitness is None else repr(fitness)}:{job_id}"
+
+
+def from_fitness_cursor(text: str) -> tuple[float | None, str]:
+    """Inverse of `to_fitness_cursor`; InvalidRequest (field `after`) for anything else."""
+    match = _FITNESS_CURSOR.fullmatch(text)
+    try:
+        if match is not None:
+            return float(match[1]) if match[1] else None, match[2]
+    except ValueError:
+        pass
+    raise no_cursor()
+
+
+def to_name_cursor(job_id: str) -> str:
+    """Place of a job in the list by name; a name may be long, and never changes."""
+    return f"name:{job_id}"
+
+
+def from_name_cursor(text: str) -> str:
+    """Inverse of `to_name_cursor`; InvalidRequest (field `after`) for anything else."""
+    match = _NAME_CURSOR.fullmatch(text)
+    if match is None:
+        raise no_cursor()
+    return match[1]
+
+
+def no_cursor() -> InvalidRequest:
+    """For whoever passes what no page ended with."""
+    return InvalidRequest(
+        "not a cursor of the job list in this order; pass the `next` of the page before",
+        field="after",
+    )
 
 
 class _Entry(NamedTuple):

@@ -1,23 +1,27 @@
-"""Single statements on jobs and iterations, inside a transaction that someone else began."""
+"""Single statements on jobs and iterations, inside a transaction that someone else began:
+rows, who holds a job, and what a transition sets.
+"""
 
 from __future__ import annotations
 
 import math
+import re
+import secrets
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import ColumnElement, Connection, Select, and_, insert, or_, select, update
 
-from services.optimizer.errors import Conflict, NotFound
-from services.optimizer.job import Answered, Ask, CompletedIteration, Job, JobState
-from services.optimizer.spec import Spec
-from services.optimizer.specs import AnySpec
-from services.optimizer.store.cursors import is_job_id, new_job_id
+from services.optimizer.errors import Conflict, LeaseLost, NotFound
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.job import Answered, Ask, Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
+    best_particle,
     evaluation_rows,
     iteration_summary,
     spec_document,
@@ -26,6 +30,20 @@ from services.optimizer.store.rows import (
     to_job,
 )
 from services.optimizer.store.tables import evaluations, iterations, jobs
+
+# No vowels, no look-alikes: an id is read aloud, and it spells no word.
+ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
+_ID: Final = re.compile(rf"[{ID_ALPHABET}]{{12}}")
+
+
+def new_job_id() -> str:
+    """Twelve characters, 57 random bits: unique among any number of stores that are merged."""
+    return "".join(secrets.choice(ID_ALPHABET) for _ in range(12))
+
+
+def is_job_id(text: str) -> bool:
+    """Whether it can be the id of a job at all; databases choke on some other strings."""
+    return _ID.fullmatch(text) is not None
 
 
 def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
@@ -141,3 +159,94 @@ def complete_iteration(
             f" {job['iterations']}"
         )
     connection.execute(insert(evaluations), evaluation_rows(job["id"], done))
+
+
+def entering(state: JobState, now: datetime) -> dict[str, Any]:
+    """Columns that follow from a state; only a job under way keeps its lease.
+
+    The token stays in any case, so that the next one is higher.
+    """
+    columns: dict[str, Any] = {
+        "state": state,
+        "updated_at": now,
+        "finished_at": now if state.terminal else None,
+    }
+    if state not in (JobState.RUNNING, JobState.PAUSING):
+        columns |= {"lease_owner": None, "lease_expires_at": None}
+    return columns
+
+
+def state_after_commit(state: JobState, following: Ask | None) -> JobState:
+    """The end of the budget wins over a pause that was asked for in the last iteration."""
+    if following is None:
+        return JobState.SUCCEEDED
+    return JobState.PAUSED if state is JobState.PAUSING else state
+
+
+def state_after_release(state: JobState, wanted: JobState) -> JobState:
+    """A job that was to pause is not queued again by a runner that shuts down."""
+    if wanted is JobState.QUEUED and state is JobState.PAUSING:
+        return JobState.PAUSED
+    return wanted
+
+
+def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
+    """Progress with one more iteration; only a strictly lower fitness is a new best."""
+    columns: dict[str, Any] = {
+        "iterations": done.iteration + 1,
+        "evaluations": job["evaluations"] + len(done.fitness),
+        "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
+    }
+    particle = best_particle(done.fitness)
+    if particle is not None:
+        fitness = float(done.fitness[particle])
+        if job["best_fitness"] is None or fitness < job["best_fitness"]:
+            columns |= {
+                "best_fitness": fitness,
+                "best_iteration": done.iteration,
+                "best_particle": particle,
+            }
+    return columns
+
+
+def held(connection: Connection, claim: Claim) -> Row:
+    """The locked row of a claimed job; LeaseLost unless the claim is still the job's.
+
+    A lease that ran out but that nobody has taken is still the claim's: the token decides.
+    """
+    row = job_row(connection, claim.job.id, lock=True)
+    if row["lease_token"] == claim.token and row["lease_owner"] == claim.runner:
+        return row
+    owner = row["lease_owner"]
+    now = f"held by {owner}" if owner is not None else f"{row['state']} and held by nobody"
+    raise LeaseLost(f"{claim.runner} has lost job {claim.job.id}: it is {now}")
+
+
+def lease_is_live(row: Row, now: datetime) -> bool:
+    """Whether a runner has the job and has been heard of lately."""
+    expires = row["lease_expires_at"]
+    return expires is not None and expires > now
+
+
+def claimable(now: datetime, job_id: str | None) -> Select[*tuple[Any, ...]]:
+    """The oldest job waiting for a runner, or whose runner has gone; locked when it is selected.
+
+    Runners that look at the same time pass over each other's candidates; only a runner that wants
+    one certain job waits for it.
+    """
+    query = (
+        select(jobs)
+        .where(or_(jobs.c.state == JobState.QUEUED, _abandoned(now)))
+        .order_by(jobs.c.created_at, jobs.c.id)
+        .limit(1)
+    )
+    if job_id is None:
+        return query.with_for_update(skip_locked=True)
+    return query.where(jobs.c.id == job_id).with_for_update()
+
+
+def _abandoned(now: datetime) -> ColumnElement[bool]:
+    return and_(
+        jobs.c.state.in_((JobState.RUNNING, JobState.PAUSING)),
+        or_(jobs.c.lease_expires_at.is_(None), jobs.c.lease_expires_at <= now),
+    )

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from services.optimizer.errors import StoreUnavailable
-from services.optimizer.job import (
+from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.job import (
     Ask,
     CompletedIteration,
     Evaluation,
@@ -24,8 +25,7 @@ from services.optimizer.job import (
     JobState,
     Progress,
 )
-from services.optimizer.spec import Spec
-from services.optimizer.specs import SPECS, AnySpec
+from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.tables import iterations
 from sim.outcome import Status
 
@@ -150,7 +150,7 @@ def to_evaluation(row: Row) -> Evaluation:
 
 def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any]]:
     """One row of `evaluations` per particle."""
-    # (K, n, m) and (K, n), by trial, are turned to one (K, m) and (K,) per particle.
+    # (K, n, m) and (K, n), by case, are turned to one (K, m) and (K,) per particle.
     objectives = np.stack([outcome.objectives for outcome in done.outcomes], axis=1)
     statuses = np.stack([outcome.statuses for outcome in done.outcomes], axis=1)
     return [
@@ -159,11 +159,11 @@ def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any
             "iteration": done.iteration,
             "particle": particle,
             "design": design,
-            "objectives": [_numbers(trial) for trial in by_trial],
+            "objectives": [_numbers(case) for case in by_case],
             "statuses": [Status(status).label for status in labels],
             "fitness": _number(fitness),
         }
-        for particle, (design, by_trial, labels, fitness) in enumerate(
+        for particle, (design, by_case, labels, fitness) in enumerate(
             zip(
                 done.designs.tolist(),
                 objectives.tolist(),

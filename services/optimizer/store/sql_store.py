@@ -10,8 +10,8 @@ from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import BudgetChanged, IdempotencyConflict, InvalidRequest, NotFound
-from services.optimizer.evaluation_columns import EvaluationColumns
-from services.optimizer.job import (
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import (
     Ask,
     Claim,
     Command,
@@ -24,13 +24,11 @@ from services.optimizer.job import (
     commanded,
     extended,
 )
-from services.optimizer.spec import Spec
+from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.base import Page
-from services.optimizer.store.cursors import from_cursor, to_cursor
+from services.optimizer.store.columns import select_columns
 from services.optimizer.store.engine import Database, connect, parse_url
-from services.optimizer.store.evaluation_columns import select_columns
-from services.optimizer.store.job_list import cursor_of, job_rows, sort_jobs
-from services.optimizer.store.leases import claimable, held, lease_is_live
+from services.optimizer.store.job_list import cursor_of, from_cursor, job_rows, sort_jobs, to_cursor
 from services.optimizer.store.migrate import check_revision, migrate
 from services.optimizer.store.recordings import (
     insert_recording,
@@ -39,22 +37,23 @@ from services.optimizer.store.recordings import (
 )
 from services.optimizer.store.records import (
     answered_ask,
+    claimable,
     complete_iteration,
+    entering,
+    held,
     insert_ask,
     insert_job,
     job_of_key,
     job_row,
+    lease_is_live,
     outstanding_ask,
+    progress_after,
+    state_after_commit,
+    state_after_release,
     update_job,
 )
 from services.optimizer.store.rows import LISTED, budget, to_evaluation, to_iteration, to_job
 from services.optimizer.store.tables import evaluations, iterations, jobs
-from services.optimizer.store.transitions import (
-    entering,
-    progress_after,
-    state_after_commit,
-    state_after_release,
-)
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _LARGEST_INDEX: Final = 2**31 - 1

@@ -28,7 +28,7 @@ export type Objective = Schemas['ObjectiveView']
 export type IdentificationSpec = Schemas['IdentificationSpec']
 /** A spec of any kind. */
 export type AnySpec = JobSpec | IdentificationSpec
-export type Convergence = Schemas['ConvergenceView']
+export type Convergence = Schemas['IdentifiabilityView']
 export type FittedParameter = Schemas['ParameterView']
 export type RecordedWalk = Schemas['RecordedWalk']
-export type Estimate = Schemas['CostView']
+export type Estimate = Schemas['EstimateView']

@@ -18,7 +18,7 @@ export function fitnessUnit({
 }
 
 /** What the parts of a fitness are called. */
-export interface TrialWords {
+export interface CaseWords {
   /** One walk of which several are judged, and several. */
   readonly one: string
   readonly many: string
@@ -26,7 +26,7 @@ export interface TrialWords {
   readonly worth: string
 }
 
-export function trialWords(kind: Job['kind']): TrialWords {
+export function caseWords(kind: Job['kind']): CaseWords {
   return kind === 'tuning'
     ? { one: 'scenario', many: 'scenarios', worth: 'utility' }
     : { one: 'recording', many: 'recordings', worth: 'error' }

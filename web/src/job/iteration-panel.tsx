@@ -8,7 +8,7 @@ import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { jobPath, withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
-import { fitnessUnit, trialWords } from './fitness'
+import { caseWords, fitnessUnit } from './fitness'
 
 export function IterationPanel({ job, index }: { job: Job; index: number }) {
   const evaluations = useResource(`${job.id} ${index}`, (signal) =>
@@ -91,7 +91,7 @@ function columns(job: Job): readonly Column<Evaluation>[] {
     ...scenarioNames(job).map(
       (scenario): Column<Evaluation> => ({
         key: `utility ${scenario}`,
-        label: `${trialWords(job.kind).worth} ${scenario}`,
+        label: `${caseWords(job.kind).worth} ${scenario}`,
         unit,
         numeric: true,
         value: (e) => e.scenarios[scenario]?.utility ?? null,

@@ -10,7 +10,7 @@ import { formatNumber } from '../format/number'
 /** A recording in short; its currents are many. */
 export interface RecordingSummary {
   /** As results name it: the beginning of its id. */
-  readonly trial: string
+  readonly caseName: string
   readonly scenario: string
   readonly controller: string
   /** Time that is compared [s]. */
@@ -38,16 +38,19 @@ export function useRecordings(job: Job): Resource<readonly RecordingSummary[]> {
   )
 }
 
-/** What a trial is called: a recording also by the scenario that was walked. */
-export function trialLabel(trial: string, recordings: readonly RecordingSummary[] | null): string {
-  const found = recordings?.find((recording) => recording.trial === trial)
-  return found ? `${found.scenario} (${trial})` : trial
+/** What a case is called: a recording also by the scenario that was walked. */
+export function caseLabel(
+  caseName: string,
+  recordings: readonly RecordingSummary[] | null,
+): string {
+  const found = recordings?.find((recording) => recording.caseName === caseName)
+  return found ? `${found.scenario} (${caseName})` : caseName
 }
 
-function summaryOf(trial: string, { scenario, controller, current, synthetic }: RecordedWalk) {
+function summaryOf(caseName: string, { scenario, controller, current, synthetic }: RecordedWalk) {
   const numbers = current.flat()
   return {
-    trial,
+    caseName,
     scenario: scenario.name,
     controller,
     seconds: current.length / RATE,
@@ -76,9 +79,9 @@ export function RecordingsCard({
         <Table
           caption="Recordings"
           rows={recordings.data}
-          rowKey={({ trial }) => trial}
+          rowKey={({ caseName }) => caseName}
           columns={[
-            { key: 'trial', label: 'Recording', header: true, value: (r) => r.trial },
+            { key: 'case', label: 'Recording', header: true, value: (r) => r.caseName },
             { key: 'scenario', label: 'Scenario', value: (r) => r.scenario },
             { key: 'controller', label: 'Controller', minor: true, value: (r) => r.controller },
             {

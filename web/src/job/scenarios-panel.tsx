@@ -7,10 +7,10 @@ import { change, formatNumber } from '../format/number'
 import { capitalized, inWords } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
 import { withQuery } from '../router/routes'
-import { fitnessUnit, trialWords } from './fitness'
+import { caseWords, fitnessUnit } from './fitness'
 import { ObjectiveNotes } from './objective-notes'
 import { utilityOf } from './preference'
-import { type RecordingSummary, RecordingsCard, trialLabel, useRecordings } from './recordings'
+import { caseLabel, type RecordingSummary, RecordingsCard, useRecordings } from './recordings'
 import { type Reference, ReferencePicker, useReference } from './reference'
 import { UtilityBars } from './utility-bars'
 
@@ -31,7 +31,7 @@ export function ScenariosPanel({ job }: { job: Job }) {
   const reference = useReference(job, choice)
   const recordings = useRecordings(job)
   const isFit = job.kind === 'identification'
-  const words = trialWords(job.kind)
+  const words = caseWords(job.kind)
   if (!job.best) {
     return (
       <section class="card">
@@ -97,14 +97,14 @@ function rowsOf(
     const other = reference?.scenarios[scenario] ?? null
     // Another job may have another preference: its utilities are not to be compared, its objectives are.
     const otherUtility = other && (preference ? utilityOf(other, preference) : other.utility)
-    const label = trialLabel(scenario, recordings)
+    const label = caseLabel(scenario, recordings)
     return { scenario, label, own, other, utility: own.utility, otherUtility }
   })
 }
 
 /** Fitness of both over the scenarios that both have walked in. */
 function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: string }) {
-  const words = trialWords(job.kind)
+  const words = caseWords(job.kind)
   const both = rows.filter((row) => row.utility !== null && row.otherUtility !== null)
   if (both.length === 0)
     return (
@@ -147,7 +147,7 @@ function UtilityTable({
   reference: Reference | null
 }) {
   const unit = fitnessUnit(job)
-  const words = trialWords(job.kind)
+  const words = caseWords(job.kind)
   const columns: Column<Row>[] = [
     {
       key: 'scenario',
@@ -191,7 +191,7 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
   return [
     {
       key: 'scenario',
-      label: capitalized(trialWords(job.kind).one),
+      label: capitalized(caseWords(job.kind).one),
       header: true,
       value: (row) => row.label,
       cell: (row) =>

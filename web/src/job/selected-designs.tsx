@@ -4,7 +4,7 @@ import type { Job } from '../api/types'
 import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { jobPath, withQuery } from '../router/routes'
-import { trialWords } from './fitness'
+import { caseWords } from './fitness'
 import { columnNamed, type Particles } from './particles'
 
 const DIGITS: Readonly<Record<string, number>> = { integer: 1, continuous: 4 }
@@ -39,7 +39,7 @@ export function SelectedDesigns({
         ...numbers.map(
           (column): Column<number> => ({
             key: column.name,
-            label: column.name.replace(/^utility:/, `${trialWords(job.kind).worth} `),
+            label: column.name.replace(/^utility:/, `${caseWords(job.kind).worth} `),
             unit: column.unit,
             numeric: true,
             value: (row) => (Number.isNaN(column.values[row]) ? null : column.values[row]),

@@ -4,7 +4,7 @@ import type { ComponentChildren } from 'preact'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { quantity } from '../format/number'
 import { capitalized } from '../format/words'
-import type { TrialWords } from './fitness'
+import type { CaseWords } from './fitness'
 
 interface Bar {
   readonly name: string
@@ -21,7 +21,7 @@ export function UtilityBars({
 }: {
   rows: readonly Bar[]
   unit: string
-  words: TrialWords
+  words: CaseWords
   /** Name of the reference; null if there is none. */
   label: string | null
   table: () => ComponentChildren

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { fitnessUnit, trialWords } from '../../src/job/fitness'
+import { caseWords, fitnessUnit } from '../../src/job/fitness'
 
 const currents = [{ name: 'current_link_1', unit: 'mA', description: 'error' }]
 
@@ -13,6 +13,6 @@ test('summaries, which have no objectives, have currents in ampere', () => {
 })
 
 test('what is judged is called by its name', () => {
-  expect(trialWords('tuning').many).toBe('scenarios')
-  expect(trialWords('identification').worth).toBe('error')
+  expect(caseWords('tuning').many).toBe('scenarios')
+  expect(caseWords('identification').worth).toBe('error')
 })

@@ -1,0 +1,68 @@
+"""One design walking to be looked at: what is asked, and how it is done. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from gaitswarm.requests.walk import WalkRequest, resolved
+from gaitswarm.views.replay import encoded_replay
+from sim.outcome import Status
+from sim.replay import CONTROL_RATE, replay
+from sim.robot import load_robot
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, ScenarioName
+from sim.simulate import simulate, with_gait
+
+
+class ReplayRequest(WalkRequest):
+    """One design and the walk in which to look at it."""
+
+    scenario: ScenarioName | Scenario = Field(
+        default="normal-fast",
+        description="Name or number of a preset (see /v1/scenarios), or your own.",
+        examples=["normal-fast"],
+    )
+    rate: float = Field(
+        default=50.0,
+        ge=1.0,
+        le=CONTROL_RATE,
+        description="Frames a second; each is the nearest tick of 2 ms, whose time is exact [Hz].",
+    )
+
+    @field_validator("scenario")
+    @classmethod
+    def _preset_exists(cls, entry: str | Scenario) -> str | Scenario:
+        resolved(entry)
+        return entry
+
+
+def run_replay(request: ReplayRequest) -> bytes:
+    """Let the design walk; see `encoded_replay`. A failed walk is shown up to its end.
+
+    Raises InvalidRequest that names the field for a design that cannot be compiled or a gait that
+    leaves the legs' reach.
+    """
+    scenario = resolved(request.scenario)
+    request.check_design()
+    request.check_reach(scenario, field="scenario")
+    robot = load_robot(request.robot)
+    walk = simulate(
+        scenario,
+        request.controller,
+        tuple(request.design),
+        np.array([tuple(request.design.values())], dtype=np.float64),
+        robot=robot,
+        log=True,
+    )
+    (log,) = walk.logs
+    if log is None:
+        raise AssertionError("a gait within reach is walked")
+    gait = {name: v for name, v in request.design.items() if name in GAIT_VARIABLE_NAMES}
+    return encoded_replay(
+        replay(robot, log, rate=request.rate, load=scenario.load),
+        robot,
+        with_gait(scenario, gait),
+        rate=request.rate,
+        status=Status(walk.outcome.statuses[0]),
+        objectives=walk.outcome.objectives[0],
+    )

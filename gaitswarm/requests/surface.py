@@ -1,0 +1,68 @@
+"""A fuzzy controller's surfaces on request. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from gaitswarm.requests.walk import PUBLISHED_DESIGN, check_names
+from gaitswarm.views.surface import SurfaceView
+from services.optimizer.errors import InvalidRequest
+from sim.controllers import CONTROLLERS, ControllerName, Inference
+from sim.controllers.surface import surface
+from sim.variables import VariableName
+
+
+class SurfaceRequest(BaseModel):
+    """One design of a fuzzy controller, and how finely to look at it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    design: dict[VariableName, FiniteFloat] = Field(
+        description="Value of each of the controller's variables; gait variables do not matter.",
+        examples=[PUBLISHED_DESIGN],
+    )
+    error_points: int = Field(
+        default=65, ge=3, le=129, description="Points of the grid over the error's range [1]."
+    )
+    current_points: int = Field(
+        default=33, ge=2, le=65, description="Points of the grid over the current's range [1]."
+    )
+    velocity_error: float = Field(
+        default=0.0,
+        ge=-1e7,
+        le=1e7,
+        description="At which the surfaces of fuzzy-pi-3 are drawn [counts/s].",
+    )
+
+
+def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceView:
+    """The surface of every output.
+
+    Raises InvalidRequest for a controller that is not fuzzy, or a design that it cannot have.
+    """
+    surfaces = [
+        surface(
+            inference,
+            error_points=request.error_points,
+            current_points=request.current_points,
+            velocity=request.velocity_error,
+        )
+        for inference in _inferences(controller, request.design)
+    ]
+    if not surfaces:
+        raise InvalidRequest(
+            f"{controller} has no fuzzy surface; choose a fuzzy controller", field="controller"
+        )
+    return SurfaceView.from_surfaces(controller, surfaces)
+
+
+def _inferences(controller: ControllerName, design: Mapping[str, float]) -> tuple[Inference, ...]:
+    try:
+        inferences = CONTROLLERS[controller].inferences(design)
+        if inferences:
+            check_names(controller, design)
+    except ValueError as error:
+        raise InvalidRequest(str(error).removeprefix("design: "), field="design") from error
+    return inferences

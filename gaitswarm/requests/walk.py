@@ -1,0 +1,163 @@
+"""One design walking on request: what is asked, and how it is done. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
+
+from gaitswarm.views import SimulationView
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.errors import SimulationInputError
+from sim.robot import RobotSource
+from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioName, find_scenario
+from sim.simulate import Backend, check_reach, simulate
+from sim.variables import VariableName
+
+PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
+
+
+class WalkRequest(BaseModel):
+    """One design, and the robot that it drives."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    robot: RobotSource = Field(
+        default="szabadka2",
+        description="Robot to simulate, by name, or a variant with another law of friction or with"
+        " gearlash, or the text of the files of your own.",
+    )
+    controller: ControllerName = Field(
+        default="fuzzy-pi", description="Motor controller that drives it; see /v1/controllers."
+    )
+    design: dict[VariableName, FiniteFloat] = Field(
+        description="Value of each of the controller's variables, and of any gait variable, which"
+        " then replaces the scenario's value; names and units as in /v1/controllers.",
+        examples=[PUBLISHED_DESIGN],
+    )
+
+    @model_validator(mode="after")
+    def _design_fits(self) -> Self:
+        check_names(self.controller, self.design)
+        return self
+
+    def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
+        """Length of all walks together [s], the measure of what the request costs."""
+        cycle_time = self.design.get("cycle_time")
+        return sum(
+            scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
+            for scenario in scenarios
+        )
+
+    def check_design(self) -> None:
+        """Raise InvalidRequest for values that the controller cannot have."""
+        try:
+            CONTROLLERS[self.controller].compile(self.design)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field="design") from error
+
+    def check_reach(self, scenario: Scenario, *, field: str) -> None:
+        """Raise InvalidRequest of `field` for a gait that leaves the legs' reach."""
+        names, values = tuple(self.design), tuple(self.design.values())
+        try:
+            check_reach(scenario, names, values, robot=self.robot)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field=field) from error
+
+
+def check_names(controller: ControllerName, design: Mapping[str, float]) -> None:
+    """Raise ValueError for a variable that the controller and the gait don't know, or lack."""
+    needed = [variable.name for variable in CONTROLLERS[controller].variables]
+    for name in design:
+        if name not in needed and name not in GAIT_VARIABLE_NAMES:
+            known = ", ".join([*needed, *sorted(GAIT_VARIABLE_NAMES)])
+            raise ValueError(f"design: unknown variable {name!r}; known are {known}")
+    missing = [name for name in needed if name not in design]
+    if missing:
+        raise ValueError(f"design: {', '.join(missing)} missing; {controller} needs it")
+
+
+def resolved(entry: ScenarioName | Scenario) -> Scenario:
+    """The scenario in full, a preset looked up."""
+    return find_scenario(entry) if isinstance(entry, str) else entry
+
+
+class SimulationRequest(WalkRequest):
+    """One design and the walks in which to try it."""
+
+    scenarios: tuple[ScenarioName | Scenario, ...] = Field(
+        default=tuple(scenario.name for scenario in SCENARIOS),
+        min_length=1,
+        max_length=32,
+        description="Walks: names or numbers of presets (see /v1/scenarios), or your own.",
+        examples=[["normal-fast", "2"]],
+    )
+    preference: PreferenceName | Preference = Field(
+        default="A", description="How objectives are weighed: A, B, C of table 4.5, or your own."
+    )
+    log: bool = Field(
+        default=False, description="Whether to return the 500 Hz log of every walk; it is large."
+    )
+
+    @field_validator("scenarios")
+    @classmethod
+    def _presets_exist(cls, entries: tuple[str | Scenario, ...]) -> tuple[str | Scenario, ...]:
+        for entry in entries:
+            if isinstance(entry, str):
+                find_scenario(entry)
+        return entries
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> Self:
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"scenarios: {name!r} is named twice")
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios in full, presets looked up."""
+        return tuple(map(resolved, self.scenarios))
+
+    def resolved_preference(self) -> Preference:
+        """The preference in full."""
+        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
+
+
+def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> SimulationView:
+    """Let the design walk in every scenario.
+
+    Raises InvalidRequest that names the field for a design that cannot be compiled or a gait that
+    leaves the legs' reach.
+    """
+    scenarios = request.resolved_scenarios()
+    # All walks are checked before the first is run.
+    request.check_design()
+    for index, scenario in enumerate(scenarios):
+        request.check_reach(scenario, field=f"scenarios.{index}")
+    walks = [
+        simulate(
+            scenario,
+            request.controller,
+            tuple(request.design),
+            np.array([tuple(request.design.values())], dtype=np.float64),
+            robot=request.robot,
+            log=request.log,
+            backend=backend,
+        )
+        for scenario in scenarios
+    ]
+    return SimulationView.from_walks(
+        robot=request.robot,
+        controller=request.controller,
+        design=request.design,
+        preference=request.resolved_preference(),
+        names=[scenario.name for scenario in scenarios],
+        statuses=np.concatenate([walk.outcome.statuses for walk in walks]),
+        objectives=np.concatenate([walk.outcome.objectives for walk in walks]),
+        logs=[log for walk in walks for log in walk.logs],
+    )

@@ -1,0 +1,82 @@
+"""Views: domain objects as JSON, for the HTTP API and for `--json` on the command line.
+
+Nothing in this package knows FastAPI or HTTP.
+"""
+
+from __future__ import annotations
+
+from gaitswarm.views.analysis import (
+    DistributionItemView,
+    DistributionView,
+    RankedDesignView,
+    RankingRequest,
+    RankingView,
+)
+from gaitswarm.views.base import FieldErrorView, ProblemView, View, finite
+from gaitswarm.views.catalogue import (
+    CatalogueView,
+    ControllerView,
+    PreferenceView,
+    ScenarioView,
+    controller_views,
+    preference_views,
+    scenario_views,
+)
+from gaitswarm.views.evaluation import (
+    BestView,
+    EvaluationView,
+    ObjectiveView,
+    ScenarioResultView,
+    evaluation_views,
+)
+from gaitswarm.views.job import (
+    PREFIX,
+    EstimateView,
+    ExtensionRequest,
+    HistoryIterationView,
+    IterationView,
+    JobSummaryView,
+    JobView,
+    PageView,
+    StateView,
+)
+from gaitswarm.views.particles import ParticlesHeaderView, encoded_particles
+from gaitswarm.views.simulation import SimulatedScenarioView, SimulationView, WalkLogView
+
+__all__ = [
+    "PREFIX",
+    "BestView",
+    "CatalogueView",
+    "ControllerView",
+    "DistributionItemView",
+    "DistributionView",
+    "EstimateView",
+    "EvaluationView",
+    "ExtensionRequest",
+    "FieldErrorView",
+    "HistoryIterationView",
+    "IterationView",
+    "JobSummaryView",
+    "JobView",
+    "ObjectiveView",
+    "PageView",
+    "ParticlesHeaderView",
+    "PreferenceView",
+    "ProblemView",
+    "RankedDesignView",
+    "RankingRequest",
+    "RankingView",
+    "ScenarioResultView",
+    "ScenarioView",
+    "SimulatedScenarioView",
+    "SimulationView",
+    "StateView",
+    "View",
+    "WalkLogView",
+    "controller_views",
+    "encoded_particles",
+    "evaluation_views",
+    "finite",
+    "preference_views",
+    "scenario_views",
+]

@@ -1,0 +1,90 @@
+"""What there is to choose from: scenarios, preferences, controllers."""
+
+from __future__ import annotations
+
+from typing import Any, Generic, TypeVar
+
+from pydantic import ConfigDict, Field
+
+from gaitswarm.views.base import View, listing_name
+from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
+from sim.controllers import CONTROLLERS
+from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario
+from sim.variables import Variable
+
+T = TypeVar("T")
+
+
+class CatalogueView(View, Generic[T]):
+    """A complete list."""
+
+    # A parametrized generic does not inherit its docstring.
+    model_config = ConfigDict(json_schema_extra={"description": "A complete list."})
+
+    items: list[T] = Field(description="Everything there is, in the order of the thesis's tables.")
+
+    @classmethod
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
+        """Name of the schema, as clients see it."""
+        return listing_name(params, "List")
+
+
+class ScenarioView(Scenario):
+    """A preset walking scenario (thesis table 4.2)."""
+
+    number: int = Field(
+        description="Number in table 4.2; a job may name a scenario by it.", examples=[1]
+    )
+    simulated_seconds: float = Field(description="Length of the walk [s].", examples=[4.5])
+
+
+class PreferenceView(Preference):
+    """A published preference (thesis table 4.5)."""
+
+    name: PreferenceName = Field(description="Name, as in job specs.", examples=["A"])
+
+
+class ControllerView(View):
+    """A family of motor controllers and what can be tuned in it."""
+
+    name: str = Field(description="Name, as in job specs.", examples=["fuzzy-pi"])
+    description: str = Field(
+        description="What it is, with its source.", examples=["Mamdani fuzzy-PI, chapter 4"]
+    )
+    variables: list[Variable] = Field(
+        description="Design variables; a job searches all that it does not hold fixed."
+    )
+    gait_variables: list[Variable] = Field(
+        description="Gait parameters that a design may set as well, in place of the scenario's."
+    )
+    published: dict[str, dict[str, float]] = Field(
+        description="Designs from the literature, by preference or study: {name: value}.",
+        examples=[{"A": {"I": 0.171, "FI1R": 5837.0}}],
+    )
+
+
+def scenario_views() -> list[ScenarioView]:
+    """The presets of table 4.2, in its order."""
+    return [
+        ScenarioView(**dict(scenario), number=number, simulated_seconds=scenario.duration)
+        for number, scenario in enumerate(SCENARIOS, start=1)
+    ]
+
+
+def preference_views() -> list[PreferenceView]:
+    """The preferences of table 4.5, in its order."""
+    return [PreferenceView(name=name, **dict(p)) for name, p in PREFERENCES.items()]
+
+
+def controller_views() -> list[ControllerView]:
+    """Every controller with its variables."""
+    return [
+        ControllerView(
+            name=controller.name,
+            description=controller.description,
+            variables=list(controller.variables),
+            gait_variables=list(GAIT_VARIABLES),
+            published={study: dict(design) for study, design in controller.published.items()},
+        )
+        for controller in CONTROLLERS.values()
+    ]

@@ -1,0 +1,164 @@
+"""Designs and what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gaitswarm.views.base import View, finite
+from services.optimizer.jobs.job import Evaluation
+from services.optimizer.jobs.spec import Spec, exponential
+from sim.outcome import OBJECTIVES, Objective, Status
+
+StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled"]
+_EXAMPLE: Final = {
+    "torque": 8.71,
+    "acceleration": 1.77,
+    "angular_acceleration": 16.09,
+    "energy": 41.96,
+    "reciprocal_speed": 6.41,
+    "height_loss": -0.0038,
+}
+
+
+class ObjectiveView(View):
+    """One thing that a job minimizes in every case."""
+
+    name: str = Field(description="Name, as in results.", examples=["torque"])
+    unit: str = Field(description="Its unit.", examples=["N m"])
+    description: str = Field(
+        description="What it means.",
+        examples=["f1: rms over time of the sum of the absolute gear torques"],
+    )
+
+    @classmethod
+    def from_objective(cls, objective: Objective) -> ObjectiveView:
+        """As the simulator declares it."""
+        return cls(name=objective.name, unit=objective.unit, description=objective.description)
+
+
+class ScenarioResultView(View):
+    """How a design did in one case of its job: a walk in a scenario, or a fit to a recording."""
+
+    status: StatusName = Field(
+        description="How the walk ended; everything but `ok` is a failed walk.", examples=["ok"]
+    )
+    explanation: str = Field(
+        description="The status in a sentence, with what to do about it.",
+        examples=["walked to the end"],
+    )
+    utility: float | None = Field(
+        description="To be minimized; null if the walk failed. A walk's is the bias-weighted"
+        " product of f1..f5 under the job's preference (eq. 4.1) [1], a fit's the mean absolute"
+        " error of currents over the job's links [A].",
+        examples=[21.05],
+    )
+    objectives: dict[str, float | None] = Field(
+        description="Raw objectives by name, all to be minimized; null where there is none. Units"
+        " are in the job's `objectives`; a walk has those of table 4.1: "
+        + ", ".join(f"{o.name} [{o.unit}]" for o in OBJECTIVES)
+        + ".",
+        examples=[_EXAMPLE],
+    )
+
+    @classmethod
+    def from_trial(
+        cls, status: int, objectives: Mapping[str, float], log_utility: float
+    ) -> ScenarioResultView:
+        """log_utility: +inf for a failed walk."""
+        ended = Status(status)
+        return cls.model_validate(
+            {
+                "status": ended.label,
+                "explanation": ended.phrase,
+                "utility": utility(log_utility),
+                "objectives": {name: finite(value) for name, value in objectives.items()},
+            }
+        )
+
+
+class EvaluationView(View):
+    """One design, judged in every case of its job."""
+
+    iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
+    particle: int = Field(description="Particle of the swarm, from 0.", examples=[7])
+    fitness: float | None = Field(
+        description="To be minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or"
+        " mean error of the fits (eq. 2.21) [A]; null if the design failed in any case.",
+        examples=[20.87],
+    )
+    design: dict[str, float] = Field(
+        description="Value of every variable, searched and fixed, by name; units as in"
+        " /v1/controllers.",
+        examples=[{"I": 0.171, "FI1R": 5837.0, "FI2R": 20111.0, "FOR": 781.0, "FOMF": 2.0}],
+    )
+    scenarios: dict[str, ScenarioResultView] = Field(
+        description="Result in each case, by the scenario's name or the recording's short id."
+    )
+
+
+class BestView(EvaluationView):
+    """The best design that a job has found so far."""
+
+    fitness: float = Field(
+        description="As of any evaluation; never null.",
+        examples=[20.87],
+    )
+
+    @classmethod
+    def from_evaluation(cls, evaluation: Evaluation, spec: Spec) -> BestView:
+        """spec: that of the evaluation's job."""
+        (view,) = evaluation_views([evaluation], spec)
+        return cls.model_validate(dict(view))
+
+
+def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
+    """Views of evaluations of one job, in their order; utilities are derived from its spec."""
+    if not evaluations:
+        return []
+    variables = spec.design_space().names
+    objectives = np.stack([evaluation.objectives for evaluation in evaluations])
+    statuses = np.stack([evaluation.statuses for evaluation in evaluations])
+    logs = spec.judge(objectives, statuses != Status.OK).log_utilities
+    return [
+        EvaluationView(
+            iteration=evaluation.iteration,
+            particle=evaluation.particle,
+            fitness=finite(evaluation.fitness),
+            design=dict(zip(variables, evaluation.design.tolist(), strict=True)),
+            scenarios=case_results(
+                spec.case_names,
+                spec.objectives,
+                evaluation.statuses,
+                evaluation.objectives,
+                log_utilities,
+            ),
+        )
+        for evaluation, log_utilities in zip(evaluations, logs, strict=True)
+    ]
+
+
+def case_results(
+    names: Sequence[str],
+    objectives: Sequence[Objective],
+    statuses: NDArray[np.uint8],
+    values: NDArray[np.float64],
+    log_utilities: NDArray[np.float64],
+) -> dict[str, ScenarioResultView]:
+    """names, statuses, log_utilities (K,), values (K, m) of one design in K cases, by name."""
+    columns = [objective.name for objective in objectives]
+    return {
+        name: ScenarioResultView.from_trial(status, dict(zip(columns, row, strict=True)), log)
+        for name, status, row, log in zip(
+            names, statuses.tolist(), values.tolist(), log_utilities.tolist(), strict=True
+        )
+    }
+
+
+def utility(log_utility: float) -> float | None:
+    """Number of its logarithm; None where it is not finite."""
+    return finite(exponential(log_utility))

@@ -1,0 +1,126 @@
+"""Recorded walks at a glance, and which fitted parameters can be trusted."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from gaitswarm.views.base import View
+from services.optimizer.analysis.identifiability import (
+    THRESHOLDS,
+    Identifiability,
+    ParameterIdentifiability,
+)
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.identification.recorded_walk import RecordedWalk
+
+
+class IntervalView(View):
+    """Values of a parameter among designs within a threshold, in the parameter's unit."""
+
+    low: float = Field(description="Least of them.", examples=[10.9])
+    high: float = Field(description="Greatest of them.", examples=[11.3])
+
+
+class ParameterView(View):
+    """One parameter over all runs."""
+
+    name: str = Field(description="Name of the variable.", examples=["battery_voltage"])
+    unit: str = Field(description="Its unit.", examples=["V"])
+    low: float = Field(description="Lower bound of the search.", examples=[8.0])
+    high: float = Field(description="Upper bound of the search.", examples=[13.0])
+    best: float = Field(description="Value in the best design of all runs.", examples=[11.1])
+    bests: list[float] = Field(
+        description="Value in each run's best design.", examples=[[11.1, 11.2, 11.0]]
+    )
+    intervals: list[IntervalView] = Field(
+        description="One for each of `thresholds`, over all runs."
+    )
+    trust: Literal["trusted", "rough", "unknown"] | None = Field(
+        description="How far the runs agree at the threshold of 5 %: within 15 %, within 35 %, or"
+        " not within 35 % of the range that was searched; null for a single run, which cannot"
+        " tell.",
+        examples=["trusted"],
+    )
+    explanation: str | None = Field(
+        description="The same in a sentence.",
+        examples=["all runs agree on a small part of the range"],
+    )
+
+    @classmethod
+    def from_parameter(cls, found: ParameterIdentifiability) -> ParameterView:
+        """As the optimizer's service finds it."""
+        trust = found.trust
+        return cls(
+            name=found.variable.name,
+            unit=found.variable.unit,
+            low=found.variable.low,
+            high=found.variable.high,
+            best=found.best,
+            bests=list(found.bests),
+            intervals=[IntervalView(low=low, high=high) for low, high in found.intervals],
+            trust=None if trust is None else trust.value,
+            explanation=None if trust is None else trust.phrase,
+        )
+
+
+class IdentifiabilityView(View):
+    """How runs of one problem, that differ in their seed, converge (thesis fig. 2.14)."""
+
+    jobs: list[str] = Field(description="The runs.", examples=[["k2q7zr5dm9xw"]])
+    fitness: list[float] = Field(description="Each run's least fitness.", examples=[[0.0312]])
+    thresholds: list[float] = Field(
+        description="Distances from a run's best fitness, as shares of it [1].",
+        examples=[list(THRESHOLDS)],
+    )
+    designs: list[int] = Field(
+        description="Number of designs of all runs within each of them [1].",
+        examples=[[3214, 2851, 2617]],
+    )
+    parameters: list[ParameterView] = Field(description="Every variable that was searched.")
+
+    @classmethod
+    def from_identifiability(cls, jobs: list[str], found: Identifiability) -> IdentifiabilityView:
+        """jobs: ids of the runs, in order."""
+        return cls(
+            jobs=jobs,
+            fitness=list(found.fitness),
+            thresholds=list(THRESHOLDS),
+            designs=list(found.designs),
+            parameters=[ParameterView.from_parameter(p) for p in found.parameters],
+        )
+
+
+class RecordingView(View):
+    """A recorded walk without its numbers."""
+
+    id: str = Field(
+        description="Identifier, as in `recordings` of a job.",
+        examples=["0f343b0931126a20f133d67c2b018a3b"],
+    )
+    scenario: str = Field(description="Name of its scenario.", examples=["normal-fast"])
+    controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
+    joints: int = Field(description="Joints whose currents were measured.", examples=[18])
+    rows: int = Field(description="Rows, 500 a second.", examples=[1500])
+    seconds: float = Field(description="Time that is compared [s].", examples=[3.0])
+    mean_current: float = Field(
+        description="Mean over rows and joints of the absolute current [A].", examples=[0.14]
+    )
+    synthetic: bool = Field(
+        description="Whether it was computed, not measured on a robot.", examples=[False]
+    )
+
+    @classmethod
+    def from_walk(cls, recording_id: str, walk: RecordedWalk) -> RecordingView:
+        """recording_id: as the store gave it."""
+        return cls(
+            id=recording_id,
+            scenario=walk.scenario.name,
+            controller=walk.controller,
+            joints=len(walk.joints),
+            rows=len(walk.current),
+            seconds=len(walk.current) * CONTROL_PERIOD,
+            mean_current=float(walk.amperes.mean()),
+            synthetic=walk.synthetic,
+        )

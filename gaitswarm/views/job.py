@@ -1,0 +1,308 @@
+"""Jobs, their progress and their history, and what a job would cost."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any, Final, Generic, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from gaitswarm.views.base import View, finite, listing_name
+from gaitswarm.views.evaluation import BestView, EvaluationView, ObjectiveView, evaluation_views
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.estimate import Estimate
+from services.optimizer.jobs.job import (
+    LARGEST_BUDGET,
+    TRANSITIONS,
+    Evaluation,
+    Iteration,
+    Job,
+    JobState,
+    time_left,
+)
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.tuning import JobSpec
+
+PREFIX: Final = "/v1"
+"""Version of the HTTP API, in every path."""
+
+_RESOURCES: Final = ("best", "iterations", "events", "distribution", "particles", "export")
+
+T = TypeVar("T")
+
+
+class PageView(View, Generic[T]):
+    """A page of a list. The list is complete when `next` is null."""
+
+    # A parametrized generic does not inherit its docstring.
+    model_config = ConfigDict(
+        json_schema_extra={
+            "description": "A page of a list. The list is complete when `next` is null."
+        }
+    )
+
+    items: list[T] = Field(description="The items, in the list's order.")
+    next: str | None = Field(
+        description="Give it as `after` to get the following page; null on the last page.",
+        examples=["24"],
+    )
+
+    @classmethod
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
+        """Name of the schema, as clients see it."""
+        return listing_name(params, "Page")
+
+
+class JobSummaryView(View):
+    """A job and how far it is."""
+
+    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
+    kind: Literal["tuning", "identification"] = Field(
+        description="Whether it tunes a drive or fits parameters of the robot to recorded walks.",
+        examples=["tuning"],
+    )
+    state: JobState = Field(
+        description="queued, running, pausing (ends its iteration first), paused, cancelled,"
+        " failed or succeeded.",
+        examples=["running"],
+    )
+    error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
+    controller: str | None = Field(
+        description="Motor controller that it tunes; null for a job that tunes none.",
+        examples=["fuzzy-pi"],
+    )
+    scenarios: list[str] = Field(
+        description="Scenarios in which every design walks, or recordings that it is fitted to.",
+        examples=[["normal-fast", "turn-right-fast"]],
+    )
+    particles: int = Field(description="Size of the swarm [1].", examples=[25])
+    iterations: int = Field(description="Iterations committed so far [1].", examples=[12])
+    iterations_planned: int = Field(description="Budget of iterations [1].", examples=[25])
+    evaluations: int = Field(
+        description="Designs judged so far, each in every scenario [1].", examples=[300]
+    )
+    evaluations_planned: int = Field(
+        description="Designs that the whole budget will judge [1].", examples=[625]
+    )
+    best_fitness: float | None = Field(
+        description="Least fitness so far [1]; null while every design has failed.",
+        examples=[21.3],
+    )
+    best_iteration: int | None = Field(
+        description="Iteration that found it, from 0.", examples=[11]
+    )
+    compute_seconds: float = Field(
+        description="Time spent in evaluating committed iterations [s].", examples=[14.8]
+    )
+    evaluations_per_second: float | None = Field(
+        description="Designs judged per second of that time [1/s]; null before the first.",
+        examples=[20.3],
+    )
+    simulations_per_second: float | None = Field(
+        description="Walks (designs x scenarios) simulated per second of that time [1/s].",
+        examples=[121.6],
+    )
+    eta_seconds: float | None = Field(
+        description="Estimated time to the end of the budget at the rate so far [s]: 0 for a job"
+        " that succeeded, null unless it runs and has committed an iteration.",
+        examples=[16.1],
+    )
+    created_at: datetime = Field(description="When it was submitted, UTC.")
+    updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
+    started_at: datetime | None = Field(description="When it was first claimed, UTC.")
+    finished_at: datetime | None = Field(description="When it ended, UTC.")
+    links: dict[str, str] = Field(
+        description="Where to go on: `self`, `best`, `iterations`, `events`, `distribution`,"
+        " `particles`, `export`, `ranking` (POST) for a job that tunes a drive, and those of"
+        " `pause`, `resume`, `cancel`, `extend` (POST) that its state allows.",
+        examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
+    )
+
+    @classmethod
+    def from_job(cls, job: Job) -> JobSummaryView:
+        """From the job alone: no further query."""
+        return cls.model_validate(_summary(job))
+
+
+class JobView(JobSummaryView):
+    """A job in full: what was asked, how far it is, and its best design so far."""
+
+    best: BestView | None = Field(
+        description="Best design so far; null while there is none that walks in every scenario."
+    )
+    objectives: list[ObjectiveView] = Field(
+        description="What every case of this job yields; columns of its results."
+    )
+    spec: AnySpec = Field(
+        description="What was asked, with every preset written out as it was on submission."
+    )
+
+    @classmethod
+    def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
+        """best: as `JobService.best` returns it."""
+        view = None if best is None else BestView.from_evaluation(best, job.spec)
+        objectives = [ObjectiveView.from_objective(o) for o in job.spec.objectives]
+        return cls.model_validate(
+            {**_summary(job), "best": view, "objectives": objectives, "spec": job.spec}
+        )
+
+
+class ExtensionRequest(BaseModel):
+    """Another budget for a job."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    iterations: int = Field(
+        ge=1,
+        le=LARGEST_BUDGET,
+        description="Iterations in all, more than the job has committed [1].",
+        examples=[50],
+    )
+
+
+class IterationView(View):
+    """One committed iteration of a job: the swarm's fitness at a glance."""
+
+    index: int = Field(description="Index of the iteration, from 0.", examples=[24])
+    best: float | None = Field(
+        description="Least fitness of this iteration [1]; null if every design failed.",
+        examples=[21.3],
+    )
+    mean: float | None = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
+    median: float | None = Field(description="Median of them [1].", examples=[23.9])
+    worst: float | None = Field(description="Greatest of them [1].", examples=[41.7])
+    best_so_far: float | None = Field(
+        description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
+    )
+    failed: int = Field(
+        description="Designs that failed in at least one scenario [1].", examples=[2]
+    )
+    evaluate_seconds: float = Field(
+        description="Time that its evaluation took [s].", examples=[1.23]
+    )
+    committed_at: datetime = Field(description="When it was committed, UTC.")
+
+    @classmethod
+    def from_iteration(cls, iteration: Iteration) -> IterationView:
+        """An iteration as the store lists it."""
+        return cls.model_validate(_at_a_glance(iteration))
+
+
+class HistoryIterationView(IterationView):
+    """One committed iteration with every particle."""
+
+    evaluations: list[EvaluationView] = Field(description="Every particle, in order.")
+
+    @classmethod
+    def from_iteration_and_evaluations(
+        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
+    ) -> HistoryIterationView:
+        """evaluations: those of the iteration; spec: that of its job."""
+        particles = evaluation_views(evaluations, spec)
+        return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
+
+
+class StateView(View):
+    """A change of a job's state, as the event stream tells it."""
+
+    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    state: JobState = Field(description="The state that it is in now.", examples=["succeeded"])
+    error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
+    iterations: int = Field(description="Iterations committed so far [1].", examples=[25])
+
+    @classmethod
+    def from_job(cls, job: Job) -> StateView:
+        """The job's present state."""
+        return cls(id=job.id, state=job.state, error=job.error, iterations=job.progress.iterations)
+
+
+def job_links(job: Job) -> dict[str, str]:
+    """Paths of the job's resources, and of the commands that its state allows."""
+    here = f"{PREFIX}/jobs/{job.id}"
+    resources = {name: f"{here}/{name}" for name in _RESOURCES}
+    if isinstance(job.spec, JobSpec):
+        resources["ranking"] = f"{here}/ranking"
+    commands = {
+        command.value: f"{here}/{command.value}"
+        for state, command in TRANSITIONS
+        if state is job.state
+    }
+    if job.state is not JobState.CANCELLED:
+        commands["extend"] = f"{here}/extend"
+    return {"self": here, **resources, **commands}
+
+
+def _summary(job: Job) -> dict[str, object]:
+    progress, spec = job.progress, job.spec
+    rates = time_left(job, datetime.now(UTC))
+    return {
+        "id": job.id,
+        "name": spec.name,
+        "kind": spec.kind,
+        "state": job.state,
+        "error": job.error,
+        "controller": spec.controller if isinstance(spec, JobSpec) else None,
+        "scenarios": list(spec.case_names),
+        "particles": spec.optimizer.particles,
+        "iterations": progress.iterations,
+        "iterations_planned": spec.iterations,
+        "evaluations": progress.evaluations,
+        "evaluations_planned": spec.iterations * spec.optimizer.particles,
+        "best_fitness": finite(progress.best_fitness),
+        "best_iteration": progress.best_iteration,
+        "compute_seconds": progress.compute_seconds,
+        "evaluations_per_second": rates.evaluations_per_second,
+        "simulations_per_second": rates.simulations_per_second,
+        "eta_seconds": rates.eta_seconds,
+        "created_at": job.created_at,
+        "updated_at": job.updated_at,
+        "started_at": job.started_at,
+        "finished_at": job.finished_at,
+        "links": job_links(job),
+    }
+
+
+def _at_a_glance(iteration: Iteration) -> dict[str, object]:
+    return {
+        "index": iteration.index,
+        "best": finite(iteration.best),
+        "mean": finite(iteration.mean),
+        "median": finite(iteration.median),
+        "worst": finite(iteration.worst),
+        "best_so_far": finite(iteration.best_so_far),
+        "failed": iteration.failed,
+        "evaluate_seconds": iteration.evaluate_seconds,
+        "committed_at": iteration.committed_at,
+    }
+
+
+class EstimateView(View):
+    """What a job would cost if it were submitted."""
+
+    evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
+    walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
+    simulated_seconds: float = Field(
+        description="Length of all walks together [s]; less for designs that fall.",
+        examples=[20250.0],
+    )
+    seconds: float | None = Field(
+        description="How long it will take, once it runs and has the machine for itself [s]; null"
+        " if that is unknown.",
+        examples=[21.5],
+    )
+    basis: str = Field(
+        description="What that is derived from.",
+        examples=["the rate of 2 earlier jobs with the same kind of walks: 942 simulated s/s"],
+    )
+
+    @classmethod
+    def from_estimate(cls, estimate: Estimate) -> EstimateView:
+        """As the service estimates it."""
+        return cls(
+            evaluations=estimate.evaluations,
+            walks=estimate.walks,
+            simulated_seconds=estimate.simulated_seconds,
+            seconds=estimate.seconds,
+            basis=estimate.basis,
+        )

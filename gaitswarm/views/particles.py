@@ -1,0 +1,95 @@
+"""Every evaluation of a job as numbers by column, for pictures of the whole search."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gaitswarm.views.base import View, framed
+from services.optimizer.analysis.distribution import thinned
+from services.optimizer.analysis.utilities import utilities
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
+
+
+class ParticleColumnView(View):
+    """What one column of numbers is."""
+
+    name: str = Field(
+        description="`iteration`, `particle`, `fitness`, a searched variable's name, or"
+        " `utility:<scenario>`.",
+        examples=["FI1R"],
+    )
+    unit: str = Field(description="Unit of its numbers.", examples=["counts"])
+    low: float | None = Field(description="Lower bound of a variable; else null.")
+    high: float | None = Field(description="Upper bound of a variable; else null.")
+    kind: Literal["index", "fitness", "continuous", "integer", "utility"] = Field(
+        description="What its numbers are; `continuous` and `integer` are variables."
+    )
+
+
+class ParticlesHeaderView(View):
+    """What the numbers after it are."""
+
+    job_id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    rows: int = Field(description="Evaluations that follow: numbers of each column [1].")
+    total: int = Field(description="Evaluations there are, of which the rows are chosen [1].")
+    iterations: tuple[int, int] | None = Field(
+        description="First and last iteration among the rows; null without any.",
+        examples=[(0, 24)],
+    )
+    columns: list[ParticleColumnView] = Field(description="The columns, in order.")
+
+
+def encoded_particles(
+    job: Job, columns: EvaluationColumns, *, after: int | None, most: int
+) -> bytes:
+    """`framed` header and float32 columns, one after another; NaN for what does not exist.
+
+    columns: of the whole job. after: only iterations with a greater index. most: rows, thinned
+    evenly in iterations; the best of them is always there.
+    """
+    wanted = columns.after(after)
+    chosen = wanted.rows(thinned(wanted, most))
+    rows = len(chosen)
+    header = ParticlesHeaderView(
+        job_id=job.id,
+        rows=rows,
+        total=len(wanted),
+        iterations=(int(chosen.iteration[0]), int(chosen.iteration[-1])) if rows else None,
+        columns=_described(job),
+    )
+    return framed(header, _numbers(job, chosen))
+
+
+def _described(job: Job) -> list[ParticleColumnView]:
+    unit = "1" if job.spec.kind == "tuning" else "A"
+    plain = [("iteration", "1", "index"), ("particle", "1", "index"), ("fitness", unit, "fitness")]
+    worth = [(f"utility:{name}", unit, "utility") for name in job.spec.case_names]
+    variables = [
+        {"name": v.name, "unit": v.unit, "low": v.low, "high": v.high, "kind": v.kind}
+        for v in job.spec.design_space().variables
+    ]
+    unbounded = [
+        [{"name": n, "unit": u, "low": None, "high": None, "kind": kind} for n, u, kind in group]
+        for group in (plain, worth)
+    ]
+    described = [*unbounded[0], *variables, *unbounded[1]]
+    return [ParticleColumnView.model_validate(column) for column in described]
+
+
+def _numbers(job: Job, chosen: EvaluationColumns) -> NDArray[np.float64]:
+    """(columns, rows)."""
+    searched = len(job.spec.design_space().variables)
+    numbers = np.concatenate(
+        [
+            [chosen.iteration, chosen.particle, chosen.fitness],
+            chosen.designs[:, :searched].T,
+            utilities(chosen, job.spec).T,
+        ]
+    )
+    numbers[~np.isfinite(numbers)] = np.nan
+    return numbers

@@ -1,0 +1,145 @@
+"""One design walking on request, outside any job."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, WithJsonSchema
+
+from gaitswarm.views.base import View, finite
+from gaitswarm.views.evaluation import ScenarioResultView, case_results
+from services.optimizer.jobs.preference import Preference, judge
+from sim.kernel.observation import WalkLog
+from sim.outcome import OBJECTIVES, Status
+from sim.robot import RobotSource
+
+LOG_RATE: Final = 500
+"""Rows of a log per second of simulated time [Hz]."""
+
+LogValues = Annotated[list[Any], WithJsonSchema({"type": "array", "items": {}})]
+
+_COLUMNS: Final[dict[str, tuple[str, str]]] = {
+    "time": ("s", "time since the start"),
+    "base_position": ("m", "position of the body in the world: x, y, z"),
+    "base_orientation": ("1", "orientation of the body in the world: quaternion x, y, z, w"),
+    "base_velocity": ("m/s, rad/s", "velocity in the body frame: 3 linear, then 3 angular"),
+    "joint_angle": ("rad", "angle of every joint"),
+    "motor_angle": ("rad", "angle of every joint at its encoder, before any gearlash"),
+    "joint_velocity": ("rad/s", "angular velocity of every joint"),
+    "desired_angle": ("rad", "desired angle of every joint"),
+    "current": ("A", "motor current of every joint"),
+    "voltage": ("V", "motor voltage of every joint"),
+    "load_torque": ("N m", "gear torque of every joint"),
+    "foot_force": ("N", "force of the ground on every foot in the world frame: x, y, z"),
+    "supply": ("V", "voltage of the battery"),
+}
+
+
+class LogColumnView(View):
+    """One recorded quantity."""
+
+    unit: str = Field(description="Unit of the values.", examples=["rad"])
+    description: str = Field(description="What was recorded.", examples=["angle of every joint"])
+    values: LogValues = Field(
+        description="One entry per row: a number, or nested lists where there are several joints,"
+        " legs or coordinates; null where undefined.",
+        examples=[[[0.0, 0.1], [0.01, 0.11]]],
+    )
+
+
+class WalkLogView(View):
+    """What happened in a walk, column by column."""
+
+    rate: int = Field(
+        default=LOG_RATE, description="Rows per second of simulated time [Hz].", examples=[500]
+    )
+    columns: dict[str, LogColumnView] = Field(
+        description="Recorded quantities by name: " + ", ".join(_COLUMNS) + "."
+    )
+
+    @classmethod
+    def from_log(cls, log: WalkLog) -> WalkLogView:
+        """All arrays of the log; what is not finite is null."""
+        # model_construct: hundreds of thousands of numbers that need no checking again.
+        return cls.model_construct(
+            rate=LOG_RATE,
+            columns={
+                name: LogColumnView.model_construct(
+                    unit=unit, description=description, values=_nullable(getattr(log, name))
+                )
+                for name, (unit, description) in _COLUMNS.items()
+            },
+        )
+
+
+class SimulatedScenarioView(ScenarioResultView):
+    """How the design did in one scenario, with its log if it was asked for."""
+
+    log: WalkLogView | None = Field(
+        default=None,
+        description="The walk at 500 Hz; null unless asked for, or if the robot never moved.",
+    )
+
+
+class SimulationView(View):
+    """What one design is worth."""
+
+    robot: RobotSource = Field(
+        description="Robot that walked, as it was asked for.", examples=["szabadka2"]
+    )
+    controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
+    design: dict[str, float] = Field(
+        description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]
+    )
+    preference: Preference = Field(description="By which utilities and fitness were computed.")
+    fitness: float | None = Field(
+        description="Geometric mean of the scenarios' utilities (eq. 4.2), to be minimized [1];"
+        " null if any walk failed.",
+        examples=[20.87],
+    )
+    scenarios: dict[str, SimulatedScenarioView] = Field(
+        description="Result in each scenario, by the scenario's name."
+    )
+
+    @classmethod
+    def from_walks(
+        cls,
+        *,
+        robot: RobotSource,
+        controller: str,
+        design: Mapping[str, float],
+        preference: Preference,
+        names: Sequence[str],
+        statuses: NDArray[np.uint8],
+        objectives: NDArray[np.float64],
+        logs: Sequence[WalkLog | None],
+    ) -> SimulationView:
+        """names, statuses (K,), objectives (K, 6): one walk per scenario; logs: K or none."""
+        judged = judge(objectives[None], (statuses != Status.OK)[None], preference)
+        results = case_results(names, OBJECTIVES, statuses, objectives, judged.log_utilities[0])
+        recorded = [None if log is None else WalkLogView.from_log(log) for log in logs]
+        return cls(
+            robot=robot,
+            controller=controller,
+            design=dict(design),
+            preference=preference,
+            fitness=finite(float(judged.fitness[0])),
+            scenarios={
+                name: SimulatedScenarioView.model_construct(**dict(results[name]), log=log)
+                for name, log in zip(names, recorded or [None] * len(names), strict=True)
+            },
+        )
+
+
+def _nullable(array: NDArray[np.float64]) -> list[Any]:
+    """Nested lists of the array; None for what is not finite."""
+    if np.isfinite(array).all():
+        rows: list[Any] = array.tolist()
+        return rows
+    values = array.astype(object)
+    values[~np.isfinite(array)] = None
+    marked: list[Any] = values.tolist()
+    return marked

@@ -1,0 +1,124 @@
+"""Which fitted parameters can be trusted: their intervals among good designs (thesis fig. 2.14).
+
+A swarm contracts whether or not a parameter matters, so the interval of one run says little. Runs
+that differ in their seed alone contract to the same value only where the measured walks ask for it:
+the intervals here are over all runs together, each run's good designs by its own best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.jobs.columns import EvaluationColumns
+from sim.variables import Variable
+
+Floats = NDArray[np.float64]
+
+THRESHOLDS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
+"""Twelve distances from a run's best fitness, as shares of it."""
+
+DECISIVE: Final = 0.05
+"""The threshold at which a parameter is judged."""
+
+_TRUSTED: Final = 0.15
+_ROUGH: Final = 0.35
+"""Widths at the decisive threshold, as shares of the range that was searched."""
+
+
+class Trust(StrEnum):
+    """What several runs say of a parameter."""
+
+    TRUSTED = "trusted"
+    ROUGH = "rough"
+    UNKNOWN = "unknown"
+
+    @property
+    def phrase(self) -> str:
+        """One sentence that a user can act on."""
+        return _PHRASES[self]
+
+
+_PHRASES: Final = {
+    Trust.TRUSTED: "all runs agree on a small part of the range",
+    Trust.ROUGH: "all runs agree on a part of the range; more or longer walks may narrow it",
+    Trust.UNKNOWN: "runs as good as each other disagree: these walks cannot tell it",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterIdentifiability:
+    """One parameter. intervals: least and greatest value at each of `THRESHOLDS`, in its unit.
+
+    best: value in the best design of all runs; bests: in each run's. trust: None for a single run,
+    which cannot tell.
+    """
+
+    variable: Variable
+    best: float
+    bests: tuple[float, ...]
+    intervals: tuple[tuple[float, float], ...]
+    trust: Trust | None
+
+    def width(self, threshold: float = DECISIVE) -> float:
+        """Of the interval at one of `THRESHOLDS`, as a share of the range that was searched."""
+        low, high = self.intervals[THRESHOLDS.index(threshold)]
+        return (high - low) / (self.variable.high - self.variable.low)
+
+
+@dataclass(frozen=True, slots=True)
+class Identifiability:
+    """All searched parameters. fitness: each run's best; designs: how many lie within each
+    threshold.
+    """
+
+    fitness: tuple[float, ...]
+    designs: tuple[int, ...]
+    parameters: tuple[ParameterIdentifiability, ...]
+
+
+def identifiability(
+    variables: Sequence[Variable], runs: Sequence[EvaluationColumns]
+) -> Identifiability:
+    """Intervals over runs of one problem. variables: the first columns of the runs' designs.
+
+    Raises ValueError unless every run has a design that did not fail.
+    """
+    if not runs or not all(np.isfinite(run.fitness).any() for run in runs):
+        raise ValueError("every run needs a design that did not fail")
+    best = [int(np.argmin(run.fitness)) for run in runs]
+    fitness = tuple(float(run.fitness[row]) for run, row in zip(runs, best, strict=True))
+    overall = int(np.argmin(fitness))
+    within = [
+        [run.fitness <= least * (1.0 + threshold) for run, least in zip(runs, fitness, strict=True)]
+        for threshold in THRESHOLDS
+    ]
+    parameters = []
+    for column, variable in enumerate(variables):
+        bests = tuple(float(run.designs[row, column]) for run, row in zip(runs, best, strict=True))
+        intervals = tuple(
+            _interval([run.designs[rows, column] for run, rows in zip(runs, good, strict=True)])
+            for good in within
+        )
+        found = ParameterIdentifiability(variable, bests[overall], bests, intervals, trust=None)
+        parameters.append(found if len(runs) == 1 else _judged(found))
+    designs = tuple(int(sum(rows.sum() for rows in good)) for good in within)
+    return Identifiability(fitness, designs, tuple(parameters))
+
+
+def _interval(values: Sequence[Floats]) -> tuple[float, float]:
+    together = np.concatenate(values)
+    return float(together.min()), float(together.max())
+
+
+def _judged(found: ParameterIdentifiability) -> ParameterIdentifiability:
+    width = found.width()
+    trust = Trust.UNKNOWN
+    if width <= _ROUGH:
+        trust = Trust.TRUSTED if width <= _TRUSTED else Trust.ROUGH
+    return ParameterIdentifiability(found.variable, found.best, found.bests, found.intervals, trust)

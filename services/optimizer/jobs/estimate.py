@@ -1,0 +1,177 @@
+"""What a job will cost before it is submitted: how many walks, and how long they take."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.spec import Spec, create_optimizer
+from services.optimizer.jobs.tuning import JobSpec
+from sim.case import Case, Walk
+from sim.outcome import Status
+from sim.simulate import prepare
+
+_MOST_JOBS: Final = 5
+"""Jobs whose rates are averaged, so that one on a busy machine does not count for all."""
+
+_MEASURED: Final = 8
+"""Designs that walk to measure a rate: as many as the kernel takes at once."""
+
+_LONGEST_WALK: Final = 5.0
+"""Length of the walk that is measured [s]; a very short one would tell how long tables take."""
+
+_REMEMBERED: Final = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """evaluations: designs; walks: each design in each case; simulated_seconds: all walks [s].
+
+    seconds: wall time [s], None where nothing is known; basis: what it is derived from.
+    """
+
+    evaluations: int
+    walks: int
+    simulated_seconds: float
+    seconds: float | None
+    basis: str
+
+
+def estimate(
+    spec: Spec, cases: Sequence[Case], earlier: Sequence[Job], measured: MeasuredRates
+) -> Estimate:
+    """cases: those of the spec. earlier: jobs, of which those that are like it tell a rate.
+
+    Without one, a short walk is measured in this thread.
+    """
+    evaluations = spec.iterations * spec.optimizer.particles
+    one = duration(spec, cases)
+    alike = [job for job in earlier if _alike(job, spec)][:_MOST_JOBS]
+    if alike:
+        walked = sum(_simulated_seconds(job, one) for job in alike)
+        rate: float | None = walked / sum(job.progress.compute_seconds for job in alike)
+        jobs = "1 earlier job" if len(alike) == 1 else f"{len(alike)} earlier jobs"
+        basis = f"the rate of {jobs} with the same kind of walks: {rate:.3g} simulated s/s"
+    else:
+        rate, basis = measured.rate(spec, cases)
+    simulated = evaluations * one
+    return Estimate(
+        evaluations=evaluations,
+        walks=evaluations * len(cases),
+        simulated_seconds=simulated,
+        seconds=None if rate is None else simulated / rate,
+        basis=basis,
+    )
+
+
+def duration(spec: Spec, cases: Sequence[Case]) -> float:
+    """Simulated time of one design in some of the spec's cases [s].
+
+    A cycle time that is searched counts by the middle of its bounds.
+    """
+    cycle_time = _typical(spec.design_space(), "cycle_time")
+    return sum(
+        case.scenario.cycles * cycle_time
+        if isinstance(case, Walk) and cycle_time is not None
+        else case.duration
+        for case in cases
+    )
+
+
+class MeasuredRates:
+    """Simulated over elapsed seconds, of this machine, by kind of walk. Thread-safe.
+
+    A rate is measured once and kept: it is an estimate, and whoever fills a form asks often.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._rates: OrderedDict[str, float] = OrderedDict()
+
+    def rate(self, spec: Spec, cases: Sequence[Case]) -> tuple[float | None, str]:
+        """The rate of all cores and what it is based on; None without a compiled kernel.
+
+        Compiles the robot's kernel if need be, as the job itself would.
+        """
+        if prepare(spec.robot) != "native":
+            return None, "nothing: without a C compiler walks take some hundred times as long"
+        cores = len(os.sched_getaffinity(0))
+        with self._lock:
+            key = _kind_of_walk(spec)
+            rate = self._rates.pop(key, None) or _measure(spec, cases)
+            if rate is None:
+                return None, "nothing: the designs that were tried are beyond the legs' reach"
+            self._rates[key] = rate
+            if len(self._rates) > _REMEMBERED:
+                self._rates.popitem(last=False)
+        return cores * rate, (
+            f"a walk measured on this machine, {rate:.3g} simulated s/s, on all of its"
+            f" {cores} cores"
+        )
+
+
+def _measure(spec: Spec, cases: Sequence[Case]) -> float | None:
+    """Simulated seconds per second of one core: the swarm's first designs in the shortest case.
+
+    None if none of them can begin to walk.
+    """
+    positions = create_optimizer(spec).ask()[:_MEASURED]
+    designs = spec.design_space().designs(positions)
+    case = _shortened(min(cases, key=lambda case: case.duration))
+    # The first walk pays for what later ones find ready: tables, and memory that is mapped.
+    case.run(designs[:1])
+    begun = time.perf_counter()
+    outcome = case.run(designs)
+    elapsed = time.perf_counter() - begun
+    walked = int((outcome.statuses != Status.UNREACHABLE).sum())
+    return walked * duration(spec, [case]) / elapsed if walked else None
+
+
+def _shortened(case: Case) -> Case:
+    """A walk of some seconds; a fit needs all of its recording."""
+    if not isinstance(case, Walk):
+        return case
+    scenario = case.scenario
+    cycles = max(1.0, min(scenario.cycles, _LONGEST_WALK / scenario.cycle_time))
+    return replace(case, scenario=scenario.model_copy(update={"cycles": cycles}))
+
+
+def _alike(job: Job, spec: Spec) -> bool:
+    """Whether a job has run walks of the same kind; a fit, to the same recordings."""
+    return (
+        job.progress.compute_seconds > 0.0
+        and _kind_of_walk(job.spec) == _kind_of_walk(spec)
+        and job.spec.recording_ids == spec.recording_ids
+    )
+
+
+def _kind_of_walk(spec: Spec) -> str:
+    """What a walk's speed depends on: the robot and the controller."""
+    controller = spec.controller if isinstance(spec, JobSpec) else "recorded"
+    return f"{controller} {spec.model_dump_json(include={'robot'})}"
+
+
+def _simulated_seconds(job: Job, fitted: float) -> float:
+    """What the committed iterations of a job that is like another have walked [s], as planned.
+
+    fitted: simulated time of one design of the other [s]; fits to the same recordings share it.
+    """
+    tuned = isinstance(job.spec, JobSpec)
+    one = duration(job.spec, job.spec.cases({})) if tuned else fitted
+    return job.progress.evaluations * one
+
+
+def _typical(space: DesignSpace, name: str) -> float | None:
+    """Value of a variable that is fixed, or the middle of its bounds; None if it is neither."""
+    fixed = dict(space.fixed)
+    if name in fixed:
+        return fixed[name]
+    bounds = [(v.low, v.high) for v in space.variables if v.name == name]
+    return 0.5 * sum(bounds[0]) if bounds else None

@@ -1,0 +1,124 @@
+"""Jobs that fit a robot's parameters to measured walks (thesis 2.4)."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, model_validator
+
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.spec import Judgement, Spec
+from sim.case import Case
+from sim.identification.current_fit import LINK_CURRENTS, CurrentFit
+from sim.identification.parameters import identifiable_variables
+from sim.identification.recorded_walk import Recordings
+from sim.outcome import Objective
+from sim.robot import load_robot
+
+Floats = NDArray[np.float64]
+
+RecordingId = Annotated[
+    str,
+    Field(
+        pattern=r"^[0-9a-f]{32}$",
+        description="Id of a recorded walk, as POST /v1/recordings answers it.",
+        examples=["0f343b0931126a20f133d67c2b018a3b"],
+    ),
+]
+
+Link = Literal[1, 2, 3]
+
+
+class IdentificationSpec(Spec):
+    """Identification: which of a robot's parameters are fitted to which recorded walks.
+
+    Fitness is the mean absolute error of motor currents (eq. 2.21), over links and walks [A].
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "kind": "identification",
+                    "recordings": ["0f343b0931126a20f133d67c2b018a3b"],
+                    "variables": ["battery_voltage", "body_mass"],
+                    "iterations": 100,
+                }
+            ]
+        },
+    )
+
+    kind: Literal["identification"] = Field(description="Fit parameters of the robot.")
+    recordings: tuple[RecordingId, ...] = Field(
+        min_length=1,
+        max_length=32,
+        description="Walks to fit, several at once; see /v1/recordings.",
+    )
+    links: tuple[Link, ...] = Field(
+        default=(1, 2, 3),
+        min_length=1,
+        max_length=3,
+        description="Links whose currents are compared: 1 coxa, 2 femur, 3 tibia.",
+    )
+
+    @model_validator(mode="after")
+    def _can_be_run(self) -> IdentificationSpec:
+        for field, values in (("recordings", self.recordings), ("links", self.links)):
+            for value in values:
+                if values.count(value) > 1:
+                    raise ValueError(f"{field}: {value} is named twice")
+        self.design_space()
+        return self
+
+    def design_space(self) -> DesignSpace:
+        """See `Spec.design_space`: any of the robot's parameters; the others stay as described."""
+        known = identifiable_variables(load_robot(self.robot))
+        chosen = self.variables
+        if chosen is None:
+            chosen = tuple(v for v in known if v.name not in self.fixed)
+        return DesignSpace.build(required=(), optional=known, chosen=chosen, fixed=self.fixed)
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """See `Spec.objectives`: mean absolute error of the currents of each link."""
+        return LINK_CURRENTS
+
+    @property
+    def case_names(self) -> tuple[str, ...]:
+        """See `Spec.case_names`: the recordings' ids, shortened."""
+        return tuple(recording[:12] for recording in self.recordings)
+
+    @property
+    def recording_ids(self) -> tuple[str, ...]:
+        """See `Spec.recording_ids`."""
+        return self.recordings
+
+    def cases(self, recordings: Recordings) -> tuple[Case, ...]:
+        """See `Spec.cases`: one fit to each recorded walk."""
+        names = self.design_space().names
+        return tuple(
+            CurrentFit(name, self.robot, recordings[recording], names)
+            for name, recording in zip(self.case_names, self.recordings, strict=True)
+        )
+
+    def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
+        """See `Spec.judge`: a case's utility is the mean over `links`, fitness that over walks."""
+        columns = [link - 1 for link in self.links]
+        means = [
+            [math.fsum(walk) / len(columns) for walk in design]
+            for design in objectives[:, :, columns].tolist()
+        ]
+        errors = np.where(failed, np.inf, np.array(means).reshape(failed.shape))
+        fitness = [math.fsum(row) / len(row) for row in errors.tolist()]
+        with np.errstate(divide="ignore"):
+            return Judgement(np.array(fitness), np.log(errors))
+
+    def resolved(self) -> IdentificationSpec:
+        """See `Spec.resolved`."""
+        space = self.design_space()
+        return self.model_copy(
+            update={"variables": space.variables, "fixed": dict(space.fixed)},
+        )

@@ -1,0 +1,252 @@
+"""Jobs and what is remembered of them: the domain objects of the service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.errors import Conflict, InvalidRequest
+from services.optimizer.jobs.documents import AnySpec
+from sim.identification.recorded_walk import Recordings
+from sim.outcome import Outcome
+
+
+class JobState(StrEnum):
+    """Where a job is in its life."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+    SUCCEEDED = "succeeded"
+
+    @property
+    def terminal(self) -> bool:
+        """Nothing more happens to it by itself."""
+        return self in (JobState.CANCELLED, JobState.FAILED, JobState.SUCCEEDED)
+
+
+class Command(StrEnum):
+    """What a user may ask of a job."""
+
+    PAUSE = "pause"
+    RESUME = "resume"
+    CANCEL = "cancel"
+
+
+class JobOrder(StrEnum):
+    """How a list of jobs is sorted."""
+
+    CREATED = "created"
+    """Newest first."""
+    FITNESS = "fitness"
+    """Best fitness first, jobs without one last."""
+    NAME = "name"
+    """By name whatever its case, jobs without one last."""
+
+
+TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
+    (JobState.QUEUED, Command.PAUSE): JobState.PAUSED,
+    (JobState.RUNNING, Command.PAUSE): JobState.PAUSING,
+    (JobState.PAUSED, Command.RESUME): JobState.QUEUED,
+    (JobState.PAUSING, Command.RESUME): JobState.RUNNING,
+    (JobState.FAILED, Command.RESUME): JobState.QUEUED,
+    (JobState.QUEUED, Command.CANCEL): JobState.CANCELLED,
+    (JobState.RUNNING, Command.CANCEL): JobState.CANCELLED,
+    (JobState.PAUSING, Command.CANCEL): JobState.CANCELLED,
+    (JobState.PAUSED, Command.CANCEL): JobState.CANCELLED,
+    (JobState.FAILED, Command.CANCEL): JobState.CANCELLED,
+}
+"""Every transition that a user can ask for; the runner's own are claim, pause, end."""
+
+
+def commanded(state: JobState, command: Command) -> JobState:
+    """The state after a command; Conflict says what is possible instead."""
+    try:
+        return TRANSITIONS[state, command]
+    except KeyError:
+        possible = [c.value for (s, c) in TRANSITIONS if s is state]
+        hint = f"possible now: {', '.join(possible)}" if possible else "it has ended"
+        raise Conflict(f"cannot {command} a job that is {state}; {hint}") from None
+
+
+LARGEST_BUDGET: Final = 1_000_000
+"""Iterations, as in a spec."""
+
+
+def extended(state: JobState, committed: int, iterations: int) -> JobState:
+    """The state of a job after it got another budget, of `iterations` in all.
+
+    committed: iterations that it has. Raises Conflict for a job that was cancelled, InvalidRequest
+    for a budget that is spent already.
+    """
+    if state is JobState.CANCELLED:
+        raise Conflict("cannot extend a job that is cancelled; submit its spec as a new one")
+    if not committed < iterations <= LARGEST_BUDGET:
+        raise InvalidRequest(
+            f"must be more than the {committed} that the job has committed, and at most"
+            f" {LARGEST_BUDGET}; it is the number in all, not of further ones",
+            field="iterations",
+        )
+    return JobState.QUEUED if state is JobState.SUCCEEDED else state
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """One design, judged in every case of its job.
+
+    design: (v,) values of `Job.spec.design_space().names`.
+    objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN where there
+        is none; statuses: (K,) uint8.
+    fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
+    """
+
+    iteration: int
+    particle: int
+    design: NDArray[np.float64]
+    objectives: NDArray[np.float64]
+    statuses: NDArray[np.uint8]
+    fitness: float
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a job is; read with the job in one query."""
+
+    iterations: int = 0
+    evaluations: int = 0
+    best_fitness: float | None = None
+    best_iteration: int | None = None
+    best_particle: int | None = None
+    compute_seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A job as stored.
+
+    spec: resolved, no preset is left to be looked up; its `iterations` are the present budget.
+    """
+
+    id: str
+    spec: AnySpec
+    state: JobState
+    created_at: datetime
+    updated_at: datetime
+    started_at: datetime | None = None
+    finished_at: datetime | None = None
+    error: str | None = None
+    progress: Progress = field(default_factory=Progress)
+
+
+@dataclass(frozen=True, slots=True)
+class Iteration:
+    """One committed iteration, as it is listed: no particles.
+
+    index counts from 0. best, mean, median, worst: fitness over the swarm's finite values, None
+    if no particle has one. best_so_far: over this and all earlier iterations.
+    """
+
+    index: int
+    best: float | None
+    mean: float | None
+    median: float | None
+    worst: float | None
+    best_so_far: float | None
+    failed: int
+    evaluate_seconds: float
+    committed_at: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """An iteration that is to be evaluated: stored before it is sent out.
+
+    positions: (particles, d) as the optimizer gave them; state: the optimizer's dump after the ask.
+    Both are stored as standard JSON, so every number in them is finite.
+    """
+
+    iteration: int
+    positions: NDArray[np.float64]
+    state: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answered:
+    """A committed ask with its fitness (particles,), from which the next one follows."""
+
+    ask: Ask
+    fitness: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class CompletedIteration:
+    """All that one transaction commits of an iteration.
+
+    designs: (n, v); outcomes: one per case, of n designs each; fitness: (n,).
+    """
+
+    iteration: int
+    designs: NDArray[np.float64]
+    outcomes: tuple[Outcome, ...]
+    fitness: NDArray[np.float64]
+    evaluate_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A lease on a job. `token` fences: a store refuses writes under an older one.
+
+    ask: the stored one to go on with; None for a job that has not begun, or was extended after its
+        budget was spent.
+    answered: the last committed one, where there is no other to go on with.
+    recordings: those that the job's spec names.
+    """
+
+    job: Job
+    runner: str
+    token: int
+    ask: Ask | None
+    recordings: Recordings = field(default_factory=dict)
+    answered: Answered | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TimeLeft:
+    """Rates so far, and the rest of the budget at that rate.
+
+    eta_seconds: [s]; 0 for a job that succeeded, None unless it runs and has committed something.
+    evaluations_per_second: designs judged [1/s]; simulations_per_second: walks, one per design and
+        scenario [1/s]; None before the first commit.
+    """
+
+    eta_seconds: float | None
+    evaluations_per_second: float | None
+    simulations_per_second: float | None
+
+
+def time_left(job: Job, now: datetime) -> TimeLeft:
+    """now: aware; the iteration under way counts as done in part, by the time since the last one.
+
+    Rates are over the time spent evaluating, so pauses and the time in the queue do not count.
+    """
+    progress = job.progress
+    if progress.iterations == 0 or progress.compute_seconds <= 0.0:
+        return TimeLeft(0.0 if job.state is JobState.SUCCEEDED else None, None, None)
+    rate = progress.evaluations / progress.compute_seconds
+    eta: float | None = None
+    if job.state is JobState.SUCCEEDED:
+        eta = 0.0
+    elif job.state is JobState.RUNNING:
+        one = progress.compute_seconds / progress.iterations
+        remaining = max(0, job.spec.iterations - progress.iterations) * one
+        under_way = min(one, max(0.0, (now - job.updated_at).total_seconds()))
+        eta = max(0.0, remaining - under_way)
+    return TimeLeft(eta, rate, rate * len(job.spec.case_names))

@@ -1,0 +1,102 @@
+"""Bias-weighted product and geometric mean (thesis eq. 4.1, 4.2), in logarithms."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from services.optimizer.jobs.spec import Judgement, exponential
+
+N_PREFERRED: Final = 5
+"""Objectives f1..f5 enter the product; f6 belongs to the single-scenario fitness of chapter 3."""
+
+_FIELDS: Final = ("torque", "acceleration", "angular_acceleration", "energy", "reciprocal_speed")
+
+
+# With exponents up to ten, objectives up to a million cannot overflow a double.
+Bias = Annotated[float, Field(ge=0.0, le=1e6)]
+Exponent = Annotated[float, Field(ge=0.0, le=10.0)]
+
+
+class Preference(BaseModel):
+    """Biases b and exponents e of the five objectives, in the order f1..f5 of table 4.1.
+
+    A scenario's utility is prod_m (b_m + f_m) ** e_m, to be minimized.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    bias: tuple[Bias, Bias, Bias, Bias, Bias] = Field(
+        description="b_m >= 0, in the unit of f_m: " + ", ".join(_FIELDS),
+        examples=[(0.9, 0.8, 0.24, 0.5, 0.8)],
+    )
+    exponent: tuple[Exponent, Exponent, Exponent, Exponent, Exponent] = Field(
+        description="e_m >= 0: weight of each objective; not all of them zero.",
+        examples=[(0.1, 0.7, 0.3, 0.3, 0.1)],
+    )
+
+    @model_validator(mode="after")
+    def _ranks_designs(self) -> Preference:
+        if not any(self.exponent):
+            raise ValueError("exponents are all zero, so every design would be worth the same")
+        return self
+
+
+PreferenceName = Literal["A", "B", "C"]
+
+PREFERENCES: Final[dict[PreferenceName, Preference]] = {
+    "A": Preference(bias=(0.9, 0.8, 0.24, 0.5, 0.8), exponent=(0.1, 0.7, 0.3, 0.3, 0.1)),
+    "B": Preference(bias=(0.4, 0.7, 0.3, 0.4, 1.0), exponent=(0.2, 0.6, 0.8, 0.1, 0.2)),
+    "C": Preference(bias=(0.0, 0.0, 0.0, 0.0, 0.0), exponent=(1.0, 1.0, 1.0, 1.0, 1.0)),
+}
+"""Table 4.5."""
+
+
+def judge(
+    objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
+) -> Judgement:
+    """Eq. 4.1 and 4.2 of n designs in K scenarios: objectives (n, K, >= 5), failed (n, K)."""
+    logarithms = log_utilities(objectives, failed, preference)
+    return Judgement(geometric_mean(logarithms), logarithms)
+
+
+def log_utilities(
+    objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
+) -> NDArray[np.float64]:
+    """Logarithm of eq. 4.1 for every design and scenario.
+
+    objectives: (..., >= 5), f1..f5 first; failed: (...) true where the walk has no utility.
+    Returns (...): the logarithm of the utility, +inf where failed or where an objective with a
+    weight is not finite.
+    """
+    flat = objectives.reshape(-1, objectives.shape[-1])
+    values = [
+        math.inf if bad else _log_product(row, preference)
+        for row, bad in zip(flat.tolist(), failed.reshape(-1).tolist(), strict=True)
+    ]
+    return np.array(values, dtype=np.float64).reshape(failed.shape)
+
+
+def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Eq. 4.2 over the last axis: (n, scenarios) log utilities -> (n,) fitness, +inf if any is."""
+    means = [
+        math.inf if math.inf in row else math.fsum(row) / len(row) for row in log_utility.tolist()
+    ]
+    return np.array([exponential(mean) for mean in means], dtype=np.float64)
+
+
+def _log_product(row: list[float], preference: Preference) -> float:
+    terms = []
+    for f, b, e in zip(row, preference.bias, preference.exponent, strict=False):
+        if e == 0.0:
+            continue
+        factor = b + f
+        if not math.isfinite(factor):
+            return math.inf
+        # A factor of zero or less cannot be improved upon; only a robot at rest reaches it.
+        terms.append(e * math.log(factor) if factor > 0.0 else -math.inf)
+    return math.fsum(terms)

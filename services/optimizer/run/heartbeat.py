@@ -1,0 +1,90 @@
+"""Keeps a lease alive while its job runs, and sees what users have asked of the job meanwhile."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, Self
+
+from services.optimizer.errors import LeaseLost, StoreUnavailable
+from services.optimizer.jobs.job import Claim, JobState
+from services.optimizer.store.base import Store
+
+_BEATS_PER_LEASE: Final = 3
+_LONGEST_INTERVAL: Final = 1.0
+"""Seconds after which a cancellation or a pause is seen at the latest."""
+
+_log = logging.getLogger(__name__)
+
+
+class Heartbeat:
+    """Renews a claim from a thread of its own, from entering to leaving the `with` block.
+
+    A store that does not answer is tried again until the lease must have run out; then the job
+    counts as lost, because another runner may have it.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        claim: Claim,
+        *,
+        lease_seconds: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._store = store
+        self._claim = claim
+        self._lease_seconds = lease_seconds
+        self._clock = clock
+        self._interval = min(lease_seconds / _BEATS_PER_LEASE, _LONGEST_INTERVAL)
+        self._ended = threading.Event()
+        self._lost = threading.Event()
+        self._state = claim.job.state
+        self._thread = threading.Thread(
+            target=self._beat, name=f"heartbeat-{claim.job.id}", daemon=True
+        )
+
+    @property
+    def lost(self) -> bool:
+        """The job was cancelled, or is or may be another runner's."""
+        return self._lost.is_set()
+
+    @property
+    def state(self) -> JobState:
+        """State of the job at the last beat."""
+        return self._state
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _beat(self) -> None:
+        good_until = self._clock() + self._lease_seconds
+        while not self._ended.wait(self._interval):
+            sent = self._clock()
+            try:
+                self._state = self._store.renew(self._claim, lease_seconds=self._lease_seconds)
+                good_until = sent + self._lease_seconds
+            except LeaseLost as error:
+                # A commit that ends the job gives up the lease between two beats.
+                if not self._ended.is_set():
+                    _log.info("job %s: %s", self._claim.job.id, error)
+                self._lost.set()
+                return
+            except StoreUnavailable as error:
+                _log.warning("job %s: no heartbeat: %s", self._claim.job.id, error)
+                if self._clock() >= good_until:
+                    self._lost.set()
+                    return

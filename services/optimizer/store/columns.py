@@ -1,0 +1,71 @@
+"""Many rows of `evaluations` at once, as columns.
+
+JSON texts of thousands of rows are joined to one array and parsed in one go, which is faster than
+reading them one by one, as `rows.to_evaluation` does, and makes no object for each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+from sqlalchemy import Connection, Text, cast, select
+
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.store.tables import evaluations
+from sim.outcome import Status
+
+# Faster than the standard library's parser by half, and as exact.
+_JSON: Final = TypeAdapter(Any)
+
+
+def select_columns(
+    connection: Connection, job_id: str, first: int, last: int
+) -> EvaluationColumns | None:
+    """Evaluations of the committed iterations first <= index < last; None if there is none."""
+    table = evaluations.c
+    query = (
+        select(
+            table.iteration,
+            table.particle,
+            table.fitness,
+            # As text: both databases keep the JSON as it was written.
+            cast(table.design, Text),
+            cast(table.objectives, Text),
+            cast(table.statuses, Text),
+        )
+        .where(table.job_id == job_id, table.iteration >= first, table.iteration < last)
+        .order_by(table.iteration, table.particle)
+    )
+    rows = connection.execute(query).all()
+    if not rows:
+        return None
+    iteration, particle, fitness, designs, objectives, statuses = zip(*rows, strict=True)
+    return EvaluationColumns(
+        iteration=np.array(iteration, dtype=np.int64),
+        particle=np.array(particle, dtype=np.int64),
+        designs=_numbers(designs),
+        objectives=_numbers(objectives),
+        statuses=_statuses(statuses),
+        fitness=np.array([math.inf if f is None else f for f in fitness], dtype=np.float64),
+    )
+
+
+def _numbers(texts: Iterable[str]) -> NDArray[np.float64]:
+    """Nested arrays of numbers, one text a row; null is NaN."""
+    return np.array(_JSON.validate_json(f"[{','.join(texts)}]"), dtype=np.float64)
+
+
+def _statuses(texts: Sequence[str]) -> NDArray[np.uint8]:
+    """Arrays of labels, of which a job has few different ones."""
+    values = cache(_status_values)
+    return np.array([values(text) for text in texts], dtype=np.uint8)
+
+
+def _status_values(text: str) -> list[int]:
+    return [Status.from_label(label) for label in _JSON.validate_json(text)]

@@ -1,0 +1,104 @@
+"""How one iteration is cut into tasks, and one task as it is sent to a worker."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import pickle
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.case import Case
+from sim.errors import SimulationError
+from sim.outcome import Outcome
+
+_TASKS_PER_SLOT: Final = 3
+"""Enough for the last tasks to end at about the same time, few enough to keep each long."""
+
+_SHORTEST: Final = 10.0
+"""Simulated seconds in a task at least: tens of milliseconds of work, against milliseconds to
+send it."""
+
+_LONGEST: Final = 250.0
+"""Simulated seconds in a task at most, if its case can be cut so fine: about a second, so
+that other jobs, and whoever cancels this one, need not wait."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Designs start <= index < stop in one case.
+
+    cost: simulated seconds that the kernel steps through, with its lanes filled up.
+    """
+
+    case: int
+    start: int
+    stop: int
+    cost: float
+
+
+def cut(durations: Sequence[float], designs: int, *, slots: int, lanes: int) -> tuple[Chunk, ...]:
+    """Chunks of all cases, longest first.
+
+    durations: simulated seconds of each case. Every chunk but a case's last is a multiple
+    of `lanes`, because the kernel steps so many walkers together, present or not.
+    """
+    blocks = math.ceil(designs / lanes)
+    total = sum(durations) * blocks * lanes
+    wanted = min(max(total / (_TASKS_PER_SLOT * slots), _SHORTEST), _LONGEST)
+    chunks: list[Chunk] = []
+    for case, duration in enumerate(durations):
+        largest = max(1, round(wanted / (duration * lanes)))
+        pieces = max(1, math.ceil(blocks / largest))
+        edges = [blocks * piece // pieces for piece in range(pieces + 1)]
+        chunks += [
+            Chunk(case, a * lanes, min(b * lanes, designs), (b - a) * lanes * duration)
+            for a, b in itertools.pairwise(edges)
+            if b > a
+        ]
+    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.case, chunk.start)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """Some designs in one case. designs: (n, v)."""
+
+    case: Case
+    designs: NDArray[np.float64]
+
+    def run(self) -> Outcome:
+        """Put them to it."""
+        return self.case.run(self.designs)
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """What the simulation raised, on its way back from another process."""
+
+    error: Exception
+
+
+def run_in_worker(task: Task) -> Outcome | Failure:
+    """The body of a remote task. An error is a result here, not a sign of a broken worker."""
+    try:
+        return task.run()
+    except Exception as error:  # noqa: BLE001 - it is raised again where the result is wanted
+        return Failure(transportable(error))
+
+
+def transportable(error: Exception) -> Exception:
+    """The error itself if it survives pickling, else one of its family with the same message."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - written by the line itself
+    except Exception:  # noqa: BLE001 - a constructor may raise anything
+        family = SimulationError if isinstance(error, SimulationError) else RuntimeError
+        return family(f"{type(error).__name__}: {error}")
+    return error
+
+
+def warm_up() -> None:
+    """Does nothing; but a process that was sent it has imported what a walk needs."""

@@ -1,0 +1,70 @@
+"""What every design of a job is put to, as it is sent to whoever runs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.outcome import OBJECTIVES, Objective, Outcome
+from sim.robot import RobotSource
+from sim.scenario import Scenario
+from sim.simulate import simulate
+
+
+class Case(Protocol):
+    """One test of designs, with all that it depends on; immutable, and fit for another process.
+
+    A design's result depends on the case and the design alone, bit for bit.
+    """
+
+    @property
+    def name(self) -> str:
+        """Unique in its job."""
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of one design [s]."""
+
+    @property
+    def robot(self) -> RobotSource:
+        """The robot, whose kernel should be ready before many processes need it."""
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """Columns of its outcomes' objectives, in order."""
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        """designs: (n, v). Raises SimulationInputError for one that cannot be simulated."""
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """Designs of a controller walk through a scenario. variables: columns of the designs."""
+
+    robot: RobotSource
+    controller: str
+    scenario: Scenario
+    variables: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """See `Case.name`."""
+        return self.scenario.name
+
+    @property
+    def duration(self) -> float:
+        """See `Case.duration`."""
+        return self.scenario.duration
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """See `Case.objectives`: f1..f6 of table 4.1."""
+        return OBJECTIVES
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        """See `Case.run`."""
+        walked = simulate(self.scenario, self.controller, self.variables, designs, robot=self.robot)
+        return walked.outcome

@@ -1,0 +1,147 @@
+"""What a job will cost: counted exactly, timed by jobs like it or by a walk of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.estimate import MeasuredRates, estimate
+from services.optimizer.jobs.identification import IdentificationSpec
+from services.optimizer.jobs.job import Job, Progress
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.pso import PsoSettings
+from sim.identification.recorded_walk import RecordedWalk
+from sim.robot import RobotVariant
+from sim.scenario import Scenario
+from sim.simulate import Simulation, simulate
+from sim.variables import Variable
+from tests.optimizer.formula import job
+
+SPEC = JobSpec.model_validate(
+    {
+        "controller": "pi",
+        "scenarios": [
+            {"name": "one", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "cycles": 2.0},
+            {"name": "two", "cycle_time": 1.0, "radius": 0.16, "withers": 0.15, "cycles": 1.0},
+        ],
+        "optimizer": {"particles": 10},
+        "iterations": 5,
+    }
+)
+
+
+class NoMeasurement(MeasuredRates):
+    def rate(self, spec: Spec, cases: object) -> tuple[float | None, str]:
+        return None, "nothing"
+
+
+def done(spec: AnySpec, evaluations: int, seconds: float) -> Job:
+    progress = Progress(iterations=1, evaluations=evaluations, compute_seconds=seconds)
+    return replace(job(spec), progress=progress)
+
+
+def estimated(spec: JobSpec, *earlier: Job) -> tuple[float | None, str]:
+    found = estimate(spec, spec.cases({}), earlier, NoMeasurement())
+    return found.seconds, found.basis
+
+
+def test_walks_and_their_length_are_counted() -> None:
+    found = estimate(SPEC, SPEC.cases({}), (), NoMeasurement())
+    assert (found.evaluations, found.walks) == (50, 100)
+    assert found.simulated_seconds == pytest.approx(50 * (3.0 + 1.0))
+    assert (found.seconds, found.basis) == (None, "nothing")
+
+
+def test_a_cycle_time_of_the_design_replaces_that_of_the_scenarios() -> None:
+    bounds = Variable(name="cycle_time", low=1.0, high=3.0)
+    fixed = SPEC.model_copy(update={"fixed": {"cycle_time": 2.0}})
+    searched = SPEC.model_copy(update={"variables": ("P", "I", bounds)})
+    for spec in (fixed, searched):
+        found = estimate(spec, spec.cases({}), (), NoMeasurement())
+        assert found.simulated_seconds == pytest.approx(50 * 3.0 * 2.0)
+
+
+def test_jobs_alike_tell_how_long_it_takes() -> None:
+    # 40 and 20 designs of 4 s each, in 3 s together: 80 simulated seconds a second.
+    seconds, basis = estimated(SPEC, done(SPEC, 40, 1.0), done(SPEC, 20, 2.0))
+    assert seconds == pytest.approx(200.0 / 80.0)
+    assert "2 earlier jobs" in basis
+
+
+def test_a_job_that_has_done_nothing_tells_nothing() -> None:
+    assert estimated(SPEC, job(SPEC)) == (None, "nothing")
+
+
+@pytest.mark.parametrize(
+    "change", [{"controller": "pid"}, {"robot": RobotVariant(contact_law="stick")}]
+)
+def test_jobs_of_another_robot_or_controller_tell_nothing(change: dict[str, object]) -> None:
+    other = JobSpec.model_validate(SPEC.model_dump(exclude=set(change)) | change)
+    assert estimated(SPEC, done(other, 40, 1.0)) == (None, "nothing")
+
+
+@pytest.mark.slow
+def test_without_a_job_alike_a_walk_is_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rates = MeasuredRates()
+    first = estimate(SPEC, SPEC.cases({}), (), rates)
+    assert first.seconds is not None and 0.0 < first.seconds < 60.0
+    assert "measured on this machine" in first.basis
+    monkeypatch.setattr("services.optimizer.jobs.estimate.create_optimizer", None)
+    assert estimate(SPEC, SPEC.cases({}), (), rates) == first
+
+
+@pytest.mark.slow
+def test_a_measured_walk_is_short_however_long_the_jobs_walks_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenario = SPEC.resolved_scenarios()[0].model_copy(update={"cycles": 100.0})
+    long = SPEC.model_copy(update={"scenarios": (scenario,)})
+    walked: list[float] = []
+
+    def noted(scenario: Scenario, *arguments: Any, **options: Any) -> Simulation:
+        walked.append(scenario.cycles)
+        return simulate(scenario, *arguments, **options)
+
+    monkeypatch.setattr("sim.case.simulate", noted)
+    found = estimate(long, long.cases({}), (), MeasuredRates())
+    assert found.seconds is not None
+    assert max(walked) * scenario.cycle_time == pytest.approx(5.0)
+
+
+@pytest.mark.slow
+def test_a_gait_beyond_reach_has_no_rate() -> None:
+    bounds = Variable(name="stride", low=0.5, high=0.6)
+    spec = SPEC.model_copy(update={"variables": ("P", "I", bounds)})
+    found = estimate(spec, spec.cases({}), (), MeasuredRates())
+    assert found.seconds is None
+    assert "reach" in found.basis
+
+
+def test_a_fit_is_timed_by_fits_to_the_same_recordings() -> None:
+    walk = RecordedWalk(
+        scenario=SPEC.resolved_scenarios()[0],
+        controller="pi",
+        design={"P": 0.4, "I": 0.1},
+        first_tick=0,
+        joints=("a",),
+        current=((0.1,),),
+    )
+    recordings = {"0" * 32: walk, "1" * 32: walk}
+    one, both = (
+        IdentificationSpec(
+            kind="identification", recordings=ids, optimizer=PsoSettings(particles=10), iterations=5
+        )
+        for ids in (tuple(recordings)[:1], tuple(recordings))
+    )
+
+    def seconds(spec: IdentificationSpec, *earlier: Job) -> float | None:
+        return estimate(spec, spec.cases(recordings), earlier, NoMeasurement()).seconds
+
+    fitted = done(one.model_copy(update={"iterations": 99}), evaluations=20, seconds=4.0)
+    assert seconds(one, fitted) == pytest.approx(50 * 4.0 / 20)
+    assert seconds(both, fitted) is None
+    assert seconds(one, done(SPEC, evaluations=20, seconds=4.0)) is None

@@ -13,7 +13,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page bench test unit lint format pictures lock clean setup setup-dev page-if-possible
+.PHONY: help demo serve page bench test unit lint format architecture pictures lock clean setup setup-dev page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -48,12 +48,15 @@ lint: setup-dev ## Check style, types, imports between packages and declared dep
 	@scripts/npm.sh --if-possible run check
 	@scripts/npm.sh --if-possible run lint
 
+architecture: setup-dev ## Draw docs/images/architecture.svg anew, from the imports of the code.
+	@$(BIN)/python -m scripts.architecture
+
 format: setup-dev ## Format the code and fix what can be fixed.
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 	@scripts/npm.sh --if-possible run format
 
-pictures: setup-dev ## Draw the pictures of the page in docs/images anew.
+pictures: architecture ## Draw the pictures in docs/images anew: the page's, and the architecture.
 	@scripts/page.sh
 	@GAITSWARM_REQUIRE_PAGE=1 GAITSWARM_SCREENSHOTS=docs/images $(BIN)/python -m pytest -q tests/web/test_pictures.py $(ARGS)
 

@@ -1,0 +1,1 @@
+"""REST under /v1, and the page: how programs ask."""

@@ -1,0 +1,1 @@
+"""The Python library: typed results, and jobs here or on a server."""

@@ -1,4 +1,4 @@
-"""The composition root: the one place where store, evaluator and runner meet."""
+"""The composition root: store, evaluator and runner meet here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be asked of the service, in the words of its users; the API and the CLI call this."""
+"""What can be asked of the service, in the words of its users."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""Where walks run: in threads of this process, or on Ray."""

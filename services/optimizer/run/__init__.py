@@ -1,0 +1,1 @@
+"""A job under way: the coordinator decides, the runner does."""

@@ -1,0 +1,1 @@
+"""The memory: jobs, iterations and evaluations in SQL."""

@@ -42,7 +42,7 @@ RobotOption = Annotated[
         "--robot",
         metavar="NAME|JSON|FOLDER",
         help="Robot by name, a variant as JSON, such as"
-        ' {"contact_law": "stick", "gearlash": [2.5, 1, 1]}, or the folder of your own.',
+        ' {"contact_law": "stick", "backlash": [2.5, 1, 1]}, or the folder of your own.',
     ),
 ]
 

@@ -17,6 +17,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     """A robot's name, a variant as JSON, or a folder. Raises InvalidRequest."""
     from pydantic import TypeAdapter, ValidationError
 
+    from sim.former_names import as_written
     from sim.robot import RobotSource
     from sim.robot.robot import SHIPPED
 
@@ -34,7 +35,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
         kind = "RobotFiles" if _is_files(data) else "RobotVariant"
         chosen = [e for e in error.errors(include_url=False) if kind in str(e["loc"][0])]
         first = (chosen or error.errors(include_url=False))[0]
-        within = first["loc"][1:] if chosen and not isinstance(data, str) else ()
+        within = as_written(data, first["loc"][1:]) if chosen and not isinstance(data, str) else ()
         where = ".".join(str(part) for part in ("robot", *within))
         raise InvalidRequest(first["msg"].removeprefix("Value error, "), field=where) from error
     return robot

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gaitswarm.views import FieldErrorView
+from sim.former_names import as_written
 
 _OTHER_SHAPE: Final = frozenset(
     {"string_type", "literal_error", "model_type", "model_attributes_type", "dict_type"}
@@ -59,7 +60,7 @@ def field_error(field: str, message: str) -> FieldErrorView:
 def _entry(error: Mapping[str, Any], document: Any) -> _Entry:
     path: Path = ()
     labels: list[tuple[Path, str]] = []
-    location = error["loc"]
+    location = as_written(document, error["loc"])
     for position, part in enumerate(location):
         last = position == len(location) - 1
         if _has(document, part):
@@ -90,7 +91,7 @@ def _follows_from_others(error: Mapping[str, Any], document: Any) -> bool:
     """A list whose items are wrong is then too short as well, though it was not in the input."""
     if error["type"] != "too_short":
         return False
-    for part in error["loc"]:
+    for part in as_written(document, error["loc"]):
         if _has(document, part):
             document = document[part]
     return isinstance(document, list | tuple) and len(document) >= error["ctx"]["min_length"]

@@ -34,7 +34,7 @@ class UnreachablePose(SimulationInputError):
         self.miss = miss
         super().__init__(
             f"scenario {scenario!r}: leg {leg!r} misses its foot trajectory by"
-            f" {miss * 1000:.1f} mm; reduce stride, radius or withers"
+            f" {miss * 1000:.1f} mm; reduce stride, radius or hip_height"
         )
 
     def __reduce__(self) -> tuple[type[UnreachablePose], tuple[str, str, float]]:

@@ -43,8 +43,8 @@ class Status(IntEnum):
 _PHRASES: Final = {
     Status.OK: "walked to the end",
     Status.DIVERGED: "a state became infinite or undefined; check gains and contact stiffness",
-    Status.FELL: "the body sank below half its withers or tilted over 45 degrees",
-    Status.UNREACHABLE: "the foot trajectory leaves the leg's reach; reduce stride or withers",
+    Status.FELL: "the body sank below half its hip height or tilted over 45 degrees",
+    Status.UNREACHABLE: "the foot trajectory leaves the leg's reach; reduce stride or hip_height",
     Status.STALLED: "the robot did not move forward, so energy per metre has no value",
 }
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from sim import former_names
 from sim.errors import SimulationInputError
+from sim.former_names import current_names
 from sim.variables import Variable
 
 ScenarioName = Annotated[
@@ -39,10 +41,10 @@ class Scenario(BaseModel):
         description="Lateral distance of the feet from the body's long axis [m].",
         examples=[0.16],
     )
-    withers: float = Field(
+    hip_height: float = Field(
         gt=0.0,
         le=1.0,
-        description="Height of the coxa axes over the ground [m].",
+        description="Height of the coxa axes over the ground, the thesis's withers [m].",
         examples=[0.15],
     )
     load: float = Field(
@@ -100,6 +102,11 @@ class Scenario(BaseModel):
         default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read_former_names(cls, document: Any) -> Any:
+        return current_names(document, former_names.SCENARIO)
+
     @property
     def duration(self) -> float:
         """Simulated time [s]."""
@@ -141,12 +148,12 @@ A value set by a design replaces the scenario's own in every scenario.
 GAIT_VARIABLE_NAMES: Final = frozenset(variable.name for variable in GAIT_VARIABLES)
 
 SCENARIOS: Final[tuple[Scenario, ...]] = (
-    Scenario(name="normal-fast", cycle_time=1.5, radius=0.16, withers=0.15),
-    Scenario(name="normal-slow", cycle_time=2.2, radius=0.16, withers=0.15),
-    Scenario(name="loaded-fast", cycle_time=1.5, radius=0.145, withers=0.20, load=2.0),
-    Scenario(name="loaded-slow", cycle_time=2.2, radius=0.145, withers=0.20, load=2.0),
-    Scenario(name="slope-fast", cycle_time=1.5, radius=0.20, withers=0.14, slope=10.0),
-    Scenario(name="turn-right-fast", cycle_time=1.5, radius=0.16, withers=0.15, turn=0.5),
+    Scenario(name="normal-fast", cycle_time=1.5, radius=0.16, hip_height=0.15),
+    Scenario(name="normal-slow", cycle_time=2.2, radius=0.16, hip_height=0.15),
+    Scenario(name="loaded-fast", cycle_time=1.5, radius=0.145, hip_height=0.20, load=2.0),
+    Scenario(name="loaded-slow", cycle_time=2.2, radius=0.145, hip_height=0.20, load=2.0),
+    Scenario(name="slope-fast", cycle_time=1.5, radius=0.20, hip_height=0.14, slope=10.0),
+    Scenario(name="turn-right-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, turn=0.5),
 )
 """The six scenarios of table 4.2, in its order."""
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from sim.controllers import CONTROLLERS, Drive
+from sim.compiler.compilation import target
+from sim.controllers import CONTROLLERS, ControlLaw
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import Trajectory, desired_angles, require_reachable
@@ -20,7 +21,6 @@ from sim.kernel.native import native_kernel
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.parameters import body_of, gravity_on, pack_parameters
 from sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup
-from sim.native.compilation import target
 from sim.noise import LinkNoise
 from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.robot import Robot, RobotFiles, RobotVariant, load_robot
@@ -32,8 +32,8 @@ Backend = Literal["auto", "native", "reference"]
 PHYSICS_RATE: Final = 5000
 """Physics steps a second [Hz]; the control rate is 500 Hz."""
 
-GEARLASH_PHYSICS_RATE: Final = 20_000
-"""Rate [Hz] for robots with gearlash: without their rotors, tibias answer the ground too fast for
+BACKLASH_PHYSICS_RATE: Final = 20_000
+"""Rate [Hz] for robots with backlash: without their rotors, tibias answer the ground too fast for
 5 kHz."""
 
 RobotChoice = str | RobotVariant | RobotFiles | Robot
@@ -69,8 +69,8 @@ def simulate(
 ) -> Simulation:
     """Let every design walk through a scenario.
 
-    robot: a shipped robot by name, a variant of one, or a `Robot` of your own; with gearlash it is
-        simulated at `GEARLASH_PHYSICS_RATE` at least.
+    robot: a shipped robot by name, a variant of one, or a `Robot` of your own; with backlash it is
+        simulated at `BACKLASH_PHYSICS_RATE` at least.
     planner: the robot that the desired angles are for, if its legs differ from the robot's.
     designs: (n, len(variables)); columns are controller variables (all of them) and gait
         variables (any of them, replacing the scenario's value).
@@ -86,11 +86,11 @@ def simulate(
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
     setups: dict[int, WalkSetup] = {}
-    courses: dict[tuple[float, ...], Callable[[Drive], WalkSetup] | None] = {}
+    courses: dict[tuple[float, ...], Callable[[ControlLaw], WalkSetup] | None] = {}
     for index, row in enumerate(designs.tolist()):
         design = dict(zip(variables, row, strict=True))
         gait = {name: design.pop(name) for name in variables if name in GAIT_VARIABLE_NAMES}
-        drive = CONTROLLERS[controller].compile(design)  # type: ignore[index]
+        control_law = CONTROLLERS[controller].compile(design)  # type: ignore[index]
         key = tuple(gait.values())
         if key not in courses:
             walked = with_gait(scenario, gait)
@@ -104,7 +104,7 @@ def simulate(
             )
         course = courses[key]
         if course is not None:
-            setups[index] = course(drive)
+            setups[index] = course(control_law)
     results = kernel.walk(list(setups.values()), Coding.of(machine, substeps), log=log)
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
@@ -188,8 +188,8 @@ def _check_arguments(
 
 def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[int, float]:
     """Physics steps a control tick, and their length [s]."""
-    if robot.has_gearlash:
-        physics_rate = max(physics_rate, GEARLASH_PHYSICS_RATE)
+    if robot.has_backlash:
+        physics_rate = max(physics_rate, BACKLASH_PHYSICS_RATE)
     return round(physics_rate * CONTROL_PERIOD), 1.0 / physics_rate
 
 
@@ -221,8 +221,8 @@ def course_of(
     noise: LinkNoise | None = None,
     *,
     trajectory: Trajectory | None = None,
-) -> Callable[[Drive], WalkSetup] | None:
-    """All of a walk but its drive, which designs of one gait share.
+) -> Callable[[ControlLaw], WalkSetup] | None:
+    """All of a walk but its control law, which designs of one gait share.
 
     trajectory: desired angles, if they are not those for this robot's legs.
     None for a gait out of the legs' reach.
@@ -235,9 +235,9 @@ def course_of(
     mass = kernel.total_mass - kernel.body.mass + body.mass + scenario.load
     weight = mass * -gravity_on(scenario.slope)[2]
     joints = trajectory.angles[0]
-    memory = np.zeros(kernel.memory)
-    if robot.has_gearlash:
-        memory[:n_joints] = joints
+    internal_state = np.zeros(kernel.internal_state_size)
+    if robot.has_backlash:
+        internal_state[:n_joints] = joints
     codes = np.rint(trajectory.angles * robot.description.sensors.angle_counts)
     return partial(
         WalkSetup,
@@ -247,11 +247,11 @@ def course_of(
                 joints,
             ]
         ),
-        memory,
+        internal_state,
         pack_parameters(robot, body, scenario, timestep),
         codes.astype(np.int32),
-        fall_height=0.5 * scenario.withers,
-        push=None if noise is None else noise.torques(ticks, n_joints),
+        fall_height=0.5 * scenario.hip_height,
+        disturbance=None if noise is None else noise.torques(ticks, n_joints),
     )
 
 

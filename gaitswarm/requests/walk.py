@@ -29,7 +29,7 @@ class WalkRequest(BaseModel):
     robot: RobotSource = Field(
         default="szabadka2",
         description="Robot to simulate, by name, or a variant with another law of friction or with"
-        " gearlash, or the text of the files of your own.",
+        " backlash, or the text of the files of your own.",
     )
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller that drives it; see /v1/controllers."

@@ -27,7 +27,7 @@ _CHANNELS: Final[dict[str, tuple[str, str]]] = {
     "foot_force": ("N", "force of the ground on every foot in the world: x, y, z"),
     "joint_angle": ("rad", "angle of every joint"),
     "desired_angle": ("rad", "desired angle of every joint"),
-    "motor_angle": ("rad", "angle of every joint at its encoder, before any gearlash"),
+    "motor_angle": ("rad", "angle of every joint at its encoder, before any backlash"),
     "current": ("A", "motor current of every joint"),
     "voltage": ("V", "motor voltage of every joint"),
     "load_torque": ("N m", "gear torque of every joint"),

@@ -27,7 +27,7 @@ _COLUMNS: Final[dict[str, tuple[str, str]]] = {
     "base_orientation": ("1", "orientation of the body in the world: quaternion x, y, z, w"),
     "base_velocity": ("m/s, rad/s", "velocity in the body frame: 3 linear, then 3 angular"),
     "joint_angle": ("rad", "angle of every joint"),
-    "motor_angle": ("rad", "angle of every joint at its encoder, before any gearlash"),
+    "motor_angle": ("rad", "angle of every joint at its encoder, before any backlash"),
     "joint_velocity": ("rad/s", "angular velocity of every joint"),
     "desired_angle": ("rad", "desired angle of every joint"),
     "current": ("A", "motor current of every joint"),

@@ -1,4 +1,4 @@
-"""What a motor controller is to the rest: variables to tune, published values, a compiled drive."""
+"""What a motor controller is to the rest: variables to tune, published values, a control law."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ class LookupTable:
 
 
 class Response(Protocol):
-    """What a drive looks up: a table, or for comparison the inference that it came from."""
+    """What a control law looks up: a table, or for comparison the inference that it came from."""
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
         """See `LookupTable.respond`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class ControlLaw:
     """A controller as it runs on the robot: integers only, errors and PWM in coded counts.
 
     Direct part, >> 16: error * proportional_gain + change * derivative_gain + `direct` table's
@@ -114,7 +114,7 @@ class Controller(Protocol):
     def published(self) -> Mapping[str, Mapping[str, float]]:
         """Designs from the literature, by the preference or study that they belong to."""
 
-    def compile(self, design: Mapping[str, float]) -> Drive:
+    def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """Integers for the kernel. Raises SimulationInputError that names the variable."""
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:

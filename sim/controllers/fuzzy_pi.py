@@ -1,7 +1,7 @@
 """Fuzzy-PI of chapter 4: a Mamdani fuzzy-P as a quantised table, plus an integrator.
 
 The proportional part answers to the angle error and the absolute motor current; high current
-reverses the drive, which protects motor and battery (thesis table 4.3). What is simulated is what
+reverses the motor, which protects motor and battery (thesis table 4.3). What is simulated is what
 is shipped: a 10 bit x 6 bit table of 8-bit outputs (section 5.3).
 """
 
@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive, Inference, LookupTable, Universe
+from sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
 from sim.controllers.fixed_point import (
     FRACTION_BITS,
     integral_gain,
@@ -145,14 +145,14 @@ class FuzzyPi:
         }
     )
 
-    def compile(self, design: Mapping[str, float]) -> Drive:
+    def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """See `Controller.compile`."""
         return self.compile_with(design, ERROR, CURRENT)
 
-    def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> Drive:
+    def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
         """The same controller with a table of other resolution."""
         p = _Parameters.of(design)
-        return Drive(integral_gain=p.integral, direct=p.table(error, current))
+        return ControlLaw(integral_gain=p.integral, direct=p.table(error, current))
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
         """See `Controller.inferences`."""
@@ -169,12 +169,12 @@ class FuzzyPi:
         )
         return (fuzzy_p,)
 
-    def without_table(self, design: Mapping[str, float]) -> Drive:
+    def without_table(self, design: Mapping[str, float]) -> ControlLaw:
         """The same controller by full inference, for comparison (reference kernel only)."""
         p = _Parameters.of(design)
         system = inference_system(*p.weights, p.shape)
         exact = ExactInference(system, p.error_range, p.current_range, p.output_range)
-        return Drive(integral_gain=p.integral, direct=exact)
+        return ControlLaw(integral_gain=p.integral, direct=exact)
 
 
 @dataclass(frozen=True, slots=True)

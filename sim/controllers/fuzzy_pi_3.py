@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive, Inference, LookupTable, Universe
+from sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
 from sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     CURRENT_COUNTS,
@@ -183,10 +183,10 @@ class FuzzyPi3:
         }
     )
 
-    def compile(self, design: Mapping[str, float]) -> Drive:
+    def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """See `Controller.compile`."""
         voltage, rate = self.inferences(design)
-        return Drive(direct=voltage.table, integrated=rate.table)
+        return ControlLaw(direct=voltage.table, integrated=rate.table)
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
         """See `Controller.inferences`."""

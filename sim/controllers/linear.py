@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from sim.controllers.base import Drive, Inference
+from sim.controllers.base import ControlLaw, Inference
 from sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     FRACTION_BITS,
@@ -49,10 +49,10 @@ class LinearController:
     variables: tuple[Variable, ...]
     published: Mapping[str, Mapping[str, float]]
 
-    def compile(self, design: Mapping[str, float]) -> Drive:
+    def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """See `Controller.compile`."""
         gains = {v.name: required(design, v.name, low=0.0, high=100.0) for v in self.variables}
-        return Drive(
+        return ControlLaw(
             proportional_gain=to_fixed(gains["P"], FRACTION_BITS),
             integral_gain=integral_gain(gains.get("I", 0.0)),
             derivative_gain=to_fixed(gains.get("D", 0.0) / CONTROL_PERIOD, FRACTION_BITS),

@@ -10,8 +10,8 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.compiler.compilation import load_library, target, vector_header
 from sim.controllers.mamdani import Mamdani, output_points
-from sim.native.compilation import load_library, target, vector_header
 
 _VECTORS_IN_A_BLOCK = 4
 

@@ -67,7 +67,7 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
             leg,
             forward,
             np.full_like(forward, scenario.radius - abs(leg.hip[1])),
-            lift - (scenario.withers - sole),
+            lift - (scenario.hip_height - sole),
         )
         columns.append(angles)
         misses.append(float(miss.max()))

@@ -13,7 +13,7 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
 from sim.identification.parameters import with_parameters
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.drive import electrical
+from sim.kernel.motor import electrical
 from sim.kernel.walk import Coding
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
@@ -63,7 +63,7 @@ class CurrentFit:
                 f"{self.name}: recorded on other joints than those of the robot"
             )
         scenario = with_gait(self.walk.scenario, self.walk.gait)
-        drive = CONTROLLERS[self.walk.controller].compile(self.walk.gains)
+        control_law = CONTROLLERS[self.walk.controller].compile(self.walk.gains)
         kernel = kernel_of(described)
         substeps, timestep = control_steps(described)
         robots = [
@@ -76,7 +76,7 @@ class CurrentFit:
             course = course_of(robot, kernel, scenario, timestep, trajectory=trajectory)
             if course is None:
                 raise SimulationInputError(f"{self.name}: the gait leaves the legs' reach")
-            setups.append(course(drive))
+            setups.append(course(control_law))
         results = kernel.walk(setups, Coding.of(described, substeps), log=True)
         errors = np.full((len(designs), JOINTS_PER_LEG), np.nan)
         statuses = np.full(len(designs), Status.OK, dtype=np.uint8)
@@ -101,12 +101,12 @@ def motor_currents(robot: Robot, states: Floats) -> Floats:
     """
     n = robot.n_joints
     duty = states[:, -n:]
-    # Behind gearlash the motors have angles and rates of their own, first in the memory.
+    # Behind backlash the motors have angles and rates of their own, first in the internal state.
     first = 7 + n + 6
     rates = states[:, first : first + n]
-    if robot.has_gearlash:
+    if robot.has_backlash:
         rates = states[:, first + 2 * n : first + 3 * n]
-    drives, supply = robot.drives(), robot.description.supply
-    columns = list(duty.T), list(rates.T), drives.viscous.tolist()
-    seen = electrical(drives, *columns, supply.voltage, supply.resistance)
+    actuators, supply = robot.actuators(), robot.description.supply
+    columns = list(duty.T), list(rates.T), actuators.viscous.tolist()
+    seen = electrical(actuators, *columns, supply.voltage, supply.resistance)
     return np.stack(seen.currents, axis=1)

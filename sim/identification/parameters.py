@@ -89,24 +89,26 @@ def with_parameters(robot: Robot, values: Mapping[str, float]) -> Robot:
 
 def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescription:
     """Each joint that is named gets a gearhead of its own, each foot contact of its own."""
-    gearheads, drives, legs = dict(d.gearheads), dict(d.drives), list[Leg]()
+    gearheads, actuators, legs = dict(d.gearheads), dict(d.actuators), list[Leg]()
     for leg in d.legs:
-        names = list(leg.drives)
+        names = list(leg.actuators)
         for index, joint in enumerate(leg.joints):
             variable = f"efficiency_{joint}"
             if variable in values:
-                own, drive = f"of {joint}", drives[names[index]]
+                own, actuator = f"of {joint}", actuators[names[index]]
                 gearheads[own] = _changed(
-                    gearheads[drive.gearhead], {"efficiency": variable}, values
+                    gearheads[actuator.gearhead], {"efficiency": variable}, values
                 )
-                drives[own] = drive.model_copy(update={"gearhead": own})
+                actuators[own] = actuator.model_copy(update={"gearhead": own})
                 names[index] = own
         by_field = {field: f"{field}_{leg.name}" for field in _CONTACT}
         own_contact = leg.contact
         if not values.keys().isdisjoint(by_field.values()):
             own_contact = _changed(leg.contact or d.contact, by_field, values)
-        legs.append(leg.model_copy(update={"drives": tuple(names), "contact": own_contact}))
-    return d.model_copy(update={"gearheads": gearheads, "drives": drives, "legs": tuple(legs)})
+        legs.append(leg.model_copy(update={"actuators": tuple(names), "contact": own_contact}))
+    return d.model_copy(
+        update={"gearheads": gearheads, "actuators": actuators, "legs": tuple(legs)}
+    )
 
 
 Part = TypeVar("Part", bound=BaseModel)
@@ -134,7 +136,7 @@ def nominal_values(robot: Robot) -> dict[str, float]:
     }
     if d.body_mass is not None:
         values["body_mass"] = d.body_mass
-    efficiencies = robot.drives().efficiency.tolist()
+    efficiencies = robot.actuators().efficiency.tolist()
     values |= {
         f"efficiency_{joint}": eta
         for joint, eta in zip(robot.joint_names, efficiencies, strict=True)

@@ -1,7 +1,7 @@
 """Ground contact of a point foot and its laws of friction (thesis 2.2.6).
 
-Each law is a function (foot, ground, memory, timestep) -> (force, memory after the step); memory is
-the state that a law carries from step to step, for most of them none.
+Each law is a function (foot, ground, internal state, timestep) -> (force, internal state after the
+step); the internal state is what a law carries from step to step, for most of them nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sim.kernel.articulated_body import Force, LinkState
 from sim.kernel.spatial import Scalar, Vector, add, cross, dot, scale
 from sim.robot.description import ContactLaw
 
-Memory = tuple[Scalar, ...]
+InternalState = tuple[Scalar, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Foot:
     normal: Scalar
     touching: Scalar
 
-    def push(self, force: Vector) -> Force:
+    def on_link(self, force: Vector) -> Force:
         """A force at the foot as a spatial force on its link."""
         return Force(force, cross(self.at, force))
 
@@ -64,44 +64,56 @@ def foot_on_ground(ca: Any, link: LinkState, at: Vector, ground: Mapping[str, Sc
 
 
 def linear_zone(
-    ca: Any, foot: Foot, ground: Mapping[str, Scalar], memory: Memory, timestep: Scalar
-) -> tuple[Force, Memory]:
+    ca: Any,
+    foot: Foot,
+    ground: Mapping[str, Scalar],
+    internal_state: InternalState,
+    timestep: Scalar,
+) -> tuple[Force, InternalState]:
     """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6)."""
-    del memory, timestep
+    del internal_state, timestep
     zone = ground["slip_velocity"]
     # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
     squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
     slip = ca.sqrt(ca.fmax(squared, zone * zone))
     drag = ground["friction"] * foot.normal / slip
     force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
-    return foot.push(force), ()
+    return foot.on_link(force), ()
 
 
 def karnopp(
-    ca: Any, foot: Foot, ground: Mapping[str, Scalar], memory: Memory, timestep: Scalar
-) -> tuple[Force, Memory]:
+    ca: Any,
+    foot: Foot,
+    ground: Mapping[str, Scalar],
+    internal_state: InternalState,
+    timestep: Scalar,
+) -> tuple[Force, InternalState]:
     """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14)."""
-    del ca, memory, timestep
+    del ca, internal_state, timestep
     threshold, limit = ground["stick_velocity"], ground["friction"] * foot.normal
     force = scale(foot.normal, foot.up)
     for axis in (foot.ahead, foot.left):
         speed = dot(axis, foot.velocity)
         sign = (threshold < speed) - (speed < -threshold)
         force = add(force, scale(-limit * sign, axis))
-    return foot.push(force), ()
+    return foot.on_link(force), ()
 
 
 def stick(
-    ca: Any, foot: Foot, ground: Mapping[str, Scalar], memory: Memory, timestep: Scalar
-) -> tuple[Force, Memory]:
+    ca: Any,
+    foot: Foot,
+    ground: Mapping[str, Scalar],
+    internal_state: InternalState,
+    timestep: Scalar,
+) -> tuple[Force, InternalState]:
     """Spring and damper along the ground from where the foot came down, saturated at mu F_z.
 
-    memory: the spring's elongation along the world's x and y [m]; it shrinks when the foot slips,
-    and is gone when it lifts off.
+    internal_state: the spring's elongation along the world's x and y [m]; it shrinks when the foot
+    slips, and is gone when it lifts off.
     """
     k, c = ground["stick_stiffness"], ground["stick_damping"]
     stretched, wanted = [], []
-    for axis, elongation in zip((foot.ahead, foot.left), memory, strict=True):
+    for axis, elongation in zip((foot.ahead, foot.left), internal_state, strict=True):
         speed = dot(axis, foot.velocity)
         longer = (elongation + timestep * speed) * foot.touching
         stretched.append(longer)
@@ -113,15 +125,18 @@ def stick(
     force = scale(foot.normal, foot.up)
     for axis, component in zip((foot.ahead, foot.left), wanted, strict=True):
         force = add(force, scale(share * component, axis))
-    return foot.push(force), tuple(share * longer for longer in stretched)
+    return foot.on_link(force), tuple(share * longer for longer in stretched)
 
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """A law of friction. memory: numbers that it carries a foot; parameters: that it reads."""
+    """A law of friction.
 
-    force: Callable[..., tuple[Force, Memory]]
-    memory: int
+    internal_state_size: numbers that it carries by foot; parameters: that it reads.
+    """
+
+    force: Callable[..., tuple[Force, InternalState]]
+    internal_state_size: int
     parameters: Sequence[str]
 
 

@@ -1,12 +1,12 @@
 /* The walk: per control tick read the sensors, run the controller, step the physics, measure.
-   Included after vec.h, the emitted function `step`, and the sizes NJ (joints), NX (numbers carried
-   beside q and v), NP (parameters). ENCODER is where the encoders' angles lie: q + 7, or with
-   gearlash x. The Python twin is reference.py. */
+   Included after vec.h, the emitted function `step`, and the sizes NJ (joints), NI (numbers of
+   the internal state), NP (parameters). ENCODER is where the encoders' angles lie: q + 7, or with
+   backlash the internal state. The Python twin is reference.py. */
 
 #define NQ (7 + NJ)
 #define NV (6 + NJ)
-#define NTERMS 5
-#define NLOG (NQ + NV + NX + NJ)
+#define N_INTEGRANDS 5
+#define NLOG (NQ + NV + NI + NJ)
 
 enum { OK = 0, DIVERGED = 1, FELL = 2 };
 
@@ -28,19 +28,19 @@ typedef struct {
 
 /* One walker: all it needs and all it leaves behind. Field by field as in native.py. */
 typedef struct {
-  const double *q0;         /* NQ, initial position; it starts at rest */
-  const double *x0;         /* NX */
-  const double *parameters; /* NP */
-  const int32_t *desired;   /* ticks x NJ, coded angles */
-  const double *push;       /* ticks x NJ, torque on the links [N m]; or NULL */
+  const double *q0;             /* NQ, initial position; it starts at rest */
+  const double *internal_state; /* NI, initial */
+  const double *parameters;     /* NP */
+  const int32_t *desired;       /* ticks x NJ, coded angles */
+  const double *disturbance;    /* ticks x NJ, torque on the links [N m]; or NULL */
   int64_t proportional_gain, integral_gain, derivative_gain;
   Table direct, integrated;
   int64_t ticks;
   double fall_height;  /* of the body over the ground [m] */
   double fall_cosine;  /* of the tilt */
-  double *sums;        /* NTERMS, summed over physics steps */
+  double *sums;        /* N_INTEGRANDS, summed over physics steps */
   double *end;         /* NQ, final position */
-  double *log;         /* ticks x NLOG: q, v, x, duty; or NULL */
+  double *log;         /* ticks x NLOG: q, v, internal state, duty; or NULL */
   int64_t status;
 } Walker;
 
@@ -99,7 +99,7 @@ typedef struct {
 } Past;
 
 static void control_tick(Walker *const *lane, const Coding *c, int64_t tick, const vec *encoder,
-                         const vec *current, Past *past, vec *duty, vec *push)
+                         const vec *current, Past *past, vec *duty, vec *disturbance)
 {
   for (int j = 0; j < NJ; j++) {
     const ivec angle = vec_round_int(encoder[j] * SPLAT(c->angle_counts));
@@ -116,20 +116,20 @@ static void control_tick(Walker *const *lane, const Coding *c, int64_t tick, con
       const int64_t counts = control(w, c, error, change, load, &past->integral[j][k]);
       past->error[j][k] = error;
       duty[j][k] = (double)counts * c->duty_per_count;
-      push[j][k] = w->push ? w->push[at] : 0.0;
+      disturbance[j][k] = w->disturbance ? w->disturbance[at] : 0.0;
     }
   }
 }
 
-static void write_log(Walker *const *lane, int64_t tick, const vec *q, const vec *v, const vec *x,
-                      const vec *duty)
+static void write_log(Walker *const *lane, int64_t tick, const vec *q, const vec *v,
+                      const vec *internal, const vec *duty)
 {
   for (int k = 0; k < LANES; k++) {
     if (!lane[k]->log || tick >= lane[k]->ticks) continue;
     double *row = lane[k]->log + tick * NLOG;
     for (int i = 0; i < NQ; i++) *row++ = q[i][k];
     for (int i = 0; i < NV; i++) *row++ = v[i][k];
-    for (int i = 0; i < NX; i++) *row++ = x[i][k];
+    for (int i = 0; i < NI; i++) *row++ = internal[i][k];
     for (int i = 0; i < NJ; i++) *row++ = duty[i][k];
   }
 }
@@ -146,8 +146,8 @@ static ivec all_finite(const vec *q, const vec *v)
 /* LANES walkers, all different objects but possibly copies of one another. */
 static void walk(Walker *const *lane, const Coding *c)
 {
-  vec q[2][NQ], v[2][NV], x[2][NX + 1], p[NP], duty[NJ], push[NJ], current[NJ];
-  vec sums[NTERMS], terms[NTERMS];
+  vec q[2][NQ], v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
+  vec sums[N_INTEGRANDS], integrands[N_INTEGRANDS];
   Past past;
   int walking[LANES];
   int64_t last = 0;
@@ -158,7 +158,7 @@ static void walk(Walker *const *lane, const Coding *c)
   memset(sums, 0, sizeof sums);
   for (int k = 0; k < LANES; k++) {
     for (int i = 0; i < NQ; i++) q[0][i][k] = lane[k]->q0[i];
-    for (int i = 0; i < NX; i++) x[0][i][k] = lane[k]->x0[i];
+    for (int i = 0; i < NI; i++) internal[0][i][k] = lane[k]->internal_state[i];
     for (int i = 0; i < NP; i++) p[i][k] = lane[k]->parameters[i];
     if (lane[k]->ticks > last) last = lane[k]->ticks;
     lane[k]->status = OK;
@@ -167,13 +167,13 @@ static void walk(Walker *const *lane, const Coding *c)
 
   int now = 0;
   for (int64_t tick = 0; tick < last; tick++) {
-    control_tick(lane, c, tick, ENCODER(q[now], x[now]), current, &past, duty, push);
-    write_log(lane, tick, q[now], v[now], x[now], duty);
+    control_tick(lane, c, tick, ENCODER(q[now], internal[now]), current, &past, duty, disturbance);
+    write_log(lane, tick, q[now], v[now], internal[now], duty);
     for (int64_t n = 0; n < c->substeps; n++) {
-      step(q[now], v[now], x[now], duty, push, p, q[1 - now], v[1 - now], x[1 - now], current,
-           terms);
+      step(q[now], v[now], internal[now], duty, disturbance, p, q[1 - now], v[1 - now],
+           internal[1 - now], current, integrands);
       now = 1 - now;
-      for (int i = 0; i < NTERMS; i++) sums[i] += terms[i];
+      for (int i = 0; i < N_INTEGRANDS; i++) sums[i] += integrands[i];
     }
     const vec qx = q[now][3], qy = q[now][4];
     const vec upright = SPLAT(1.0) - SPLAT(2.0) * (qx * qx + qy * qy);
@@ -187,7 +187,7 @@ static void walk(Walker *const *lane, const Coding *c)
       else if (q[now][2][k] < w->fall_height || upright[k] < w->fall_cosine) w->status = FELL;
       if (w->status != OK || tick + 1 == w->ticks) {
         walking[k] = 0;
-        for (int i = 0; i < NTERMS; i++) w->sums[i] = sums[i][k];
+        for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = sums[i][k];
         for (int i = 0; i < NQ; i++) w->end[i] = q[now][i][k];
       } else {
         any = 1;
@@ -202,7 +202,7 @@ void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding)
 {
   for (int64_t first = 0; first < n; first += LANES) {
     Walker copies[LANES];
-    double sums[LANES][NTERMS], end[LANES][NQ];
+    double sums[LANES][N_INTEGRANDS], end[LANES][NQ];
     Walker *lane[LANES];
     for (int k = 0; k < LANES; k++) {
       if (first + k < n) {
@@ -220,5 +220,5 @@ void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding)
 }
 
 int64_t gaitswarm_lanes(void) { return LANES; }
-int64_t gaitswarm_memory(void) { return NX; }
+int64_t gaitswarm_internal_state_size(void) { return NI; }
 int64_t gaitswarm_log_width(void) { return NLOG; }

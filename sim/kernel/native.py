@@ -14,25 +14,25 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.compiler.compilation import load_library, vector_header
 from sim.controllers.base import LookupTable, Response
 from sim.errors import SimulationInputError
 from sim.kernel.parameters import BodyInertia, Layout
 from sim.kernel.walk import Coding, WalkResult, WalkSetup
-from sim.native.compilation import load_library, vector_header
 from sim.outcome import Status
 from sim.robot import Robot
 
 Floats = NDArray[np.float64]
 
-_N_TERMS: Final = 5
+_N_INTEGRANDS: Final = 5
 _GENERATOR: Final = (
     "articulated_body.py",
+    "backlash.py",
     "contact.py",
-    "drive.py",
     "driver.c",
     "emit_c.py",
-    "gearlash.py",
     "integration.py",
+    "motor.py",
     "native.py",
     "parameters.py",
     "physics_step.py",
@@ -72,10 +72,10 @@ class _Table(ctypes.Structure):
 class _Walker(ctypes.Structure):
     _fields_ = [
         ("q0", ctypes.c_void_p),
-        ("x0", ctypes.c_void_p),
+        ("internal_state", ctypes.c_void_p),
         ("parameters", ctypes.c_void_p),
         ("desired", ctypes.c_void_p),
-        ("push", ctypes.c_void_p),
+        ("disturbance", ctypes.c_void_p),
         ("proportional_gain", ctypes.c_int64),
         ("integral_gain", ctypes.c_int64),
         ("derivative_gain", ctypes.c_int64),
@@ -129,7 +129,7 @@ class NativeKernel:
         self.layout = Layout(robot)
         self._n_q = 7 + robot.n_joints
         self.lanes = int(library.gaitswarm_lanes())
-        self.memory = int(library.gaitswarm_memory())
+        self.internal_state_size = int(library.gaitswarm_internal_state_size())
         self._log_width = int(library.gaitswarm_log_width())
         exported = np.array((ctypes.c_double * 14).in_dll(library, "gaitswarm_body"))
         self.total_mass = float(exported[13])
@@ -146,22 +146,24 @@ class NativeKernel:
     ) -> tuple[WalkResult, ...]:
         """See `walk.Kernel.walk`."""
         n = len(setups)
-        sums, end = np.empty((n, _N_TERMS)), np.empty((n, self._n_q))
+        sums, end = np.empty((n, _N_INTEGRANDS)), np.empty((n, self._n_q))
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
         walkers = (_Walker * n)()
         addresses = _Addresses()
         for k, (walker, setup) in enumerate(zip(walkers, setups, strict=True)):
-            drive, record = setup.drive, logs[k]
+            law, record = setup.control_law, logs[k]
             walker.q0 = addresses.of(setup.start, np.float64)
-            walker.x0 = addresses.of(setup.memory, np.float64)
+            walker.internal_state = addresses.of(setup.internal_state, np.float64)
             walker.parameters = addresses.of(setup.parameters, np.float64)
             walker.desired = addresses.of(setup.desired, np.int32)
-            walker.push = None if setup.push is None else addresses.of(setup.push, np.float64)
-            walker.proportional_gain = drive.proportional_gain
-            walker.integral_gain = drive.integral_gain
-            walker.derivative_gain = drive.derivative_gain
-            walker.direct = addresses.table(drive.direct)
-            walker.integrated = addresses.table(drive.integrated)
+            walker.disturbance = (
+                None if setup.disturbance is None else addresses.of(setup.disturbance, np.float64)
+            )
+            walker.proportional_gain = law.proportional_gain
+            walker.integral_gain = law.integral_gain
+            walker.derivative_gain = law.derivative_gain
+            walker.direct = addresses.table(law.direct)
+            walker.integrated = addresses.table(law.integrated)
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height
             walker.fall_cosine = setup.fall_cosine
@@ -209,13 +211,13 @@ def _identity(robot: Robot) -> bytes:
     """All that the source depends on; run-time parameters are left out, so they share a kernel."""
     digest = hashlib.sha256(_generator())
     digest.update(robot.urdf.encode())
-    drives = robot.drives()
-    for array in (drives.torque, drives.resistance, drives.armature):
+    actuators = robot.actuators()
+    for array in (actuators.torque, actuators.resistance, actuators.armature):
         digest.update(array.tobytes())
-    if robot.has_gearlash:
-        digest.update(drives.shaft_stiffness.tobytes() + drives.shaft_damping.tobytes())
+    if robot.has_backlash:
+        digest.update(actuators.shaft_stiffness.tobytes() + actuators.shaft_damping.tobytes())
     legs = [(*leg.joints, leg.foot) for leg in robot.description.legs]
-    digest.update(repr((legs, robot.description.contact_law, robot.has_gearlash)).encode())
+    digest.update(repr((legs, robot.description.contact_law, robot.has_backlash)).encode())
     return digest.digest()
 
 
@@ -223,7 +225,7 @@ def _source_of(robot: Robot) -> Callable[[], str]:
     def source() -> str:
         # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
         from sim.kernel.emit_c import emit_c  # noqa: PLC0415
-        from sim.kernel.physics_step import memory_size, physics_model  # noqa: PLC0415
+        from sim.kernel.physics_step import internal_state_size, physics_model  # noqa: PLC0415
 
         model = physics_model(robot)
         folder = resources.files("sim.kernel")
@@ -238,8 +240,8 @@ def _source_of(robot: Robot) -> Callable[[], str]:
             [
                 f"#define NJ {robot.n_joints}",
                 f"#define NP {model.layout.size}",
-                f"#define NX {memory_size(robot)}",
-                f"#define ENCODER(q, x) ({'(x)' if robot.has_gearlash else '(q) + 7'})",
+                f"#define NI {internal_state_size(robot)}",
+                f"#define ENCODER(q, internal) ({'internal' if robot.has_backlash else '(q) + 7'})",
                 vector_header(),
                 f"const double gaitswarm_body[14] = {{{numbers}}};",
                 emit_c(model.step, "step"),

@@ -19,7 +19,7 @@ class WalkLog:
     time (T,) [s]; base_position (T, 3) [m], base_orientation (T, 4) quaternion x y z w,
     base_velocity (T, 6) linear [m/s] and angular [rad/s] in the body frame;
     joint_angle, desired_angle (T, J) [rad]; motor_angle (T, J) [rad]: what the encoders see,
-    which differs from the link's with gearlash; joint_velocity (T, J) [rad/s];
+    which differs from the link's with backlash; joint_velocity (T, J) [rad/s];
     current (T, J) [A]; voltage (T, J) [V]; load_torque (T, J) [N m];
     foot_force (T, L, 3) [N], world frame; supply (T,) [V].
     """
@@ -68,16 +68,16 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
 
     observe = physics_model(robot).observe
     n, feet, ticks = robot.n_joints, len(robot.legs), len(states)
-    carried = len(setup.memory)
-    position, orientation, angle, twist, rate, memory, duty = np.split(
+    carried = len(setup.internal_state)
+    position, orientation, angle, twist, rate, internal_state, duty = np.split(
         states, np.cumsum([3, 4, n, 6, n, carried]), axis=1
     )
     walked = int(np.isfinite(states).all(axis=1).sum())
     seen = [np.full((ticks, observe.numel_out(k)), np.nan) for k in range(5)]
     if walked:
-        push = np.zeros_like(angle) if setup.push is None else setup.push
+        disturbance = np.zeros_like(angle) if setup.disturbance is None else setup.disturbance
         q = np.concatenate([position, orientation, angle], axis=1)
-        inputs = (q, np.concatenate([twist, rate], axis=1), memory, duty, push)
+        inputs = (q, np.concatenate([twist, rate], axis=1), internal_state, duty, disturbance)
         parts = observe.map(walked)(*(part[:walked].T for part in inputs), setup.parameters)
         for target, part in zip(seen, parts, strict=False):
             target[:walked] = np.array(part).T
@@ -88,7 +88,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         base_orientation=orientation,
         base_velocity=twist,
         joint_angle=angle,
-        motor_angle=memory[:, :n] if robot.has_gearlash else angle,
+        motor_angle=internal_state[:, :n] if robot.has_backlash else angle,
         joint_velocity=rate,
         desired_angle=setup.desired / robot.description.sensors.angle_counts,
         current=current,

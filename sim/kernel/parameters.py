@@ -32,7 +32,7 @@ class Layout:
 
     field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
-    supply_resistance (1), gearlash (J, if the robot has any), and by foot (L each) the parameters
+    supply_resistance (1), backlash (J, if the robot has any), and by foot (L each) the parameters
     of the contact law.
     """
 
@@ -48,7 +48,7 @@ class Layout:
             "viscous": n_joints,
             "supply_voltage": 1,
             "supply_resistance": 1,
-            "gearlash": n_joints if robot.has_gearlash else 0,
+            "backlash": n_joints if robot.has_backlash else 0,
             **dict.fromkeys(law.parameters, n_feet),
         }
         self.slices: dict[str, slice] = {}
@@ -98,7 +98,7 @@ def pack_parameters(robot: Robot, body: BodyInertia, scenario: Scenario, timeste
     body: see `body_of`. A load is a point mass at `load_height` over the body's centre.
     """
     d = robot.description
-    drives, contacts = robot.drives(), robot.contacts()
+    actuators, contacts = robot.actuators(), robot.contacts()
     at = np.array([0.0, 0.0, d.load_height])
     inertia = (
         body.rotational
@@ -115,10 +115,10 @@ def pack_parameters(robot: Robot, body: BodyInertia, scenario: Scenario, timeste
         base_mass=body.mass + scenario.load,
         base_moment=body.mass * body.centre + scenario.load * at,
         base_inertia=inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
-        viscous=drives.viscous,
+        viscous=actuators.viscous,
         supply_voltage=d.supply.voltage,
         supply_resistance=d.supply.resistance,
-        gearlash=drives.gearlash if robot.has_gearlash else np.empty(0),
+        backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         **by_foot,
     )
 

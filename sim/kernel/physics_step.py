@@ -20,10 +20,10 @@ from sim.kernel.articulated_body import (
     kinematics,
     links_of,
 )
-from sim.kernel.contact import LAWS, Foot, Memory, foot_on_ground
-from sim.kernel.drive import Electrical, electrical
-from sim.kernel.gearlash import shaft_torque
+from sim.kernel.backlash import shaft_torque
+from sim.kernel.contact import LAWS, Foot, InternalState, foot_on_ground
 from sim.kernel.integration import integrated
+from sim.kernel.motor import Electrical, electrical
 from sim.kernel.parameters import BodyInertia, Layout
 from sim.kernel.spatial import (
     Matrix,
@@ -39,7 +39,7 @@ from sim.kernel.spatial import (
 )
 from sim.robot import Robot
 
-TERMS: Final = (
+INTEGRANDS: Final = (
     "torque",
     "acceleration",
     "angular_acceleration",
@@ -50,23 +50,24 @@ TERMS: Final = (
 [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]."""
 
 
-def memory_size(robot: Robot) -> int:
-    """Numbers that a walk carries beside q and v: motors behind gearlash, then feet (`stick`)."""
-    motors = 2 * robot.n_joints if robot.has_gearlash else 0
-    return motors + LAWS[robot.description.contact_law].memory * len(robot.legs)
+def internal_state_size(robot: Robot) -> int:
+    """Numbers of the internal state: motors behind backlash, then feet (`stick`)."""
+    motors = 2 * robot.n_joints if robot.has_backlash else 0
+    return motors + LAWS[robot.description.contact_law].internal_state_size * len(robot.legs)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicsModel:
     """CasADi functions of one robot, and the body's own inertia.
 
-    step: (q, v, x, duty, push, p) -> (q', v', x', current, terms); observe: the same inputs ->
-    (current (J), voltage (J), load torque (J), foot force (3 L) in the world, supply (1),
-    acceleration (6+J) as `pinocchio.aba` gives it).
+    step: (q, v, internal_state, duty, disturbance, p) -> (q', v', internal_state', current,
+    integrands); observe: the same inputs -> (current (J), voltage (J), load torque (J), foot force
+    (3 L) in the world, supply (1), acceleration (6+J) as `pinocchio.aba` gives it).
     q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its own frame,
-    joint rates; x (memory_size): with gearlash the motors' angles (J) [rad] and rates (J) [rad/s]
-    at the gearhead's output, with `stick` two elongations [m] a foot; duty (J): motor voltage per
-    supply voltage; push (J): disturbing torque on each link [N m]; p: see `parameters.Layout`.
+    joint rates; internal_state: with backlash the motors' angles (J) [rad] and rates (J)
+    [rad/s] at the gearhead's output, with `stick` two elongations [m] a foot; duty (J): motor
+    voltage per supply voltage; disturbance (J): torque on each link [N m]; p: see
+    `parameters.Layout`.
     """
 
     step: Any
@@ -80,23 +81,23 @@ class PhysicsModel:
 class _Symbols:
     q: list[Scalar]
     v: list[Scalar]
-    memory: list[Scalar]
+    internal_state: list[Scalar]
     duty: list[Scalar]
-    push: list[Scalar]
+    disturbance: list[Scalar]
     p: dict[str, list[Scalar]]
     inputs: tuple[Any, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class _Dynamics:
-    """loads: torque that each gearhead passes to its link (J); memory: x after the step."""
+    """loads: torque that each gearhead passes to its link (J); internal_state: after the step."""
 
     attitude: Matrix
     electrical: Electrical
     loads: Sequence[Scalar]
     foot_forces: Sequence[Scalar]
     acceleration: Acceleration
-    memory: Sequence[Scalar]
+    internal_state: Sequence[Scalar]
 
 
 @lru_cache(maxsize=8)
@@ -116,9 +117,9 @@ def physics_model(robot: Robot) -> PhysicsModel:
     ]
     step = [
         *integrated(s.q, s.v, rates, d.attitude, s.p["timestep"][0]),
-        list(d.memory),
+        list(d.internal_state),
         list(d.electrical.currents),
-        _terms(ca, s, d),
+        _integrands(ca, s, d),
     ]
     observe = [
         list(d.electrical.currents),
@@ -143,52 +144,52 @@ def _symbols(ca: Any, robot: Robot, layout: Layout) -> _Symbols:
     sizes = {
         "q": 7 + n,
         "v": 6 + n,
-        "x": memory_size(robot),
+        "internal_state": internal_state_size(robot),
         "duty": n,
-        "push": n,
+        "disturbance": n,
         "p": layout.size,
     }
     inputs = tuple(ca.SX.sym(name, size) for name, size in sizes.items())
-    q, v, x, duty, push, p = ([s[k] for k in range(s.numel())] for s in inputs)
+    q, v, internal_state, duty, disturbance, p = ([s[k] for k in range(s.numel())] for s in inputs)
     fields = {name: p[where] for name, where in layout.slices.items()}
-    return _Symbols(q, v, x, duty, push, fields, inputs)
+    return _Symbols(q, v, internal_state, duty, disturbance, fields, inputs)
 
 
 def _dynamics(ca: Any, robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
-    """Kinematics, then the forces of drives and ground, then accelerations."""
+    """Kinematics, then the forces of actuators and ground, then accelerations."""
     links = links_of(model, robot.joint_names)
     attitude = rotation_of(s.q[3:7])
     states, rotations = link_states(ca, links, s.q, s.v, attitude)
-    drive = _drive(ca, robot, s)
-    feet, pushes, memory = _feet(ca, robot, model, s, states)
+    actuation = _actuate(ca, robot, s)
+    feet, ground_forces, internal_state = _feet(ca, robot, model, s, states)
     acceleration = articulated_body(
         links,
         base_inertia(s.p),
         states,
         rotations,
         s.v[6:],
-        drive.torques,
-        drive.armature,
-        pushes,
+        actuation.torques,
+        actuation.armature,
+        ground_forces,
         apply(transpose(attitude), _triple(s.p["gravity"])),
     )
     return _Dynamics(
         attitude,
-        drive.electrical,
-        # M_L = r K_M I - B omega - J r^2 domega; behind gearlash the rotor is not in the joint.
+        actuation.electrical,
+        # M_L = r K_M I - B omega - J r^2 domega; behind backlash the rotor is not in the joint.
         [
             torque - inertia * joint
             for torque, inertia, joint in zip(
-                drive.torques, drive.armature, acceleration.joints, strict=True
+                actuation.torques, actuation.armature, acceleration.joints, strict=True
             )
         ],
         [
             dot(axis, force.linear)
-            for foot, force in zip(feet, pushes.values(), strict=True)
+            for foot, force in zip(feet, ground_forces.values(), strict=True)
             for axis in (foot.ahead, foot.left, foot.up)
         ],
         acceleration,
-        [*drive.memory, *memory],
+        [*actuation.internal_state, *internal_state],
     )
 
 
@@ -221,18 +222,18 @@ def base_inertia(p: Mapping[str, Sequence[Scalar]]) -> Inertia:
 
 
 @dataclass(frozen=True, slots=True)
-class _Drive:
+class _Actuation:
     """torques: on each link (J); armature: rotor inertia that turns with the link (J)."""
 
     electrical: Electrical
     torques: Sequence[Scalar]
     armature: Sequence[float]
-    memory: Sequence[Scalar]
+    internal_state: Sequence[Scalar]
 
 
-def _drive(ca: Any, robot: Robot, s: _Symbols) -> _Drive:
-    n, data = robot.n_joints, robot.drives()
-    rotors = s.memory[n : 2 * n] if robot.has_gearlash else s.v[6:]
+def _actuate(ca: Any, robot: Robot, s: _Symbols) -> _Actuation:
+    n, data = robot.n_joints, robot.actuators()
+    rotors = s.internal_state[n : 2 * n] if robot.has_backlash else s.v[6:]
     motors = electrical(
         data,
         s.duty,
@@ -241,17 +242,17 @@ def _drive(ca: Any, robot: Robot, s: _Symbols) -> _Drive:
         s.p["supply_voltage"][0],
         s.p["supply_resistance"][0],
     )
-    if not robot.has_gearlash:
-        torques = [torque + push for torque, push in zip(motors.torques, s.push, strict=True)]
-        return _Drive(motors, torques, data.armature.tolist(), ())
+    if not robot.has_backlash:
+        torques = [a + b for a, b in zip(motors.torques, s.disturbance, strict=True)]
+        return _Actuation(motors, torques, data.armature.tolist(), ())
     shafts = [
         shaft_torque(ca, motor - link, rotor - rate, play, stiffness, damping)
         for motor, link, rotor, rate, play, stiffness, damping in zip(
-            s.memory[:n],
+            s.internal_state[:n],
             s.q[7:],
             rotors,
             s.v[6:],
-            s.p["gearlash"],
+            s.p["backlash"],
             data.shaft_stiffness.tolist(),
             data.shaft_damping.tolist(),
             strict=True,
@@ -264,35 +265,37 @@ def _drive(ca: Any, robot: Robot, s: _Symbols) -> _Drive:
             rotors, motors.torques, shafts, data.armature.tolist(), strict=True
         )
     ]
-    further = [angle + dt * rotor for angle, rotor in zip(s.memory[:n], faster, strict=True)]
-    torques = [shaft + push for shaft, push in zip(shafts, s.push, strict=True)]
-    return _Drive(motors, torques, [0.0] * n, [*further, *faster])
+    further = [
+        angle + dt * rotor for angle, rotor in zip(s.internal_state[:n], faster, strict=True)
+    ]
+    torques = [a + b for a, b in zip(shafts, s.disturbance, strict=True)]
+    return _Actuation(motors, torques, [0.0] * n, [*further, *faster])
 
 
 def _feet(
     ca: Any, robot: Robot, model: Any, s: _Symbols, states: Sequence[LinkState]
 ) -> tuple[list[Foot], dict[int, Any], list[Scalar]]:
-    """Every foot, the ground's force on its link (by index of the link), and the law's memory."""
+    """Every foot, the ground's force on its link (by the link's index), internal state."""
     law = LAWS[robot.description.contact_law]
-    start = 2 * robot.n_joints if robot.has_gearlash else 0
+    start = 2 * robot.n_joints if robot.has_backlash else 0
     feet: list[Foot] = []
     forces: dict[int, Any] = {}
-    memory: list[Scalar] = []
+    internal_state: list[Scalar] = []
     for n, leg in enumerate(robot.description.legs):
         frame = model.frames[model.getFrameId(leg.foot)]
         index = 1 + robot.joint_names.index(model.names[frame.parentJoint])
         ground = {name: s.p[name][n] for name in law.parameters}
         foot = foot_on_ground(ca, states[index], vector(frame.placement.translation), ground)
-        begin = start + n * law.memory
-        before: Memory = tuple(s.memory[begin : begin + law.memory])
+        begin = start + n * law.internal_state_size
+        before: InternalState = tuple(s.internal_state[begin : begin + law.internal_state_size])
         forces[index], after = law.force(ca, foot, ground, before, s.p["timestep"][0])
         feet.append(foot)
-        memory += after
-    return feet, forces, memory
+        internal_state += after
+    return feet, forces, internal_state
 
 
-def _terms(ca: Any, s: _Symbols, d: _Dynamics) -> list[Scalar]:
-    """The rates of TERMS at the state before the step."""
+def _integrands(ca: Any, s: _Symbols, d: _Dynamics) -> list[Scalar]:
+    """The rates of INTEGRANDS at the state before the step."""
     torque = sum(ca.fabs(load) for load in d.loads)
     v, w = _triple(s.v[0:3]), _triple(s.v[3:6])
     # The base's twist is in its own frame, so the material acceleration adds omega x v.

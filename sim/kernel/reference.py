@@ -14,9 +14,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive
+from sim.controllers.base import ControlLaw
 from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
-from sim.kernel.physics_step import TERMS, PhysicsModel, physics_model
+from sim.kernel.physics_step import INTEGRANDS, PhysicsModel, physics_model
 from sim.kernel.walk import CODE_LIMIT, Coding, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
@@ -33,9 +33,9 @@ class ReferenceKernel:
 
     def __init__(self, robot: Robot, model: PhysicsModel) -> None:
         self._model = model
-        self._has_gearlash = robot.has_gearlash
+        self._has_backlash = robot.has_backlash
         self.layout = model.layout
-        self.memory = model.step.numel_in(2)
+        self.internal_state_size = model.step.numel_in(2)
         self.body = model.body
         self.total_mass = model.total_mass
 
@@ -48,21 +48,21 @@ class ReferenceKernel:
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
         step = Stepper(self._model.step, setup)
         past = _Past.of(setup.desired.shape[1])
-        sums = np.zeros(len(TERMS))
+        sums = np.zeros(len(INTEGRANDS))
         rows: list[Floats] = []
         status = Status.OK
         for tick, desired in enumerate(setup.desired):
-            encoder = step.x[: len(desired)] if self._has_gearlash else step.q[7:]
+            encoder = step.internal_state[: len(desired)] if self._has_backlash else step.q[7:]
             error, load = _read_sensors(encoder, step.current, desired, coding)
-            output = _control(setup.drive, coding, error, load, past)
+            output = _control(setup.control_law, coding, error, load, past)
             step.duty[:] = output * coding.duty_per_count
-            if setup.push is not None:
-                step.push[:] = setup.push[tick]
+            if setup.disturbance is not None:
+                step.disturbance[:] = setup.disturbance[tick]
             if log:
-                rows.append(np.concatenate([step.q, step.v, step.x, step.duty]))
+                rows.append(np.concatenate([step.q, step.v, step.internal_state, step.duty]))
             for _ in range(coding.substeps):
                 step.advance()
-                sums += step.terms
+                sums += step.integrands
             status = _status_of(step.q, step.v, setup)
             if status is not Status.OK:
                 break
@@ -75,24 +75,31 @@ class Stepper:
     def __init__(self, function: Any, setup: WalkSetup) -> None:
         n_joints = setup.desired.shape[1]
         self.q, self.v = setup.start.copy(), np.zeros(6 + n_joints)
-        self.x, self.parameters = (
-            setup.memory.copy(),
+        self.internal_state, self.parameters = (
+            setup.internal_state.copy(),
             np.ascontiguousarray(setup.parameters),
         )
-        self.duty, self.push, self.current = (np.zeros(n_joints) for _ in range(3))
-        self.terms = np.zeros(len(TERMS))
-        self._after = [np.zeros_like(array) for array in (self.q, self.v, self.x)]
+        self.duty, self.disturbance, self.current = (np.zeros(n_joints) for _ in range(3))
+        self.integrands = np.zeros(len(INTEGRANDS))
+        self._after = [np.zeros_like(array) for array in (self.q, self.v, self.internal_state)]
         self._buffer, self._evaluate = function.buffer()
-        arguments = (self.q, self.v, self.x, self.duty, self.push, self.parameters)
+        arguments = (
+            self.q,
+            self.v,
+            self.internal_state,
+            self.duty,
+            self.disturbance,
+            self.parameters,
+        )
         for k, array in enumerate(arguments):
             self._buffer.set_arg(k, array.data)
-        for k, array in enumerate((*self._after, self.current, self.terms)):
+        for k, array in enumerate((*self._after, self.current, self.integrands)):
             self._buffer.set_res(k, array.data)
 
     def advance(self) -> None:
         """One physics step, in place."""
         self._evaluate()
-        for array, after in zip((self.q, self.v, self.x), self._after, strict=True):
+        for array, after in zip((self.q, self.v, self.internal_state), self._after, strict=True):
             array[:] = after
 
 
@@ -118,15 +125,15 @@ def _read_sensors(
     return np.clip(error, -CODE_LIMIT, CODE_LIMIT), _coarsen(amperes, coding.current_step)
 
 
-def _control(drive: Drive, coding: Coding, error: Ints, load: Ints, past: _Past) -> Ints:
+def _control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: _Past) -> Ints:
     """PWM counts (J,); what is past is updated in place (thesis 5.3)."""
     change = np.zeros_like(error) if past.error is None else error - past.error
-    direct = error * drive.proportional_gain + change * drive.derivative_gain
-    grown = past.integral + error * drive.integral_gain
-    if drive.direct is not None:
-        direct = direct + drive.direct.respond(error, load, change)
-    if drive.integrated is not None:
-        grown = grown + drive.integrated.respond(error, load, change)
+    direct = error * law.proportional_gain + change * law.derivative_gain
+    grown = past.integral + error * law.integral_gain
+    if law.direct is not None:
+        direct = direct + law.direct.respond(error, load, change)
+    if law.integrated is not None:
+        grown = grown + law.integrated.respond(error, load, change)
     full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
     past.error, past.integral = error, np.clip(grown, -full, full)
     output = descale(direct, FRACTION_BITS) + descale(past.integral, INTEGRAL_BITS)

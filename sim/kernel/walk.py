@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive
+from sim.controllers.base import ControlLaw
 from sim.kernel.parameters import BodyInertia
 from sim.outcome import Status
 from sim.robot import Robot
@@ -53,20 +53,20 @@ class Coding:
 class WalkSetup:
     """One walk to be computed.
 
-    start (7+J,): initial q, at rest; memory: initial x, see `physics_step.PhysicsModel`;
-    parameters (P,), see `parameters.Layout`; desired (T, J) int32 coded angles; push (T, J):
-    disturbing torques on the links [N m] or None; fall_height [m] and fall_cosine: below either
-    the robot has fallen.
+    start (7+J,): initial q, at rest; internal_state: initial, see `physics_step.PhysicsModel`;
+    parameters (P,), see `parameters.Layout`; desired (T, J) int32 coded angles; disturbance (T, J):
+    torques on the links [N m] or None; fall_height [m] and fall_cosine: below either the robot has
+    fallen.
     """
 
     start: Floats
-    memory: Floats
+    internal_state: Floats
     parameters: Floats
     desired: NDArray[np.int32]
-    drive: Drive
+    control_law: ControlLaw
     fall_height: float
     fall_cosine: float = 0.5**0.5
-    push: Floats | None = None
+    disturbance: Floats | None = None
 
     @property
     def ticks(self) -> int:
@@ -76,10 +76,11 @@ class WalkSetup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkResult:
-    """sums (5,): `physics_step.TERMS` summed over physics steps; end (7+J,): final q.
+    """sums (5,): `physics_step.INTEGRANDS` summed over physics steps; end (7+J,): final q.
 
-    states (T, 7+J + 6+J + X + J): q, v, x and duty at every control tick after its control, NaN
-    after an early end; None if not asked for. `observation.walk_log` tells the rest.
+    states (T, 7+J + 6+J + I + J): q, v, internal state and duty at every control tick after
+    its control, NaN after an early end; None if not asked for. `observation.walk_log` tells the
+    rest.
     """
 
     status: Status
@@ -108,8 +109,8 @@ class Kernel(Protocol):
         """Mass of the whole robot without load [kg]."""
 
     @property
-    def memory(self) -> int:
-        """Numbers that a walk carries beside q and v: the length of `WalkSetup.memory`."""
+    def internal_state_size(self) -> int:
+        """Numbers of a walk's internal state: the length of `WalkSetup.internal_state`."""
 
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool

@@ -1,4 +1,4 @@
-"""The robot as typed data: legs, drives, supply, sensors, contact.
+"""The robot as typed data: legs, actuators, supply, sensors, contact.
 
 The numbers live in a TOML file beside the robot's URDF (see sim/robot/szabadka2); these classes
 say what they mean, in which unit, and what is refused.
@@ -6,9 +6,12 @@ say what they mean, in which unit, and what is refused.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from sim import former_names
+from sim.former_names import current_names
 
 JOINTS_PER_LEG = 3
 """Coxa, femur, tibia."""
@@ -37,28 +40,33 @@ class Gearhead(_Data):
     efficiency: float = Field(gt=0.0, le=1.0, description="eta at the nominal point [1]")
 
 
-class DriveTrain(_Data):
+class Actuator(_Data):
     """Motor, gearhead and bevel gear of one joint, by the names of its parts."""
 
     motor: str
     gearhead: str
     bevel: float = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
-    gearlash: float = Field(
+    backlash: float = Field(
         default=0.0,
         ge=0.0,
         le=0.5,
-        description="play between gearhead and link, end to end [rad]",
+        description="play between gearhead and link, end to end, the thesis's gearlash [rad]",
     )
     shaft_stiffness: float = Field(
         default=500.0,
         gt=0.0,
-        description="of the closed play, only with gearlash [N m/rad]",
+        description="of the closed play, only with backlash [N m/rad]",
     )
     shaft_damping: float = Field(
         default=0.5,
         ge=0.0,
-        description="of the closed play, only with gearlash [N m s/rad]",
+        description="of the closed play, only with backlash [N m s/rad]",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_former_names(cls, document: Any) -> Any:
+        return current_names(document, former_names.ACTUATOR)
 
 
 class Supply(_Data):
@@ -118,8 +126,13 @@ class Leg(_Data):
 
     name: str
     phase: float = Field(ge=0.0, lt=1.0, description="start of support, share of the cycle [1]")
-    drives: tuple[str, str, str] = Field(description="drive train of coxa, femur, tibia")
+    actuators: tuple[str, str, str] = Field(description="actuators of coxa, femur, tibia")
     contact: Contact | None = Field(default=None, description="this foot's own contact")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_former_names(cls, document: Any) -> Any:
+        return current_names(document, former_names.ROBOT_FILE)
 
     @property
     def joints(self) -> tuple[str, str, str]:
@@ -146,22 +159,31 @@ class RobotDescription(_Data):
     )
     motors: dict[str, Motor]
     gearheads: dict[str, Gearhead]
-    drives: dict[str, DriveTrain]
+    actuators: dict[str, Actuator]
     supply: Supply
     pwm: Pwm
     sensors: Sensors
     contact: Contact
     legs: tuple[Leg, ...] = Field(min_length=3)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read_former_names(cls, document: Any) -> Any:
+        return current_names(document, former_names.ROBOT_FILE)
+
     @model_validator(mode="after")
     def _names_exist(self) -> RobotDescription:
-        for name, drive in self.drives.items():
-            if drive.motor not in self.motors:
-                raise ValueError(f"drives.{name}.motor: no motor {drive.motor!r} is described")
-            if drive.gearhead not in self.gearheads:
-                raise ValueError(f"drives.{name}.gearhead: no gearhead {drive.gearhead!r}")
+        for name, actuator in self.actuators.items():
+            if actuator.motor not in self.motors:
+                raise ValueError(
+                    f"actuators.{name}.motor: no motor {actuator.motor!r} is described"
+                )
+            if actuator.gearhead not in self.gearheads:
+                raise ValueError(f"actuators.{name}.gearhead: no gearhead {actuator.gearhead!r}")
         for k, leg in enumerate(self.legs):
-            for drive_name in leg.drives:
-                if drive_name not in self.drives:
-                    raise ValueError(f"legs.{k}.drives: no drive {drive_name!r} is described")
+            for actuator_name in leg.actuators:
+                if actuator_name not in self.actuators:
+                    raise ValueError(
+                        f"legs.{k}.actuators: no actuator {actuator_name!r} is described"
+                    )
         return self

@@ -7,7 +7,7 @@ import tomllib
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from typing import Final
+from typing import Any, Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
 from sim.errors import RobotFileError, SimulationInputError
+from sim.former_names import as_written
 from sim.robot.description import (
     JOINTS_PER_LEG,
+    Actuator,
     Contact,
-    DriveTrain,
     Gearhead,
     Leg,
     Motor,
@@ -51,12 +52,12 @@ class LegGeometry:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointDrive:
+class JointActuators:
     """Motors and gears by joint, in joint order, referred to the joint; arrays (J,).
 
     torque: r K_M [N m/A], also the back-EMF [V s/rad]; resistance [ohm]; inductance [H];
     armature: J_M r^2 [kg m2]; motor_friction: B_M r^2, gear_friction: B_G at eta = 0
-    [N m s/rad], to be multiplied by 1 - eta; efficiency: eta [1]; gearlash: play, end to end
+    [N m s/rad], to be multiplied by 1 - eta; efficiency: eta [1]; backlash: play, end to end
     [rad]; shaft_stiffness [N m/rad] and shaft_damping [N m s/rad] of the closed play.
     """
 
@@ -67,7 +68,7 @@ class JointDrive:
     motor_friction: Floats
     gear_friction: Floats
     efficiency: Floats
-    gearlash: Floats
+    backlash: Floats
     shaft_stiffness: Floats
     shaft_damping: Floats
 
@@ -96,27 +97,27 @@ class Robot:
         return JOINTS_PER_LEG * len(self.legs)
 
     @property
-    def has_gearlash(self) -> bool:
+    def has_backlash(self) -> bool:
         """Motors and links move apart: any joint has play."""
         return any(
-            self.description.drives[name].gearlash > 0.0
+            self.description.actuators[name].backlash > 0.0
             for leg in self.description.legs
-            for name in leg.drives
+            for name in leg.actuators
         )
 
     def contacts(self) -> tuple[Contact, ...]:
         """Each foot's contact parameters, its own or the robot's."""
         return tuple(leg.contact or self.description.contact for leg in self.description.legs)
 
-    def drives(self) -> JointDrive:
+    def actuators(self) -> JointActuators:
         """Motor and gear numbers by joint."""
         d = self.description
         rows = []
         for leg in d.legs:
-            for name in leg.drives:
-                drive = d.drives[name]
-                motor, gear = d.motors[drive.motor], d.gearheads[drive.gearhead]
-                ratio = gear.ratio * drive.bevel
+            for name in leg.actuators:
+                actuator = d.actuators[name]
+                motor, gear = d.motors[actuator.motor], d.gearheads[actuator.gearhead]
+                ratio = gear.ratio * actuator.bevel
                 rows.append(
                     (
                         ratio * motor.torque_constant,
@@ -124,14 +125,14 @@ class Robot:
                         motor.inductance,
                         motor.rotor_inertia * ratio**2,
                         motor.viscous_friction * ratio**2,
-                        gear.nominal_torque * gear.ratio / gear.nominal_speed * drive.bevel**2,
+                        gear.nominal_torque * gear.ratio / gear.nominal_speed * actuator.bevel**2,
                         gear.efficiency,
-                        drive.gearlash,
-                        drive.shaft_stiffness,
-                        drive.shaft_damping,
+                        actuator.backlash,
+                        actuator.shaft_stiffness,
+                        actuator.shaft_damping,
                     )
                 )
-        return JointDrive(*np.array(rows).T.copy())
+        return JointActuators(*np.array(rows).T.copy())
 
 
 @lru_cache(maxsize=8)
@@ -149,11 +150,13 @@ def shipped_robot(name: str) -> Robot:
 def parse_robot(toml: str, urdf: str) -> Robot:
     """A robot from the text of its two files. Raises RobotFileError that names the field."""
     try:
-        description = RobotDescription.model_validate(tomllib.loads(toml))
+        document = tomllib.loads(toml)
     except tomllib.TOMLDecodeError as error:
         raise RobotFileError(f"robot.toml: {error}") from error
+    try:
+        description = RobotDescription.model_validate(document)
     except ValidationError as error:
-        raise RobotFileError(_describe(error, toml)) from error
+        raise RobotFileError(_describe(error, toml, document)) from error
     joints = _joint_origins(urdf)
     return Robot(
         description,
@@ -162,11 +165,12 @@ def parse_robot(toml: str, urdf: str) -> Robot:
     )
 
 
-def _describe(error: ValidationError, toml: str) -> str:
+def _describe(error: ValidationError, toml: str, document: dict[str, Any]) -> str:
     """What is wrong first, with field, line, and what the field means in which unit."""
     first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"])
-    line = line_of(toml, [part for part in first["loc"] if not _is_class(part)])
+    location = as_written(document, first["loc"])
+    where = ".".join(str(part) for part in location)
+    line = line_of(toml, [part for part in location if not _is_class(part)])
     message = first["msg"].removeprefix("Value error, ")
     meaning = _meaning(str(first["loc"][-1])) if first["loc"] else None
     return (
@@ -189,7 +193,7 @@ def _meaning(field: str) -> str | None:
         RobotDescription,
         Motor,
         Gearhead,
-        DriveTrain,
+        Actuator,
         Supply,
         Pwm,
         Sensors,

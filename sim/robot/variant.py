@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from sim.robot.description import ContactLaw, DriveTrain, Leg
+from sim import former_names
+from sim.former_names import current_names
+from sim.robot.description import Actuator, ContactLaw, Leg
 from sim.robot.robot import Robot, parse_robot, shipped_robot
 
 RobotName = Literal["szabadka2"]
@@ -28,12 +30,17 @@ class RobotVariant(BaseModel):
         default="linear_zone",
         description="How soles rub: linear_zone, karnopp or stick.",
     )
-    gearlash: Degrees = Field(
+    backlash: Degrees = Field(
         default=(0.0, 0.0, 0.0),
         description="Play between gearhead and link of coxa, femur and tibia, end to end [deg];"
         " measured at 2 to 3 on the robot. Simulated at 20 kHz, so four times as slow.",
         examples=[(2.5, 1.0, 1.0)],
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_former_names(cls, document: Any) -> Any:
+        return current_names(document, former_names.ROBOT_VARIANT)
 
 
 class RobotFiles(BaseModel):
@@ -41,7 +48,9 @@ class RobotFiles(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    toml: str = Field(max_length=200_000, description="robot.toml: legs, drives, contact, supply.")
+    toml: str = Field(
+        max_length=200_000, description="robot.toml: legs, actuators, contact, supply."
+    )
     urdf: str = Field(max_length=800_000, description="robot.urdf: kinematic tree and inertias.")
 
     @model_validator(mode="after")
@@ -72,16 +81,16 @@ def _load_files(files: RobotFiles) -> Robot:
 def _load_variant(variant: RobotVariant) -> Robot:
     robot = shipped_robot(variant.name)
     description = robot.description.model_copy(update={"contact_law": variant.contact_law})
-    if any(variant.gearlash):
-        drives: dict[str, DriveTrain] = {}
+    if any(variant.backlash):
+        actuators: dict[str, Actuator] = {}
         legs: list[Leg] = []
         for leg in description.legs:
             names = []
-            for name, degrees in zip(leg.drives, variant.gearlash, strict=True):
+            for name, degrees in zip(leg.actuators, variant.backlash, strict=True):
                 named = f"{name}, {degrees:g} deg of play"
-                play = {"gearlash": math.radians(degrees)}
-                drives[named] = description.drives[name].model_copy(update=play)
+                play = {"backlash": math.radians(degrees)}
+                actuators[named] = description.actuators[name].model_copy(update=play)
                 names.append(named)
-            legs.append(leg.model_copy(update={"drives": tuple(names)}))
-        description = description.model_copy(update={"drives": drives, "legs": tuple(legs)})
+            legs.append(leg.model_copy(update={"actuators": tuple(names)}))
+        description = description.model_copy(update={"actuators": actuators, "legs": tuple(legs)})
     return replace(robot, description=description)

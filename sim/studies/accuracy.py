@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Drive
+from sim.controllers.base import ControlLaw
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.quantisation import Axis
 from sim.errors import SimulationInputError
@@ -65,13 +65,13 @@ def tables_against_inference(
     for scenario in scenarios:
         exact = _reference_walk(scenario, controller.without_table(design), robot)
         for error, current in RESOLUTIONS:
-            drive = controller.compile_with(design, Axis(error, True), Axis(current, False))
+            control_law = controller.compile_with(design, Axis(error, True), Axis(current, False))
             deviations.append(
                 Deviation(
                     f"{error}x{current} bit",
                     scenario.name,
                     exact,
-                    _reference_walk(scenario, drive, robot) / exact,
+                    _reference_walk(scenario, control_law, robot) / exact,
                 )
             )
     return tuple(deviations)
@@ -139,14 +139,14 @@ def _walk(
     return objectives
 
 
-def _reference_walk(scenario: Scenario, drive: Drive, robot: RobotChoice) -> Floats:
+def _reference_walk(scenario: Scenario, control_law: ControlLaw, robot: RobotChoice) -> Floats:
     machine = load_robot(robot)
     kernel = reference_kernel(machine)
     timestep = 1.0 / PHYSICS_RATE
     course = course_of(machine, kernel, scenario, timestep)
     if course is None:
         raise SimulationInputError(f"scenario {scenario.name!r}: out of the legs' reach")
-    setup = course(drive)
+    setup = course(control_law)
     coding = Coding.of(machine, 10)
     (result,) = kernel.walk([setup], coding, log=False)
     status, objectives = judge(setup, result, coding.substeps, timestep)

@@ -61,7 +61,7 @@ _FACTS: Final[dict[Quantity, tuple[str, Literal["joint", "leg", "axis"], str]]] 
     Quantity.JOINT_ANGLE: ("rad", "joint", "joint angle by the motor encoder"),
     Quantity.CURRENT: ("A", "joint", "absolute motor current"),
     Quantity.SUPPLY: ("V", "leg", "supply voltage at the leg's board"),
-    Quantity.POTENTIOMETER: ("rad", "joint", "joint angle behind the gearlash"),
+    Quantity.POTENTIOMETER: ("rad", "joint", "joint angle behind the backlash"),
     Quantity.BODY_ACCELERATION: ("g", "axis", "acceleration of the body, without gravity"),
 }
 

@@ -49,7 +49,7 @@ class Perturbation(BaseModel):
     ground_friction: float = Field(default=0.8, ge=0.0, description="factor, all feet")
     stiffness: float = Field(default=0.8, gt=0.0, description="factor, all soles")
     damping: float = Field(default=1.2, ge=0.0, description="factor, all soles")
-    gearlash: float = Field(default=0.02, ge=0.0, le=0.5, description="of every joint [rad]")
+    backlash: float = Field(default=0.02, ge=0.0, le=0.5, description="of every joint [rad]")
     body_mass: float | None = Field(
         default=None, gt=0.0, description="in place of the described one [kg]"
     )
@@ -60,7 +60,7 @@ class Perturbation(BaseModel):
 
     @classmethod
     def of(cls, parameters: Mapping[str, float]) -> Perturbation:
-        """A twin that differs in these parameters alone, and has no gearlash."""
+        """A twin that differs in these parameters alone, and has no backlash."""
         return cls(
             supply_voltage=1.0,
             supply_resistance=1.0,
@@ -69,7 +69,7 @@ class Perturbation(BaseModel):
             ground_friction=1.0,
             stiffness=1.0,
             damping=1.0,
-            gearlash=0.0,
+            backlash=0.0,
             parameters=dict(parameters),
         )
 
@@ -136,7 +136,7 @@ def synthetic_log(
 
 
 def perturbed(robot: Robot, change: Perturbation) -> Robot:
-    """The twin: the same robot with other friction, losses, gearlash, battery and soles."""
+    """The twin: the same robot with other friction, losses, backlash, battery and soles."""
     d = robot.description
 
     def contact(own: Contact) -> Contact:
@@ -169,9 +169,9 @@ def perturbed(robot: Robot, change: Perturbation) -> Robot:
                 )
                 for name, motor in d.motors.items()
             },
-            "drives": {
-                name: drive.model_copy(update={"gearlash": change.gearlash})
-                for name, drive in d.drives.items()
+            "actuators": {
+                name: actuator.model_copy(update={"backlash": change.backlash})
+                for name, actuator in d.actuators.items()
             },
             "contact": contact(d.contact),
             "legs": tuple(

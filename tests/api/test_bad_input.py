@@ -14,7 +14,7 @@ from services.optimizer.store.sql_store import SqlStore
 pytestmark = pytest.mark.slow
 
 GOOD: dict[str, Any] = {"scenarios": ["normal-fast"], "iterations": 2}
-OWN = {"name": "own", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15}
+OWN = {"name": "own", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15}
 BIASES = [1.0, 1.0, 1.0, 1.0, 1.0]
 
 

@@ -15,7 +15,7 @@ from services.worker.in_process import InProcessEvaluator
 SPEC = {
     "name": "end to end",
     "scenarios": [
-        {"name": "short", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "cycles": 1}
+        {"name": "short", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
     ],
     "optimizer": {"particles": 4},
     "iterations": 3,

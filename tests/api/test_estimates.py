@@ -10,7 +10,7 @@ from services.optimizer.store.sql_store import SqlStore
 
 pytestmark = pytest.mark.slow
 
-SHORT = {"name": "short", "cycle_time": 0.6, "radius": 0.16, "withers": 0.15, "cycles": 1.0}
+SHORT = {"name": "short", "cycle_time": 0.6, "radius": 0.16, "hip_height": 0.15, "cycles": 1.0}
 
 
 def test_an_estimate_counts_walks_and_stores_nothing(
@@ -40,7 +40,7 @@ def test_earlier_jobs_tell_the_rate(client: httpx2.Client, job, commit, spec: Jo
     [
         ({"iterations": 0}, "iterations"),
         ({"variables": [{"name": "I", "low": -5.0, "high": -1.0}], "fixed": {}}, "variables"),
-        ({"scenarios": [{**SHORT, "withers": 0.5}]}, "scenarios.0"),
+        ({"scenarios": [{**SHORT, "hip_height": 0.5}]}, "scenarios.0"),
     ],
 )
 def test_a_job_that_cannot_be_submitted_cannot_be_estimated(

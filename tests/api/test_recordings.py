@@ -9,7 +9,7 @@ from sim.controllers import CONTROLLERS
 from sim.robot import load_robot
 
 WALK = {
-    "scenario": {"name": "b", "cycle_time": 0.6, "radius": 0.16, "withers": 0.15, "cycles": 1},
+    "scenario": {"name": "b", "cycle_time": 0.6, "radius": 0.16, "hip_height": 0.15, "cycles": 1},
     "controller": "fuzzy-pi",
     "design": dict(CONTROLLERS["fuzzy-pi"].published["A"]),
     "first_tick": 20,

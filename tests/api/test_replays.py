@@ -20,7 +20,7 @@ from sim.scenario import SCENARIOS
 pytestmark = pytest.mark.slow
 
 DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
-SHORT = {"name": "short", "cycle_time": 1.0, "radius": 0.16, "withers": 0.15, "cycles": 1}
+SHORT = {"name": "short", "cycle_time": 1.0, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
 QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
 
 

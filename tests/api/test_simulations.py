@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 REQUEST: dict[str, Any] = {"design": DESIGN, "scenarios": ["normal-fast"]}
 
-SHORT = {"name": "short", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "cycles": 1}
+SHORT = {"name": "short", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
 
 
 def simulated(client: httpx2.Client, **change: Any) -> dict[str, Any]:
@@ -81,7 +81,13 @@ def test_there_is_no_log_unless_asked_for(client: httpx2.Client) -> None:
 
 
 def test_a_walk_that_fails_is_a_result_not_an_error(client: httpx2.Client) -> None:
-    still = {"name": "overloaded", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "load": 50}
+    still = {
+        "name": "overloaded",
+        "cycle_time": 1.5,
+        "radius": 0.16,
+        "hip_height": 0.15,
+        "load": 50,
+    }
 
     view = simulated(client, scenarios=[still])
 

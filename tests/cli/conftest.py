@@ -21,7 +21,7 @@ from cli.main import run
 from services.optimizer.service import JobService
 from services.runtime import open_store
 
-SHORT_WALK = {"name": "short", "cycle_time": 0.6, "radius": 0.16, "withers": 0.15, "cycles": 1.0}
+SHORT_WALK = {"name": "short", "cycle_time": 0.6, "radius": 0.16, "hip_height": 0.15, "cycles": 1.0}
 
 SMALL_SPEC: dict[str, Any] = {
     "name": "small",

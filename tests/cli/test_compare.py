@@ -46,6 +46,7 @@ def test_a_design_file_is_compared_on_a_variant_of_the_robot(
         (["compare", "2012"], "2012"),
         (["compare", "mpc:design.json"], "mpc"),
         (["compare", "--scenario", "moon"], "moon"),
+        (["compare", "--robot", '{"backlash": 3}'], "robot.backlash"),
         (["compare", "--robot", '{"gearlash": 3}'], "robot.gearlash"),
         (["compare", "--robot", "{"], "robot"),
         (["study", "steps", "--scenario", "moon"], "moon"),

@@ -16,7 +16,7 @@ FIT = ("--evaluator", "in-process", "--particles", "6", "--iterations", "4")
 
 @pytest.fixture
 def scenario(write_json: WriteJson) -> Path:
-    walk = {"name": "brief", "cycle_time": 0.8, "radius": 0.16, "withers": 0.15, "cycles": 2}
+    walk = {"name": "brief", "cycle_time": 0.8, "radius": 0.16, "hip_height": 0.15, "cycles": 2}
     return write_json(walk, "scenario.json")
 
 

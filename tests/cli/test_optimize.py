@@ -112,7 +112,7 @@ BAD_SPECS: dict[str, tuple[dict[str, Any], str]] = {
     "unknown field": ({"budget": 5}, "budget"),
     "unknown preference": ({"preference": "Z"}, "preference"),
     "unreachable pose": (
-        {"scenarios": [{"name": "giant", "cycle_time": 1.5, "radius": 0.9, "withers": 0.15}]},
+        {"scenarios": [{"name": "giant", "cycle_time": 1.5, "radius": 0.9, "hip_height": 0.15}]},
         "giant",
     ),
 }

@@ -25,6 +25,21 @@ def test_a_quadruped_crawls(capsys: pytest.CaptureFixture[str]) -> None:
     assert 1.0 / walked["objectives"]["reciprocal_speed"] == pytest.approx(0.05, rel=0.1)
 
 
+def test_files_with_former_names_walk_as_well(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    folder, crawl = tmp_path / "robot", tmp_path / "crawl.json"
+    shutil.copytree(QUADRUPED, folder)
+    toml = (folder / "robot.toml").read_text(encoding="utf-8").replace("actuators", "drives")
+    (folder / "robot.toml").write_text(toml, encoding="utf-8")
+    former = Path(CRAWL).read_text(encoding="utf-8").replace("hip_height", "withers")
+    crawl.write_text(former, encoding="utf-8")
+    assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", CRAWL]) == 0
+    walked = json.loads(capsys.readouterr().out)["scenarios"]
+    assert run([*SIMULATE, "--robot", str(folder), "--scenario", str(crawl)]) == 0
+    assert json.loads(capsys.readouterr().out)["scenarios"] == walked
+
+
 def test_a_job_with_a_quadruped_is_stored_with_its_robot(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -42,7 +57,7 @@ def test_a_scenario_out_of_its_reach_is_refused_by_leg_and_millimetres(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     far = tmp_path / "far.json"
-    far.write_text('{"name": "far", "cycle_time": 2, "radius": 0.5, "withers": 0.16}')
+    far.write_text('{"name": "far", "cycle_time": 2, "radius": 0.5, "hip_height": 0.16}')
     assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", str(far)]) == 2
     told = capsys.readouterr().err
     assert "far" in told
@@ -53,7 +68,7 @@ def test_a_scenario_out_of_its_reach_is_refused_by_leg_and_millimetres(
     ("line", "broken", "said"),
     [
         ("stiffness = 10000.0", "stiffness = -5.0", ("line 50", "contact.stiffness", "[N/m]")),
-        ('motor = "2232SR"', 'motor = "9999"', ("drives.coxa.motor", "9999")),
+        ('motor = "2232SR"', 'motor = "9999"', ("actuators.coxa.motor", "9999")),
         ("voltage = 11.6", 'voltage = "high"', ("supply.voltage", "[V]")),
         ("counts = 511", "counts = = 511", ("line 39",)),
         ("phase = 0.75", "phase = 7.5", ("legs.1.phase", "line 64", "[1]")),

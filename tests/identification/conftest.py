@@ -18,7 +18,7 @@ from sim.validation.synchronise import synchronise
 from sim.validation.synthetic import Perturbation, synthetic_log
 
 DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
-SCENARIO = Scenario(name="brief", cycle_time=1.0, radius=0.16, withers=0.15, cycles=2.0)
+SCENARIO = Scenario(name="brief", cycle_time=1.0, radius=0.16, hip_height=0.15, cycles=2.0)
 TRUTH = {
     "battery_voltage": 10.4,
     "body_mass": 4.3,

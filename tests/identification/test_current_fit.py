@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    "source", ["szabadka2", RobotVariant(gearlash=(2.5, 1.0, 1.0))], ids=["rigid", "gearlash"]
+    "source", ["szabadka2", RobotVariant(backlash=(2.5, 1.0, 1.0))], ids=["rigid", "backlash"]
 )
 def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
     robot = load_robot(source)

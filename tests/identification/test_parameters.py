@@ -104,9 +104,9 @@ def test_efficiency_is_the_named_gearheads_friction_alone() -> None:
     robot = load_robot("szabadka2")
     joint = robot.joint_names.index("left_front_femur")
     lossless = with_parameters(robot, {"efficiency_left_front_femur": 1.0})
-    before, after = robot.drives().viscous, lossless.drives().viscous
+    before, after = robot.actuators().viscous, lossless.actuators().viscous
     assert np.flatnonzero(before != after).tolist() == [joint]
-    assert after[joint] == robot.drives().motor_friction[joint]
+    assert after[joint] == robot.actuators().motor_friction[joint]
 
 
 @pytest.mark.parametrize(

@@ -125,8 +125,8 @@ def mjcf(
 def _add_leg(
     base: ET.Element, urdf: ET.Element, robot: Robot, leg: str, joints: Sequence[str]
 ) -> None:
-    # Behind gearlash, rotors do not turn with the links.
-    rotors = np.zeros(robot.n_joints) if robot.has_gearlash else robot.drives().armature
+    # Behind backlash, rotors do not turn with the links.
+    rotors = np.zeros(robot.n_joints) if robot.has_backlash else robot.actuators().armature
     armature = dict(zip(robot.joint_names, rotors, strict=True))
     parent = base
     for name in joints:
@@ -226,9 +226,9 @@ def _add_sensors(root: ET.Element, sites: Sequence[str]) -> None:
 
 def _add_motors(root: ET.Element, robot: Robot) -> None:
     actuator = ET.SubElement(root, "actuator")
-    drive = robot.drives()
+    actuators = robot.actuators()
     for name, k, r, b in zip(
-        robot.joint_names, drive.torque, drive.resistance, drive.viscous, strict=True
+        robot.joint_names, actuators.torque, actuators.resistance, actuators.viscous, strict=True
     ):
         ET.SubElement(
             actuator,

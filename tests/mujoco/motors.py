@@ -17,8 +17,8 @@ class Motors:
     """Quasi-static currents on a battery of finite resistance (thesis 2.2.5)."""
 
     def __init__(self, robot: Robot) -> None:
-        drive, supply = robot.drives(), robot.description.supply
-        self._k, self._r, self._viscous = drive.torque, drive.resistance, drive.viscous
+        actuators, supply = robot.actuators(), robot.description.supply
+        self._k, self._r, self._viscous = actuators.torque, actuators.resistance, actuators.viscous
         self._source, self._internal = supply.voltage, supply.resistance
 
     def __call__(self, duty: Floats, rates: Floats) -> tuple[Floats, Floats, Floats]:
@@ -37,8 +37,8 @@ class Motors:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Driven:
-    """What the drives do in one step: voltage [V], current [A], torque on the links [N m], (J,)."""
+class Actuation:
+    """Of the actuators in one step: voltage [V], current [A], torque on the links [N m], (J,)."""
 
     voltage: Floats
     current: Floats
@@ -56,7 +56,7 @@ class Gears(Protocol):
     def encoders(self, angles: Floats) -> Floats:
         """Links' angles (J,) [rad] -> what the encoders see."""
 
-    def drive(self, duty: Floats, angles: Floats, rates: Floats) -> Driven:
+    def actuate(self, duty: Floats, angles: Floats, rates: Floats) -> Actuation:
         """One physics step with the links at these angles [rad] and rates [rad/s]."""
 
 
@@ -65,16 +65,16 @@ class FirmGears:
 
     def __init__(self, robot: Robot) -> None:
         self._motors = Motors(robot)
-        self.armature = robot.drives().armature
+        self.armature = robot.actuators().armature
 
     def encoders(self, angles: Floats) -> Floats:
         """See `Gears`."""
         return angles
 
-    def drive(self, duty: Floats, angles: Floats, rates: Floats) -> Driven:
+    def actuate(self, duty: Floats, angles: Floats, rates: Floats) -> Actuation:
         """See `Gears`."""
         del angles
-        return Driven(*self._motors(duty, rates))
+        return Actuation(*self._motors(duty, rates))
 
 
 class LooseGears:
@@ -84,10 +84,10 @@ class LooseGears:
     """
 
     def __init__(self, robot: Robot, angles: Floats, timestep: float) -> None:
-        drive = robot.drives()
-        self._motors, self._inertia, self._timestep = Motors(robot), drive.armature, timestep
-        self._half = drive.gearlash / 2.0
-        self._stiffness, self._damping = drive.shaft_stiffness, drive.shaft_damping
+        actuators = robot.actuators()
+        self._motors, self._inertia, self._timestep = Motors(robot), actuators.armature, timestep
+        self._half = actuators.backlash / 2.0
+        self._stiffness, self._damping = actuators.shaft_stiffness, actuators.shaft_damping
         self.armature = np.zeros(robot.n_joints)
         self.angles, self.rates = angles.copy(), np.zeros(robot.n_joints)
 
@@ -96,13 +96,13 @@ class LooseGears:
         del angles
         return self.angles
 
-    def drive(self, duty: Floats, angles: Floats, rates: Floats) -> Driven:
+    def actuate(self, duty: Floats, angles: Floats, rates: Floats) -> Actuation:
         """See `Gears`; the rotors are stepped."""
         voltage, current, torque = self._motors(duty, self.rates)
         passed = self.shaft_torques(self.angles - angles, self.rates - rates)
         self.rates = self.rates + self._timestep * (torque - passed) / self._inertia
         self.angles = self.angles + self._timestep * self.rates
-        return Driven(voltage, current, passed)
+        return Actuation(voltage, current, passed)
 
     def shaft_torques(self, ahead: Floats, faster: Floats) -> Floats:
         """Torques on the links [N m] of rotors that are ahead [rad] and faster [rad/s] (J,).
@@ -118,4 +118,4 @@ class LooseGears:
 
 def gears_of(robot: Robot, angles: Floats, timestep: float) -> Gears:
     """The robot's, with motors and links at the same angles (J,) [rad], at rest."""
-    return LooseGears(robot, angles, timestep) if robot.has_gearlash else FirmGears(robot)
+    return LooseGears(robot, angles, timestep) if robot.has_backlash else FirmGears(robot)

@@ -21,13 +21,13 @@ VARIANTS = {
     "linear zone": RobotVariant(),
     "karnopp": RobotVariant(contact_law="karnopp"),
     "stick": RobotVariant(contact_law="stick"),
-    "stick and gearlash": RobotVariant(contact_law="stick", gearlash=(2.5, 1.0, 1.0)),
+    "stick and backlash": RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
 }
 STEEP = Scenario(
     name="steep",
     cycle_time=1.5,
     radius=0.16,
-    withers=0.15,
+    hip_height=0.15,
     load=2.0,
     slope=20.0,
     slope_direction=30.0,
@@ -67,7 +67,7 @@ def test_the_exported_robot_has_our_masses_and_joints_in_our_order(robot: Robot)
     assert model(robot, scenario=STEEP).body_mass.sum() == pytest.approx(total + 2.0, rel=1e-14)
     names = [exported.joint(k).name for k in range(1, exported.njnt)]
     assert names == list(robot.joint_names)
-    np.testing.assert_array_equal(exported.dof_armature[6:], robot.drives().armature)
+    np.testing.assert_array_equal(exported.dof_armature[6:], robot.actuators().armature)
     assert not exported.dof_armature[:6].any()
     assert not exported.dof_damping.any()
 
@@ -92,7 +92,7 @@ def test_joint_space_inertia_agrees_in_random_poses(robot: Robot) -> None:
         theirs[[*range(7), *(joint.idx_q for joint in joints)]] = q
         ours = np.triu(pin.crba(rigid, data, theirs))
         ours = (ours + np.triu(ours, 1).T)[np.ix_(order, order)]
-        ours[range(6, exported.nv), range(6, exported.nv)] += robot.drives().armature
+        ours[range(6, exported.nv), range(6, exported.nv)] += robot.actuators().armature
         np.testing.assert_allclose(to_world.T @ full @ to_world, ours, rtol=1e-9, atol=1e-12)
 
 
@@ -123,14 +123,14 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
         gears = gears_of(robot, q[7:], TIMESTEP)
         remembered = remember_anything(rng, gears, ground, v[6:])
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
-        push = rng.normal(size=robot.n_joints)
-        state = q, v, remembered, duty, push, parameters
+        disturbance = rng.normal(size=robot.n_joints)
+        state = q, v, remembered, duty, disturbance, parameters
         found = np.array(ours.observe(*state)[-1]).ravel()
         kept = np.array(ours.step(*state)[2]).ravel()
         attitude = into(d, q, v)
         mujoco.mj_step1(exported, d)
         d.qfrc_applied[:6] = 0.0
-        d.qfrc_applied[6:] = gears.drive(duty, q[7:], v[6:]).torque + push
+        d.qfrc_applied[6:] = gears.actuate(duty, q[7:], v[6:]).torque + disturbance
         forces = tread()
         limit = robot.description.contact.friction * forces[:, 2]
         rub = np.hypot(forces[:, 0], forces[:, 1])
@@ -141,7 +141,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
         twist = attitude.T @ d.qacc[:3] - np.cross(v[3:6], v[:3])
         expected = np.concatenate([twist, d.qacc[3:]])
         worst = max(worst, float(np.abs(found - expected).max() / np.abs(expected).max()))
-        np.testing.assert_allclose(kept, memory_of(gears, ground), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(kept, internal_state_of(gears, ground), rtol=1e-12, atol=1e-12)
     assert min(held, slid) > 20
     assert worst < 1e-9
 
@@ -155,10 +155,10 @@ def remember_anything(
         gears.rates = rates + rng.normal(size=len(rates))
     if isinstance(ground, Stick):
         ground.elongation = rng.normal(size=ground.elongation.shape) * 5e-3
-    return memory_of(gears, ground)
+    return internal_state_of(gears, ground)
 
 
-def memory_of(gears: Gears, ground: Ground) -> Floats:
+def internal_state_of(gears: Gears, ground: Ground) -> Floats:
     """What our kernel carries beside q and v: rotors, then springs along the ground."""
     rotors = [gears.angles, gears.rates] if isinstance(gears, LooseGears) else []
     springs = [ground.elongation.ravel()] if isinstance(ground, Stick) else []

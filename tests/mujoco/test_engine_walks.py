@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 PLAIN = RobotVariant()
 KARNOPP, STICK = RobotVariant(contact_law="karnopp"), RobotVariant(contact_law="stick")
-LOOSE = RobotVariant(gearlash=(2.5, 1.0, 1.0))
+LOOSE = RobotVariant(backlash=(2.5, 1.0, 1.0))
 NORMAL_FAST, LOADED_FAST, LOADED_SLOW, SLOPE_FAST = (SCENARIOS[k] for k in (0, 2, 3, 4))
 DRIVES: Mapping[str, tuple[str, Mapping[str, float], type[Coded]]] = {
     "published optimum A": ("fuzzy-pi", CONTROLLERS["fuzzy-pi"].published["A"], FuzzyPi),
@@ -34,7 +34,7 @@ ENERGY, RECIPROCAL_SPEED = 3, 4
 def named(value: object) -> str:
     """What tells a case from the others."""
     if isinstance(value, RobotVariant):
-        play = " and gearlash" if any(value.gearlash) else ""
+        play = " and backlash" if any(value.backlash) else ""
         return f"{value.contact_law}{play}"
     return value.name if isinstance(value, Scenario) else str(value)
 

@@ -53,7 +53,7 @@ class Trace:
 
 def timestep_of(robot: Robot) -> float:
     """[s]; links without their rotors answer the ground too fast for 5 kHz."""
-    return 5e-5 if robot.has_gearlash else 2e-4
+    return 5e-5 if robot.has_backlash else 2e-4
 
 
 def drag_of(robot: Robot, scenario: Scenario) -> float:
@@ -105,17 +105,17 @@ def walk(
         duty = controller(tick, turned[tick], current)
         for substep in range(substeps):
             mujoco.mj_step1(m, d)
-            driven = gears.drive(duty, d.qpos[7:], d.qvel[6:])
-            current = driven.current
+            actuation = gears.actuate(duty, d.qpos[7:], d.qvel[6:])
+            current = actuation.current
             d.qfrc_applied[:6] = 0.0
-            d.qfrc_applied[6:] = driven.torque
+            d.qfrc_applied[6:] = actuation.torque
             if push is not None:
                 forces = push()
             if substep == 0:
                 trodden[tick] = forces
             before = d.qpos[3:7].copy(), d.qvel[:3].copy()
             advance(m, d)
-            measures.add(*before, d.qacc, driven.torque, float(driven.voltage @ current))
+            measures.add(*before, d.qacc, actuation.torque, float(actuation.voltage @ current))
     objectives = measures.objectives(m.opt.timestep, d.qpos[2] - states[0, 2])
     return Trace(states[:, :3], states[:, [4, 5, 6, 3]], states[:, 7:], turned, trodden, objectives)
 

@@ -25,8 +25,8 @@ SPEC = JobSpec.model_validate(
     {
         "controller": "pi",
         "scenarios": [
-            {"name": "one", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "cycles": 2.0},
-            {"name": "two", "cycle_time": 1.0, "radius": 0.16, "withers": 0.15, "cycles": 1.0},
+            {"name": "one", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 2.0},
+            {"name": "two", "cycle_time": 1.0, "radius": 0.16, "hip_height": 0.15, "cycles": 1.0},
         ],
         "optimizer": {"particles": 10},
         "iterations": 5,

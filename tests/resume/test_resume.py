@@ -29,12 +29,12 @@ SPEC = JobSpec.model_validate(
     {
         "controller": "fuzzy-pi",
         "scenarios": [
-            {"name": "level", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "cycles": 2},
+            {"name": "level", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 2},
             {
                 "name": "uphill",
                 "cycle_time": 1.5,
                 "radius": 0.2,
-                "withers": 0.14,
+                "hip_height": 0.14,
                 "slope": 10.0,
                 "cycles": 2,
             },

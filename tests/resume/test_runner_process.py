@@ -27,7 +27,13 @@ def spec(iterations: int) -> JobSpec:
         {
             "controller": "pi",
             "scenarios": [
-                {"name": "short", "cycle_time": 1.0, "radius": 0.16, "withers": 0.15, "cycles": 1}
+                {
+                    "name": "short",
+                    "cycle_time": 1.0,
+                    "radius": 0.16,
+                    "hip_height": 0.15,
+                    "cycles": 1,
+                }
             ],
             "optimizer": {"name": "pso", "particles": 4},
             "iterations": iterations,

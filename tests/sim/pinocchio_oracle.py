@@ -48,7 +48,7 @@ class Oracle:
         self.q_index = [*range(7), *(joint.idx_q for joint in joints)]
         self.v_index = [*range(6), *(joint.idx_v for joint in joints)]
         armature = np.zeros(self.model.nv)
-        armature[self.v_index[6:]] = robot.drives().armature
+        armature[self.v_index[6:]] = robot.actuators().armature
         self.model.armature = armature
         self.data = self.model.createData()
 

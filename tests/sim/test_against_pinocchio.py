@@ -24,7 +24,7 @@ STEEP = Scenario(
     name="steep",
     cycle_time=1.5,
     radius=0.16,
-    withers=0.15,
+    hip_height=0.15,
     load=2.0,
     slope=20.0,
     slope_direction=30.0,
@@ -74,7 +74,7 @@ def _symbolic_tree(robot: Robot) -> Any:
         own, first_moment = inertia.rigid
         mass += own
         moment = add(moment, scale(own, at), apply(rotation, first_moment))
-    for armature, rate in zip(robot.drives().armature.tolist(), v[6:], strict=True):
+    for armature, rate in zip(robot.actuators().armature.tolist(), v[6:], strict=True):
         rotors += 0.5 * armature * rate * rate
     outputs = [
         [state.height for state in states],

@@ -32,26 +32,26 @@ def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
 ) -> None:
     oracle = Oracle(robot)
     rng = np.random.default_rng(7)
-    drive, supply = robot.drives(), robot.description.supply
-    slope = Scenario(name="steep", cycle_time=1.5, radius=0.16, withers=0.15, slope=20.0)
+    actuators, supply = robot.actuators(), robot.description.supply
+    slope = Scenario(name="steep", cycle_time=1.5, radius=0.16, hip_height=0.15, slope=20.0)
     oracle.model.gravity.linear = gravity_on(slope.slope)
     p = pack_parameters(robot, model.body, slope, 2e-4)
     touching, worst = 0, 0.0
     for _ in range(1000):
         q, v = random_state(rng, robot.n_joints)
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
-        push = rng.normal(size=robot.n_joints)
+        disturbance = rng.normal(size=robot.n_joints)
         current, voltage, load, forces, battery, found = (
-            np.array(part).ravel() for part in model.observe(q, v, [], duty, push, p)
+            np.array(part).ravel() for part in model.observe(q, v, [], duty, disturbance, p)
         )
         # The battery's equation, solved here by its fixed point instead of in closed form.
         assert battery[0] == pytest.approx(
             supply.voltage - supply.resistance * float(duty @ current), rel=1e-12
         )
-        expected = (duty * battery[0] - drive.torque * v[6:]) / drive.resistance
+        expected = (duty * battery[0] - actuators.torque * v[6:]) / actuators.resistance
         np.testing.assert_allclose(current, expected, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(voltage, duty * battery[0], rtol=1e-12)
-        torque = drive.torque * current - drive.viscous * v[6:] + push
+        torque = actuators.torque * current - actuators.viscous * v[6:] + disturbance
         external, world = oracle.contact_forces(q, v)
         touching += int((world[:, 2] > 0).any())
         tau = np.zeros(oracle.model.nv)
@@ -61,7 +61,7 @@ def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
         worst = max(worst, float(np.abs(found - reference).max() / np.abs(reference).max()))
         np.testing.assert_allclose(forces.reshape(-1, 3), world, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(
-            load, torque - drive.armature * reference[6:], rtol=1e-7, atol=1e-7
+            load, torque - actuators.armature * reference[6:], rtol=1e-7, atol=1e-7
         )
     assert touching > 200
     assert worst < 1e-10
@@ -74,7 +74,7 @@ def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -
     assert loaded.load == 2.0
     oracle.carry(loaded.load)
     p = pack_parameters(robot, model.body, loaded, 2e-4)
-    drive, still = robot.drives(), np.zeros(robot.n_joints)
+    actuators, still = robot.actuators(), np.zeros(robot.n_joints)
     for _ in range(20):
         q, v = random_state(rng, robot.n_joints)
         q[2] = 5.0
@@ -82,7 +82,7 @@ def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -
             np.array(part).ravel() for part in model.observe(q, v, [], still, still, p)
         )
         tau = np.zeros(oracle.model.nv)
-        tau[oracle.v_index[6:]] = drive.torque * current - drive.viscous * v[6:]
+        tau[oracle.v_index[6:]] = actuators.torque * current - actuators.viscous * v[6:]
         reference = pin.aba(oracle.model, oracle.data, oracle.q(q), oracle.v(v), tau)
         np.testing.assert_allclose(found, reference[oracle.v_index], rtol=1e-9, atol=1e-9)
 
@@ -124,7 +124,7 @@ def energy_drift(robot: Robot, timestep: float) -> float:
 
 def test_energy_is_conserved_without_contact_and_friction() -> None:
     robot = lossless()
-    assert not robot.drives().viscous.any()
+    assert not robot.actuators().viscous.any()
     coarse, fine = energy_drift(robot, 2e-4), energy_drift(robot, 1e-4)
     # First-order integration: what drift there is halves with the step.
     assert coarse < 1e-3

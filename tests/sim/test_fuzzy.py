@@ -94,7 +94,7 @@ def test_table_is_odd_in_the_error_and_follows_it() -> None:
     assert table[-1, 0] == table.max() > 50
 
 
-def test_high_current_reverses_the_drive() -> None:
+def test_high_current_reverses_the_motor() -> None:
     table = quantised_table(0.2, 0.3, 0.2, 1.0, Shape.TRIANGLE).astype(int)
     assert table[-1, 0] > 0 > table[-1, 63]
 
@@ -111,20 +111,20 @@ def test_table_memory_follows_equation_5_1() -> None:
     assert table_bytes((10, 6), 8) == 64 * 1024
     assert table_bytes((8, 8), 8) == 64 * 1024
     assert table_bytes((6, 6, 6), 8, outputs=2) == 512 * 1024
-    drive = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
-    assert drive.direct is not None
-    assert drive.direct.values.nbytes == table_bytes((10, 6), 8)
+    law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    assert law.direct is not None
+    assert law.direct.values.nbytes == table_bytes((10, 6), 8)
 
 
-def test_drive_scales_are_those_of_the_ranges() -> None:
-    drive = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
-    table = drive.direct
+def test_the_laws_scales_are_those_of_the_ranges() -> None:
+    law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    table = law.direct
     assert table is not None
     assert (5837 * table.error_gain + (1 << 15)) >> 16 == 511
     assert (20111 * table.current_gain + (1 << 15)) >> 16 == 63
     assert (127 * table.output_gain + (1 << 15)) >> 16 == 781
     # 0.171 PWM counts per count and second, at 500 Hz, in 20 fractional bits.
-    assert drive.integral_gain == round(0.171 * 0.002 * 2**20)
+    assert law.integral_gain == round(0.171 * 0.002 * 2**20)
 
 
 def test_a_table_of_three_inputs_is_its_inference() -> None:
@@ -143,12 +143,12 @@ def test_a_table_of_three_inputs_is_its_inference() -> None:
 
 
 def test_chapter_3s_rules_follow_error_and_velocity_and_yield_to_current() -> None:
-    drive = CONTROLLERS["fuzzy-pi-3"].compile(CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"])
-    assert drive.direct is not None
-    assert drive.integrated is not None
-    voltage, rate = drive.direct.values[:, :, 0].astype(int), drive.integrated.values.astype(int)
+    law = CONTROLLERS["fuzzy-pi-3"].compile(CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"])
+    assert law.direct is not None
+    assert law.integrated is not None
+    voltage, rate = law.direct.values[:, :, 0].astype(int), law.integrated.values.astype(int)
     assert voltage[900, 0] > 0 > voltage[120, 0]
     assert voltage[900, 63] < 0 < voltage[120, 63]
     assert rate[32, 0, 60] > 0 > rate[32, 0, 4]
     # The velocity's full range, reached within one tick of 2 ms, is the table's last layer.
-    assert (round(11682 * 0.002) * drive.integrated.velocity_gain + (1 << 15)) >> 16 == 31
+    assert (round(11682 * 0.002) * law.integrated.velocity_gain + (1 << 15)) >> 16 == 31

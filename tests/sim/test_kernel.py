@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from sim.compiler import compilation
+from sim.compiler.compilation import Target, target
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import NativeKernel, _identity, _source_of, native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import reference_kernel
 from sim.kernel.walk import Coding, Kernel, WalkSetup
-from sim.native import compilation
-from sim.native.compilation import Target, target
 from sim.outcome import Status
 from sim.robot import Robot, load_robot
 from sim.scenario import SCENARIOS, Scenario
@@ -163,9 +163,9 @@ def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
     design = np.array([list(OPTIMUM.values())])
     (log,) = simulate(SHORT, "fuzzy-pi", list(OPTIMUM), design, log=True).logs
     assert log is not None
-    drive = robot.drives()
+    actuators = robot.actuators()
     steps = 10
-    decay = np.exp(-drive.resistance / drive.inductance / PHYSICS_RATE)
+    decay = np.exp(-actuators.resistance / actuators.inductance / PHYSICS_RATE)
     exact = np.zeros(robot.n_joints)
     charge = quasi = 0.0
     for k in range(len(log.time) - 1):
@@ -173,7 +173,7 @@ def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
             speed = log.joint_velocity[k] + n / steps * (
                 log.joint_velocity[k + 1] - log.joint_velocity[k]
             )
-            settled = (log.voltage[k] - drive.torque * speed) / drive.resistance
+            settled = (log.voltage[k] - actuators.torque * speed) / actuators.resistance
             exact = settled + (exact - settled) * decay
             charge += float(log.voltage[k] @ exact)
             quasi += float(log.voltage[k] @ settled)

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim.compiler.compilation import load_library, vector_header
 from sim.errors import KernelBuildError
 from sim.kernel.native import native_kernel
-from sim.native.compilation import load_library, vector_header
 from sim.robot import load_robot
 
 pytestmark = pytest.mark.slow
@@ -59,7 +59,7 @@ def test_a_refused_source_says_why_and_leaves_nothing(
 
 def test_processes_that_start_together_share_one_compilation(tmp_path: Path) -> None:
     code = (
-        "from sim.native.compilation import load_library\n"
+        "from sim.compiler.compilation import load_library\n"
         "print(load_library('race', b'', lambda: 'int f(void) { return 7; }').f())"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path)}
@@ -84,7 +84,7 @@ def test_a_process_with_a_warm_cache_needs_neither_casadi_nor_pinocchio() -> Non
 
 def test_without_a_compiler_the_interpreter_serves_and_says_so(tmp_path: Path) -> None:
     done = run_python(
-        "import sim.native.compilation as c\nfrom sim.simulate import prepare\nprint(prepare())",
+        "import sim.compiler.compilation as c\nfrom sim.simulate import prepare\nprint(prepare())",
         PATH="",
         CC="",
         XDG_CACHE_HOME=str(tmp_path),

@@ -139,8 +139,8 @@ def test_the_bodys_acceleration_is_the_objectives(robot: Robot) -> None:
     assert np.sqrt(np.mean(norm**2)) == pytest.approx(walk.outcome.objectives[0, 1], rel=0.03)
 
 
-def test_with_gearlash_the_link_is_shown_not_its_motor() -> None:
-    robot = load_robot(RobotVariant(gearlash=(2.5, 1.0, 1.0)))
+def test_with_backlash_the_link_is_shown_not_its_motor() -> None:
+    robot = load_robot(RobotVariant(backlash=(2.5, 1.0, 1.0)))
     log, _ = walked(robot)
     shown = replay(robot, log, rate=100)
     assert np.abs(shown.joint_angle - shown.motor_angle).max() > 0.015

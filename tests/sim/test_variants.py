@@ -1,4 +1,4 @@
-"""Laws of friction, gearlash, noise, and slopes in any direction."""
+"""Laws of friction, backlash, noise, and slopes in any direction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sim.controllers import CONTROLLERS
 from sim.kernel.native import native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.parameters import pack_parameters
-from sim.kernel.physics_step import memory_size, physics_model
+from sim.kernel.physics_step import internal_state_size, physics_model
 from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status
@@ -27,7 +27,7 @@ PI = np.array([[0.45, 0.1]])
 BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
 KARNOPP = RobotVariant(contact_law="karnopp")
 STICK = RobotVariant(contact_law="stick")
-LASH = RobotVariant(gearlash=(2.5, 1.0, 1.0))
+LASH = RobotVariant(backlash=(2.5, 1.0, 1.0))
 VARIANTS = pytest.mark.parametrize("variant", [KARNOPP, STICK, LASH], ids=str)
 
 
@@ -110,9 +110,9 @@ def test_gravity_of_a_slope_points_down_it() -> None:
     assert pulls[1][1] == pytest.approx(11.5, abs=1.5)
 
 
-def test_gearlash_lets_motor_and_link_part_by_no_more_than_the_play() -> None:
+def test_backlash_lets_motor_and_link_part_by_no_more_than_the_play() -> None:
     robot = load_robot(LASH)
-    assert memory_size(robot) == 36
+    assert internal_state_size(robot) == 36
     (log,) = simulate(BRIEF, "pi", ["P", "I"], PI, robot=LASH, log=True).logs
     assert log is not None
     gap = np.abs(log.motor_angle - log.joint_angle)
@@ -126,7 +126,7 @@ def test_gearlash_lets_motor_and_link_part_by_no_more_than_the_play() -> None:
     assert not log.load_torque[:, ::3][inside].any()
 
 
-def test_gearlash_shakes_the_body() -> None:
+def test_backlash_shakes_the_body() -> None:
     shaken = simulate(SCENARIOS[0], "pi", ["P", "I"], PI, robot=LASH).outcome.objectives[0]
     firm = simulate(SCENARIOS[0], "pi", ["P", "I"], PI).outcome.objectives[0]
     assert shaken[2] > 1.5 * firm[2]
@@ -172,9 +172,9 @@ def test_a_heavier_body_costs_energy() -> None:
 
 
 def test_derivative_gain_damps_by_the_change_of_error() -> None:
-    drive = CONTROLLERS["pid"].compile({"P": 0.4, "I": 0.1, "D": 0.004})
+    law = CONTROLLERS["pid"].compile({"P": 0.4, "I": 0.1, "D": 0.004})
     # 0.004 counts s/count over a tick of 2 ms: two PWM counts per count of change.
-    assert drive.derivative_gain == 2 << 16
+    assert law.derivative_gain == 2 << 16
     results = [
         simulate(BRIEF, "pid", ["P", "I", "D"], np.array([[0.4, 0.1, 0.004]]), backend=backend)
         for backend in ("native", "reference")

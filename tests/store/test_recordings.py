@@ -14,7 +14,7 @@ from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
 from sim.scenario import Scenario
 
-SCENARIO = Scenario(name="brief", cycle_time=0.6, radius=0.16, withers=0.15, cycles=1.0)
+SCENARIO = Scenario(name="brief", cycle_time=0.6, radius=0.16, hip_height=0.15, cycles=1.0)
 
 
 def recording(**changes: object) -> RecordedWalk:

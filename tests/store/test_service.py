@@ -65,7 +65,7 @@ def test_before_anything_was_measured_nothing_is_estimated(iterations: int, seco
     assert time_left(running, NOW) == TimeLeft(None, None, None)
 
 
-HIGH_LEGS = {"name": "mine", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15, "stride": 0.5}
+HIGH_LEGS = {"name": "mine", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "stride": 0.5}
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,8 @@ def test_a_simulated_walk_has_every_quantity_in_its_unit(walks: TwoWalks) -> Non
     assert not log.synthetic
 
 
-def test_gearlash_shows_between_encoder_and_potentiometer(walks: TwoWalks) -> None:
-    robot = perturbed(walks.robot, NO_CHANGE.model_copy(update={"gearlash": 0.04}))
+def test_backlash_shows_between_encoder_and_potentiometer(walks: TwoWalks) -> None:
+    robot = perturbed(walks.robot, NO_CHANGE.model_copy(update={"backlash": 0.04}))
     values = np.array([list(DESIGN.values())])
     one = walks.scenario.model_copy(update={"cycles": 1.0})
     (walk,) = simulate(one, "fuzzy-pi", list(DESIGN), values, robot=robot, log=True).logs

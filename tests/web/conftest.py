@@ -20,7 +20,7 @@ from tests.web.visit import Visit
 REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_PAGE"))
 SCREENSHOTS = os.environ.get("GAITSWARM_SCREENSHOTS", "")
 
-SHORT_WALK = {"name": "short", "cycle_time": 1.0, "radius": 0.16, "withers": 0.15, "cycles": 1}
+SHORT_WALK = {"name": "short", "cycle_time": 1.0, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
 
 SMALL_JOB: dict[str, Any] = {
     "name": "small",

@@ -11,8 +11,8 @@ from sim.scenario import Scenario
 from sim.simulate import simulate
 
 SCENARIOS = (
-    Scenario(name="level", cycle_time=1.0, radius=0.16, withers=0.15, cycles=1),
-    Scenario(name="uphill", cycle_time=1.5, radius=0.2, withers=0.14, slope=10.0, cycles=1),
+    Scenario(name="level", cycle_time=1.0, radius=0.16, hip_height=0.15, cycles=1),
+    Scenario(name="uphill", cycle_time=1.5, radius=0.2, hip_height=0.14, slope=10.0, cycles=1),
 )
 
 

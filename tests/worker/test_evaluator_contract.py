@@ -59,7 +59,7 @@ def test_an_error_of_the_simulation_comes_through_as_itself(evaluator: Evaluator
 
 
 def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
-    long = Scenario(name="long", cycle_time=2.0, radius=0.16, withers=0.15, cycles=5)
+    long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
     stop = threading.Event()
     threading.Timer(0.3, stop.set).start()
     begun = time.monotonic()
@@ -88,7 +88,7 @@ def test_a_small_job_is_served_while_a_big_one_runs(evaluator: Evaluator) -> Non
     big_ended = threading.Event()
     stop = threading.Event()
     # A minute and more of work, in pieces of a second.
-    long = Scenario(name="long", cycle_time=2.0, radius=0.16, withers=0.15, cycles=5)
+    long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
 
     def run_big() -> None:
         try:

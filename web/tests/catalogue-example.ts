@@ -33,7 +33,7 @@ export const DOCUMENT: OpenApiDocument = {
       RobotVariant: {
         properties: {
           contact_law: { type: 'string', enum: ['linear_zone', 'stick'], default: 'linear_zone' },
-          gearlash: { default: [0, 0, 0] },
+          backlash: { default: [0, 0, 0] },
         },
       },
     },

@@ -58,11 +58,11 @@ describe('a draft', () => {
   })
 
   test('sends a variant of the robot with numbers', () => {
-    const robot = { ...empty.robot, kind: 'variant' as const, gearlash: ['2.5', '1', '1'] }
+    const robot = { ...empty.robot, kind: 'variant' as const, backlash: ['2.5', '1', '1'] }
     expect(specOf({ ...empty, robot }).robot).toEqual({
       name: 'szabadka2',
       contact_law: 'linear_zone',
-      gearlash: [2.5, 1, 1],
+      backlash: [2.5, 1, 1],
     })
   })
 })

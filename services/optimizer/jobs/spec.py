@@ -64,7 +64,7 @@ class Spec(BaseModel):
     robot: RobotSource = Field(
         default="szabadka2",
         description="Robot to simulate, by name, or a variant with another law of friction or with"
-        " gearlash, or the text of the files of your own.",
+        " backlash, or the text of the files of your own.",
     )
     variables: tuple[VariableName | Variable, ...] | None = Field(
         default=None,

@@ -82,7 +82,7 @@ function robotOf({ robot }: Draft): JobSpec['robot'] {
   return {
     name: 'szabadka2',
     contact_law: robot.contact_law,
-    gearlash: robot.gearlash.map(number),
+    backlash: robot.backlash.map(number),
   } as unknown as JobSpec['robot']
 }
 

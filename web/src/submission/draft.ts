@@ -18,7 +18,7 @@ export interface RobotDraft {
   readonly kind: 'szabadka2' | 'variant' | 'files'
   readonly contact_law: string
   /** Coxa, femur, tibia [deg]. */
-  readonly gearlash: readonly string[]
+  readonly backlash: readonly string[]
   readonly toml: string
   readonly urdf: string
 }
@@ -55,7 +55,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     robot: {
       kind: 'szabadka2',
       contact_law: text(variant.get('contact_law')?.default),
-      gearlash: list(variant.get('gearlash')?.default, 3),
+      backlash: list(variant.get('backlash')?.default, 3),
       toml: '',
       urdf: '',
     },
@@ -173,7 +173,7 @@ function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
     ...empty,
     kind: 'variant',
     contact_law: robot.contact_law ?? empty.contact_law,
-    gearlash: robot.gearlash?.map(text) ?? empty.gearlash,
+    backlash: robot.backlash?.map(text) ?? empty.backlash,
   }
 }
 

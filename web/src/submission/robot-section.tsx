@@ -47,12 +47,12 @@ export function RobotSection(props: SectionProps) {
             {LINKS.map((link, index) => (
               <NumberField
                 key={link}
-                label={`Gearlash of the ${link}`}
-                field={{ ...variant.get('gearlash')!, unit: 'deg' }}
-                value={robot.gearlash[index]}
-                error={errors.get(`robot.gearlash.${index}`)}
+                label={`Backlash of the ${link}`}
+                field={{ ...variant.get('backlash')!, unit: 'deg' }}
+                value={robot.backlash[index]}
+                error={errors.get(`robot.backlash.${index}`)}
                 onChange={(value) =>
-                  change({ gearlash: robot.gearlash.map((old, k) => (k === index ? value : old)) })
+                  change({ backlash: robot.backlash.map((old, k) => (k === index ? value : old)) })
                 }
               />
             ))}
@@ -76,7 +76,7 @@ export function RobotSection(props: SectionProps) {
         )}
         <Problems
           messages={errorsUnder(errors, 'robot').filter(
-            (message) => robot.kind !== 'variant' || !/^(gearlash|contact_law)/.test(message),
+            (message) => robot.kind !== 'variant' || !/^(backlash|contact_law)/.test(message),
           )}
         />
       </div>

@@ -35,8 +35,8 @@ export function Player({
   const newtons = newtonsPerCell(Math.max(...walks.map(({ replay }) => largestForce(replay))))
 
   useEffect(() => {
-    const drive = new ReplayDriver(playback, walks[0].replay, player.current!)
-    driver.current = drive
+    const replayDriver = new ReplayDriver(playback, walks[0].replay, player.current!)
+    driver.current = replayDriver
     const container = stage.current!
     const leave = { now: false, observer: null as ResizeObserver | null }
     setFailure(null)
@@ -45,11 +45,11 @@ export function Player({
         if (leave.now) return
         try {
           const built = new WalkScene(replaysOf(walks), 0.1 / newtons, choices, () =>
-            drive.request(),
+            replayDriver.request(),
           )
           scene.current = built
-          leave.observer = shownIn(container, built, () => drive.request())
-          drive.attach(built)
+          leave.observer = shownIn(container, built, () => replayDriver.request())
+          replayDriver.attach(built)
         } catch (error) {
           setFailure(messageOf(error))
         }
@@ -59,7 +59,7 @@ export function Player({
     return () => {
       leave.now = true
       leave.observer?.disconnect()
-      drive.dispose()
+      replayDriver.dispose()
       scene.current?.dispose()
       scene.current = null
     }

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sim.kernel.spatial import Scalar
-from sim.robot.robot import JointDrive
+from sim.robot.robot import JointActuators
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,7 @@ class Electrical:
 
 
 def electrical(
-    drive: JointDrive,
+    actuators: JointActuators,
     duty: Sequence[Scalar],
     rates: Sequence[Scalar],
     viscous: Sequence[Scalar],
@@ -36,7 +36,7 @@ def electrical(
     I_j = (duty_j U_S - k_j omega_j) / R_j, U_S = V - R_i sum(duty_j I_j) is linear in U_S.
     The electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static.
     """
-    constants = list(zip(drive.torque.tolist(), drive.resistance.tolist(), strict=True))
+    constants = list(zip(actuators.torque.tolist(), actuators.resistance.tolist(), strict=True))
     back, load = 0.0, 0.0
     for (k, r), share, rate in zip(constants, duty, rates, strict=True):
         per_ohm = share * (1.0 / r)

@@ -97,7 +97,7 @@ def target() -> Target:
 
 def vector_header() -> str:
     """C text that defines `vec` of LANES doubles and its operations."""
-    return (resources.files("sim.native") / "vec.h").read_text(encoding="utf-8")
+    return (resources.files("sim.compiler") / "vec.h").read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)

@@ -1,4 +1,4 @@
-"""Play between gearhead and link as symbols.
+"""Backlash (thesis: gearlash), the play between gearhead and link, as symbols.
 
 The thesis calls its absence the model's largest error. The motor side (rotor, gearhead, encoder) is
 a second inertia that touches the link at either end of the play through a stiff, damped shaft.
@@ -17,7 +17,7 @@ def shaft_torque(
     """Torque [N m] on the link.
 
     ahead: motor side's angle less the link's [rad], rate: its derivative [rad/s], play: end to
-    end [rad]. The shaft pushes, but never pulls the link back into the play.
+    end [rad]. It never pulls the link back into the play.
     """
     half = 0.5 * play
     drag = damping * rate

@@ -121,11 +121,11 @@ static void control_tick(Walker *const *lane, const Coding *c, int64_t tick, con
   }
 }
 
-static void write_log(Walker *const *lane, int64_t tick, const vec *q, const vec *v,
-                      const vec *internal, const vec *duty)
+static void write_log(Walker *const *lane, const int *walking, int64_t tick, const vec *q,
+                      const vec *v, const vec *internal, const vec *duty)
 {
   for (int k = 0; k < LANES; k++) {
-    if (!lane[k]->log || tick >= lane[k]->ticks) continue;
+    if (!lane[k]->log || !walking[k]) continue;
     double *row = lane[k]->log + tick * NLOG;
     for (int i = 0; i < NQ; i++) *row++ = q[i][k];
     for (int i = 0; i < NV; i++) *row++ = v[i][k];
@@ -135,11 +135,12 @@ static void write_log(Walker *const *lane, int64_t tick, const vec *q, const vec
 }
 
 /* Lanes whose state is finite; x - x is zero for a finite x only. */
-static ivec all_finite(const vec *q, const vec *v)
+static ivec all_finite(const vec *q, const vec *v, const vec *internal)
 {
   vec residue = SPLAT(0.0);
   for (int i = 0; i < NQ; i++) residue += q[i] - q[i];
   for (int i = 0; i < NV; i++) residue += v[i] - v[i];
+  for (int i = 0; i < NI; i++) residue += internal[i] - internal[i];
   return residue == SPLAT(0.0);
 }
 
@@ -168,7 +169,7 @@ static void walk(Walker *const *lane, const Coding *c)
   int now = 0;
   for (int64_t tick = 0; tick < last; tick++) {
     control_tick(lane, c, tick, ENCODER(q[now], internal[now]), current, &past, duty, disturbance);
-    write_log(lane, tick, q[now], v[now], internal[now], duty);
+    write_log(lane, walking, tick, q[now], v[now], internal[now], duty);
     for (int64_t n = 0; n < c->substeps; n++) {
       step(q[now], v[now], internal[now], duty, disturbance, p, q[1 - now], v[1 - now],
            internal[1 - now], current, integrands);
@@ -177,7 +178,7 @@ static void walk(Walker *const *lane, const Coding *c)
     }
     const vec qx = q[now][3], qy = q[now][4];
     const vec upright = SPLAT(1.0) - SPLAT(2.0) * (qx * qx + qy * qy);
-    const ivec sound = all_finite(q[now], v[now]);
+    const ivec sound = all_finite(q[now], v[now], internal[now]);
     int any = 0;
     for (int k = 0; k < LANES; k++) {
       Walker *w = lane[k];

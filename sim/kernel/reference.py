@@ -63,7 +63,7 @@ class ReferenceKernel:
             for _ in range(coding.substeps):
                 step.advance()
                 sums += step.integrands
-            status = _status_of(step.q, step.v, setup)
+            status = _status_of(step, setup)
             if status is not Status.OK:
                 break
         return WalkResult(status, sums, step.q.copy(), _padded(rows, setup.ticks) if log else None)
@@ -142,8 +142,9 @@ def _control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: _Pa
     return pwm
 
 
-def _status_of(q: Floats, v: Floats, setup: WalkSetup) -> Status:
-    if not (np.isfinite(q).all() and np.isfinite(v).all()):
+def _status_of(state: Stepper, setup: WalkSetup) -> Status:
+    q = state.q
+    if not all(np.isfinite(array).all() for array in (q, state.v, state.internal_state)):
         return Status.DIVERGED
     upright = 1.0 - 2.0 * (q[3] * q[3] + q[4] * q[4])
     if q[2] < setup.fall_height or upright < setup.fall_cosine:

@@ -13,10 +13,10 @@ from sim.compiler.compilation import Target, target
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import NativeKernel, _identity, _source_of, native_kernel
 from sim.kernel.observation import walk_log
-from sim.kernel.reference import reference_kernel
+from sim.kernel.reference import ReferenceKernel, reference_kernel
 from sim.kernel.walk import Coding, Kernel, WalkSetup
 from sim.outcome import Status
-from sim.robot import Robot, load_robot
+from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import PHYSICS_RATE, course_of, lanes, simulate
 
@@ -104,13 +104,10 @@ def test_one_walkers_divergence_and_fall_touch_no_neighbour(robot: Robot) -> Non
     kernel = native_kernel(robot)
     assert kernel is not None
     good = _setup(robot, kernel, SHORT)
-    layout = kernel.layout
     explosive = good.parameters.copy()
-    explosive[layout.slices["stiffness"]] = 1e12
-    falling = good.parameters.copy()
-    falling[layout.slices["stiffness"]] = falling[layout.slices["damping"]] = 0.0
+    explosive[kernel.layout.slices["stiffness"]] = 1e12
     bad = dataclasses.replace(good, parameters=explosive)
-    low = dataclasses.replace(good, parameters=falling)
+    low = _falling(good, kernel)
     ((status, expected),) = _sums(kernel, [good], robot)
     assert status is Status.OK
     mixed = _sums(kernel, [bad, good, low, good], robot)
@@ -118,14 +115,57 @@ def test_one_walkers_divergence_and_fall_touch_no_neighbour(robot: Robot) -> Non
     assert mixed[1][1] == mixed[3][1] == expected
 
 
+def _falling(setup: WalkSetup, kernel: NativeKernel | ReferenceKernel) -> WalkSetup:
+    """The same walk over ground that carries nothing."""
+    parameters = setup.parameters.copy()
+    for name in ("stiffness", "damping"):
+        parameters[kernel.layout.slices[name]] = 0.0
+    return dataclasses.replace(setup, parameters=parameters)
+
+
+def test_a_fallen_walkers_log_is_the_same_alone_and_in_company(robot: Robot) -> None:
+    kernel, reference = native_kernel(robot), reference_kernel(robot)
+    assert kernel is not None
+    good = _setup(robot, kernel, SHORT)
+    falling = _falling(good, kernel)
+    coding = Coding.of(robot, 10)
+    (alone,) = kernel.walk([falling], coding, log=True)
+    company = kernel.walk([good, falling, good], coding, log=True)
+    (readable,) = reference.walk([falling], coding, log=True)
+    assert [result.status for result in company] == [Status.OK, Status.FELL, Status.OK]
+    assert alone.states is not None and company[1].states is not None
+    assert readable.states is not None
+    assert company[1].states.tobytes() == alone.states.tobytes()
+    rows = np.isfinite(alone.states).all(axis=1)
+    fell_at = int(rows.sum())
+    assert 0 < fell_at < falling.ticks
+    assert rows[:fell_at].all()
+    assert np.isnan(alone.states[fell_at:]).all()
+    np.testing.assert_array_equal(np.isnan(readable.states), np.isnan(alone.states))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["native", "reference"])
+def test_a_walk_whose_internal_state_is_undefined_has_diverged(kind: str) -> None:
+    machine = load_robot(RobotVariant(backlash=(2.5, 1.0, 1.0)))
+    kernel = native_kernel(machine) if kind == "native" else reference_kernel(machine)
+    assert kernel is not None
+    setup = _setup(machine, kernel, SHORT)
+    brief = dataclasses.replace(setup, desired=setup.desired[:3])
+    undefined = brief.internal_state.copy()
+    # The angle of a motor: comparisons of the play hide it from the links.
+    undefined[0] = np.nan
+    lost = dataclasses.replace(brief, internal_state=undefined)
+    results = kernel.walk([brief, lost], Coding.of(machine, 40), log=True)
+    assert [result.status for result in results] == [Status.OK, Status.DIVERGED]
+    assert np.isfinite(results[1].end).all()
+
+
 def test_what_a_lane_does_after_its_walk_has_ended_does_not_count(robot: Robot) -> None:
     kernel = native_kernel(robot)
     assert kernel is not None
     long = _setup(robot, kernel, SHORT)
-    bottomless = long.parameters.copy()
-    for name in ("stiffness", "damping"):
-        bottomless[kernel.layout.slices[name]] = 0.0
-    falling = dataclasses.replace(long, parameters=bottomless)
+    falling = _falling(long, kernel)
     brief = dataclasses.replace(falling, desired=falling.desired[:5])
     alone = _sums(kernel, [brief], robot)
     assert alone[0][0] is Status.OK

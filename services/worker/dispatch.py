@@ -18,21 +18,28 @@ from sim.outcome import Outcome
 _GLANCE: Final = 0.1
 """Seconds between looks at `should_stop`."""
 
+_NO_STATUS: Final = 255
+"""In place of a status that has not come yet; no `Status` has this value."""
+
 
 @dataclass(slots=True, eq=False)
 class Batch:
-    """One request under way. missing: number of its chunks that have no result yet."""
+    """One request under way. missing: its chunks that have no result yet."""
 
     request: EvaluationRequest
     outcomes: tuple[Outcome, ...]
-    missing: int
+    missing: set[Chunk]
     error: BaseException | None = None
     dropped: bool = False
 
     @property
     def ended(self) -> bool:
         """Nothing more needs to be run."""
-        return self.missing == 0 or self.error is not None or self.dropped
+        return not self.missing or self.error is not None or self.dropped
+
+    def awaits(self, chunk: Chunk) -> bool:
+        """Whether a result of this chunk is still of use."""
+        return not self.ended and chunk in self.missing
 
 
 @dataclass(slots=True, eq=False)
@@ -78,10 +85,13 @@ class Dispatcher:
         count = len(request.designs)
         chunks = cut(durations, count, slots=self.slots, lanes=self.lanes())
         blank = tuple(
-            Outcome(np.full((count, len(case.objectives)), np.nan), np.zeros(count, dtype=np.uint8))
+            Outcome(
+                np.full((count, len(case.objectives)), np.nan),
+                np.full(count, _NO_STATUS, dtype=np.uint8),
+            )
             for case in request.cases
         )
-        batch = Batch(request, blank, missing=len(chunks))
+        batch = Batch(request, blank, missing=set(chunks))
         with self._changed:
             self._refuse_if_closed()
             for chunk in chunks:
@@ -100,29 +110,31 @@ class Dispatcher:
         """The chunk has its result; a second one of the same chunk is the same and ignored."""
         chunk, batch = work.chunk, work.batch
         with self._changed:
-            if batch.ended:
+            if not batch.awaits(chunk):
                 return
             into = batch.outcomes[chunk.case]
+            wanted = (chunk.stop - chunk.start, into.objectives.shape[1])
+            if outcome.objectives.shape != wanted:
+                self._end(batch, _misshapen(outcome, wanted))
+                return
             into.objectives[chunk.start : chunk.stop] = outcome.objectives
             into.statuses[chunk.start : chunk.stop] = outcome.statuses
-            batch.missing -= 1
+            batch.missing.remove(chunk)
             self._changed.notify_all()
 
     def again(self, work: Work) -> None:
         """The chunk was lost with its worker: it is to be run again."""
         with self._changed:
-            if not work.batch.ended:
+            if work.batch.awaits(work.chunk):
                 retry = Work(work.batch, work.chunk, work.attempts + 1)
                 self._queue.push(work.batch.request.job_id, work.chunk.cost, retry)
                 self._changed.notify_all()
 
     def fail(self, work: Work, error: BaseException) -> None:
-        """The chunk cannot be run: the whole request fails with this error."""
+        """The chunk cannot be run: the whole request fails with this error, if it needs it yet."""
         with self._changed:
-            if not work.batch.ended:
-                work.batch.error = error
-                self._queue.discard(lambda other: other.batch is work.batch)
-                self._changed.notify_all()
+            if work.batch.awaits(work.chunk):
+                self._end(work.batch, error)
 
     @property
     def closed(self) -> bool:
@@ -140,7 +152,7 @@ class Dispatcher:
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: batch.ended or self.closed, _GLANCE)
-                if batch.missing == 0:
+                if not batch.missing:
                     return
                 if batch.error is not None:
                     raise batch.error
@@ -148,6 +160,12 @@ class Dispatcher:
             if should_stop():
                 self._drop(batch)
                 raise EvaluationStopped
+
+    def _end(self, batch: Batch, error: BaseException) -> None:
+        """With this error; the caller holds the lock."""
+        batch.error = error
+        self._queue.discard(lambda work: work.batch is batch)
+        self._changed.notify_all()
 
     def _drop(self, batch: Batch) -> None:
         with self._changed:
@@ -157,3 +175,10 @@ class Dispatcher:
     def _refuse_if_closed(self) -> None:
         if self._closed is not None:
             raise EvaluatorUnavailable(self._closed)
+
+
+def _misshapen(outcome: Outcome, wanted: tuple[int, int]) -> RuntimeError:
+    return RuntimeError(
+        f"a worker sent objectives of shape {outcome.objectives.shape} for a chunk of {wanted};"
+        " it runs other code than this process"
+    )

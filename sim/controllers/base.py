@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sim.controllers.fixed_point import FRACTION_BITS, descale
 from sim.controllers.mamdani import Mamdani
 from sim.controllers.quantisation import Axis
+from sim.errors import SimulationInputError
 from sim.variables import Variable
 
 Ints = NDArray[np.int64]
@@ -33,6 +34,12 @@ class LookupTable:
     error_gain: int
     current_gain: int
     velocity_gain: int = 0
+
+    def __post_init__(self) -> None:
+        if self.values.ndim != 3 or not self.values.size:
+            raise SimulationInputError(
+                f"values: a table of shape {self.values.shape}; it needs three axes, none empty"
+            )
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
         """Output (J,) with the fraction bits of `output_gain`; inputs (J,) in coded counts."""

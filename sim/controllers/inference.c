@@ -7,7 +7,7 @@ enum { BLOCK = 4, MAX_SETS = 32 };
 #define UNROLLED _Pragma("GCC unroll 4")
 
 /* The grid is n_outer x n_inner cells, n_inner a multiple of BLOCK * LANES. By rule: outer and
-   inner degrees, weight, consequent; memberships: n_sets x n_points. A set that fires nowhere in a
+   inner degrees, weight, consequent; memberships: n_sets x n_points, MAX_SETS at most. A set that fires nowhere in a
    block of cells is skipped, as most are. */
 void gaitswarm_infer(int64_t n_outer, int64_t n_inner, int64_t n_rules, int64_t n_sets,
                      int64_t n_points, const double *outer, const double *inner,
@@ -66,3 +66,6 @@ void gaitswarm_infer(int64_t n_outer, int64_t n_inner, int64_t n_rules, int64_t 
     }
   }
 }
+
+int64_t gaitswarm_block(void) { return BLOCK * LANES; }
+int64_t gaitswarm_max_sets(void) { return MAX_SETS; }

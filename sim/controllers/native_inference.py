@@ -10,17 +10,19 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiler.compilation import load_library, target, vector_header
+from sim.compiler.compilation import load_library, vector_header
 from sim.controllers.mamdani import Mamdani, output_points
-
-_VECTORS_IN_A_BLOCK = 4
 
 
 def infer(system: Mamdani, grid: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Same arguments and same bits as `Mamdani.infer`, for systems of two inputs or more."""
     *firsts, inner = system.degrees(grid)
     library = _library()
-    if library is None or inner.shape[1] % (_VECTORS_IN_A_BLOCK * target().lanes):
+    if (
+        library is None
+        or inner.shape[1] % library.gaitswarm_block()
+        or len(system.outputs) > library.gaitswarm_max_sets()
+    ):
         return system.infer(grid)
     outer = reduce(_both_hold, firsts)
     arrays = (

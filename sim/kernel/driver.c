@@ -221,5 +221,8 @@ void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding)
 }
 
 int64_t gaitswarm_lanes(void) { return LANES; }
+int64_t gaitswarm_joints(void) { return NJ; }
 int64_t gaitswarm_internal_state_size(void) { return NI; }
+int64_t gaitswarm_parameters(void) { return NP; }
+int64_t gaitswarm_integrands(void) { return N_INTEGRANDS; }
 int64_t gaitswarm_log_width(void) { return NLOG; }

@@ -24,7 +24,6 @@ from sim.robot import Robot
 
 Floats = NDArray[np.float64]
 
-_N_INTEGRANDS: Final = 5
 _GENERATOR: Final = (
     "articulated_body.py",
     "backlash.py",
@@ -127,9 +126,11 @@ class NativeKernel:
     def __init__(self, robot: Robot, library: ctypes.CDLL) -> None:
         self._library = library
         self.layout = Layout(robot)
-        self._n_q = 7 + robot.n_joints
         self.lanes = int(library.gaitswarm_lanes())
         self.internal_state_size = int(library.gaitswarm_internal_state_size())
+        self._joints = int(library.gaitswarm_joints())
+        self._parameters = int(library.gaitswarm_parameters())
+        self._integrands = int(library.gaitswarm_integrands())
         self._log_width = int(library.gaitswarm_log_width())
         exported = np.array((ctypes.c_double * 14).in_dll(library, "gaitswarm_body"))
         self.total_mass = float(exported[13])
@@ -145,8 +146,14 @@ class NativeKernel:
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
     ) -> tuple[WalkResult, ...]:
         """See `walk.Kernel.walk`."""
+        for setup in setups:
+            setup.check(
+                joints=self._joints,
+                internal_state=self.internal_state_size,
+                parameters=self._parameters,
+            )
         n = len(setups)
-        sums, end = np.empty((n, _N_INTEGRANDS)), np.empty((n, self._n_q))
+        sums, end = np.empty((n, self._integrands)), np.empty((n, 7 + self._joints))
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
         walkers = (_Walker * n)()
         addresses = _Addresses()

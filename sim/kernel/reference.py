@@ -43,6 +43,12 @@ class ReferenceKernel:
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
     ) -> tuple[WalkResult, ...]:
         """See `walk.Kernel.walk`."""
+        for setup in setups:
+            setup.check(
+                joints=self._model.step.numel_in(3),
+                internal_state=self.internal_state_size,
+                parameters=self.layout.size,
+            )
         return tuple(self._walk(setup, coding, log=log) for setup in setups)
 
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.base import ControlLaw
+from sim.errors import SimulationInputError
 from sim.kernel.parameters import BodyInertia
 from sim.outcome import Status
 from sim.robot import Robot
@@ -32,6 +33,11 @@ class Coding:
     pwm_step: int
     pwm_counts: int
     substeps: int
+
+    def __post_init__(self) -> None:
+        for name in ("angle_step", "current_step", "pwm_step", "pwm_counts", "substeps"):
+            if getattr(self, name) < 1:
+                raise SimulationInputError(f"{name}: {getattr(self, name)} is less than 1")
 
     @classmethod
     def of(cls, robot: Robot, substeps: int) -> Coding:
@@ -72,6 +78,32 @@ class WalkSetup:
     def ticks(self) -> int:
         """T."""
         return len(self.desired)
+
+    def check(self, *, joints: int, internal_state: int, parameters: int) -> None:
+        """Refuse arrays that a kernel of these sizes would read beyond their ends.
+
+        Args:
+            joints: J, the robot's driven joints.
+            internal_state: X, numbers that a walk carries beside q and v.
+            parameters: P, length of the parameter vector.
+
+        Raises:
+            SimulationInputError: An array has another shape; the message names it.
+        """
+        ticks = max(self.ticks, 1)
+        wanted: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
+            "start": (self.start, (7 + joints,)),
+            "internal_state": (self.internal_state, (internal_state,)),
+            "parameters": (self.parameters, (parameters,)),
+            "desired": (self.desired, (ticks, joints)),
+        }
+        if self.disturbance is not None:
+            wanted["disturbance"] = (self.disturbance, (ticks, joints))
+        for name, (array, shape) in wanted.items():
+            if array.shape != shape:
+                raise SimulationInputError(
+                    f"{name}: an array of shape {array.shape}; this kernel and walk need {shape}"
+                )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,4 +147,4 @@ class Kernel(Protocol):
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
     ) -> tuple[WalkResult, ...]:
-        """All walks, in order."""
+        """All walks, in order. Raises SimulationInputError for a setup of other sizes."""

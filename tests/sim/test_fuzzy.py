@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sim.controllers import CONTROLLERS
 from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
 from sim.controllers.fuzzy_pi_3 import integral_system
-from sim.controllers.mamdani import FuzzySet, Shape, output_points
+from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape, output_points
 from sim.controllers.native_inference import infer
 from sim.controllers.quantisation import Axis, quantised, table_bytes
 
@@ -82,6 +82,16 @@ def test_where_no_rule_fires_the_output_is_the_middle_of_its_range() -> None:
 def test_compiled_inference_has_the_same_bits(shape: Shape) -> None:
     grid = {"error": ERROR.grid(), "current": CURRENT.grid()}
     system = inference_system(0.187, 0.961, 0.789, 0.927, shape)
+    np.testing.assert_array_equal(infer(system, grid), system.infer(grid))
+
+
+def test_a_system_of_more_sets_than_the_compiled_inference_holds_is_inferred_all_the_same() -> None:
+    peaks = np.linspace(-1.0, 1.0, 100)
+    outputs = {f"{k}": FuzzySet(float(peak), 0.1) for k, peak in enumerate(peaks)}
+    inputs = {name: {"near": FuzzySet(0.0, 1.0)} for name in ("error", "current")}
+    rules = [Rule({"error": "near", "current": "near"}, name, 1.0) for name in outputs]
+    system = Mamdani(inputs, outputs, rules)
+    grid = {name: Axis(8, centred=True).grid() for name in inputs}
     np.testing.assert_array_equal(infer(system, grid), system.infer(grid))
 
 

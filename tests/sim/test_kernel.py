@@ -11,6 +11,7 @@ import pytest
 from sim.compiler import compilation
 from sim.compiler.compilation import Target, target
 from sim.controllers import CONTROLLERS
+from sim.controllers.base import LookupTable
 from sim.kernel.native import NativeKernel, _identity, _source_of, native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import ReferenceKernel, reference_kernel
@@ -22,6 +23,7 @@ from sim.simulate import PHYSICS_RATE, course_of, lanes, simulate
 
 FUZZY = CONTROLLERS["fuzzy-pi"]
 OPTIMUM = FUZZY.published["A"]
+BACKLASH = RobotVariant(backlash=(2.5, 1.0, 1.0))
 SHORT = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.4})
 
 
@@ -147,7 +149,7 @@ def test_a_fallen_walkers_log_is_the_same_alone_and_in_company(robot: Robot) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["native", "reference"])
 def test_a_walk_whose_internal_state_is_undefined_has_diverged(kind: str) -> None:
-    machine = load_robot(RobotVariant(backlash=(2.5, 1.0, 1.0)))
+    machine = load_robot(BACKLASH)
     kernel = native_kernel(machine) if kind == "native" else reference_kernel(machine)
     assert kernel is not None
     setup = _setup(machine, kernel, SHORT)
@@ -171,6 +173,40 @@ def test_what_a_lane_does_after_its_walk_has_ended_does_not_count(robot: Robot) 
     assert alone[0][0] is Status.OK
     assert _sums(kernel, [falling], robot)[0][0] is Status.FELL
     assert _sums(kernel, [brief, long], robot)[0] == alone[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["native", "reference"])
+@pytest.mark.parametrize(
+    "name", ["start", "internal_state", "parameters", "desired", "disturbance"]
+)
+def test_an_array_of_another_shape_is_refused_by_name(kind: str, name: str) -> None:
+    machine = load_robot(BACKLASH)
+    kernel = native_kernel(machine) if kind == "native" else reference_kernel(machine)
+    assert kernel is not None
+    setup = _setup(machine, kernel, SHORT)
+    good = dataclasses.replace(setup, disturbance=np.zeros(setup.desired.shape))
+    right = getattr(good, name)
+    for wrong in (right[..., :-1], np.repeat(right, 2, axis=-1), right[:0], right[np.newaxis]):
+        bad = dataclasses.replace(good, **{name: wrong})
+        with pytest.raises(ValueError, match=rf"^{name}: .*shape"):
+            kernel.walk([good, bad], Coding.of(machine, 40), log=True)
+
+
+@pytest.mark.parametrize("shape", [(4, 0, 1), (4, 4)], ids=str)
+def test_a_table_that_a_kernel_cannot_look_up_is_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"^values: .*three axes"):
+        LookupTable(np.zeros(shape, dtype=np.int8), output_gain=1, error_gain=1, current_gain=1)
+
+
+@pytest.mark.parametrize(
+    "name", ["angle_step", "current_step", "pwm_step", "pwm_counts", "substeps"]
+)
+def test_a_resolution_that_the_kernel_would_divide_by_is_one_at_least(
+    robot: Robot, name: str
+) -> None:
+    with pytest.raises(ValueError, match=f"^{name}: 0 "):
+        dataclasses.replace(Coding.of(robot, 10), **{name: 0})
 
 
 def test_walks_of_different_length_share_a_group(robot: Robot) -> None:

@@ -21,7 +21,7 @@ class Clock:
     def __init__(self) -> None:
         self.now = datetime(2030, 1, 2, 3, 4, 5, 678901, tzinfo=UTC)
 
-    def __call__(self) -> datetime:
+    def __call__(self, _transaction: object) -> datetime:
         return self.now
 
     def advance(self, seconds: float) -> None:

@@ -250,3 +250,16 @@ def test_an_exception_rolls_back_and_keeps_its_type(database_url: str) -> None:
         found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
     assert found == head()
     database.close()
+
+
+def test_what_a_reading_transaction_sees_of_others_depends_on_the_database(
+    database_url: str, store: SqlStore
+) -> None:
+    database = connect(parse_url(database_url))
+    count = text("SELECT count(*) FROM jobs")
+    with database.transaction(write=False) as connection:
+        assert connection.execute(count).scalar_one() == 0
+        store.create_job(spec())
+        seen = connection.execute(count).scalar_one()
+    assert seen == (0 if database.engine.dialect.name == "sqlite" else 1)
+    database.close()

@@ -5,13 +5,24 @@ from __future__ import annotations
 import json
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from sqlalchemy import URL, Connection, Engine, NullPool, create_engine, event, make_url
+from sqlalchemy import (
+    URL,
+    Connection,
+    Engine,
+    NullPool,
+    create_engine,
+    event,
+    func,
+    make_url,
+    select,
+)
 from sqlalchemy.exc import ArgumentError, DatabaseError, InterfaceError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
@@ -21,6 +32,29 @@ BUSY_SECONDS: Final = 15.0
 """How long a transaction waits for another's lock before the store counts as unavailable."""
 
 _WRITE: Final = "gaitswarm_write"
+
+Clock = Callable[[Connection], datetime]
+"""Tells the time inside a transaction, aware."""
+
+
+def database_time(connection: Connection) -> datetime:
+    """The time now by the one clock that all users of a database share.
+
+    A lease is written by one process and judged by another, whose own clock may be hours off.
+
+    Args:
+        connection: An open transaction. A time read after a lock was waited for is later than one
+            read before: PostgreSQL's CURRENT_TIMESTAMP would stand still from its beginning.
+
+    Returns:
+        The time, aware.
+    """
+    if connection.dialect.name == "postgresql":
+        now: datetime = connection.execute(select(func.clock_timestamp())).scalar_one()
+        return now
+    # SQLite is a part of this process and has the machine's clock, like all other processes that
+    # can open the file; its own functions would tell only milliseconds of it.
+    return datetime.now(UTC)
 
 
 def parse_url(text: str) -> URL:
@@ -61,8 +95,16 @@ class Database:
     def transaction(self, *, write: bool) -> Iterator[Connection]:
         """Commit at the end, roll back on any exception.
 
-        write: false for a snapshot to read from; it never waits for a writer on SQLite.
-        Raises StoreUnavailable if the database is unreachable, or locked for `BUSY_SECONDS`.
+        Args:
+            write: Whether anything will be written. On SQLite a transaction that only reads never
+                waits for a writer, and sees one state of the database throughout; on PostgreSQL
+                (READ COMMITTED) each of its statements sees what is committed when it begins.
+
+        Yields:
+            A connection inside the transaction.
+
+        Raises:
+            StoreUnavailable: The database is unreachable, or locked for `BUSY_SECONDS`.
         """
         try:
             with self.engine.connect() as connection:

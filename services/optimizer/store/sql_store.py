@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from datetime import UTC, datetime, timedelta
+from collections.abc import Sequence
+from datetime import timedelta
 from typing import Final
 
 from sqlalchemy import select, tuple_
@@ -27,7 +27,7 @@ from services.optimizer.jobs.job import (
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.base import Page
 from services.optimizer.store.columns import select_columns
-from services.optimizer.store.engine import Database, connect, parse_url
+from services.optimizer.store.engine import Clock, Database, connect, database_time, parse_url
 from services.optimizer.store.job_list import cursor_of, from_cursor, job_rows, sort_jobs, to_cursor
 from services.optimizer.store.migrate import check_revision, migrate
 from services.optimizer.store.recordings import (
@@ -61,22 +61,29 @@ _LARGEST_PAGE: Final = 10_000
 _LONGEST_KEY: Final = 200
 
 
-def open_store(url: str, *, clock: Callable[[], datetime] | None = None) -> SqlStore:
+def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
     """Open a database, creating an SQLite file, and migrate it to the newest schema.
 
-    url: `sqlite:///path`, a bare path, or `postgresql://user:password@host/database`.
-    clock: aware current time; the system's by default.
-    Raises StoreUnavailable that names the database and says what to do.
+    Args:
+        url: `sqlite:///path`, a bare path, or `postgresql://user:password@host/database`.
+        clock: Tells the time of all that is stored, leases included. Only tests need another than
+            the database's own, which all processes share.
+
+    Returns:
+        The store; whoever opened it closes it.
+
+    Raises:
+        StoreUnavailable: The database cannot be used; names it and says what to do.
     """
     parsed = parse_url(url)
     migrate(parsed)
-    return SqlStore(connect(parsed), clock=clock or _system_clock)
+    return SqlStore(connect(parsed), clock=clock)
 
 
 class SqlStore:
     """`Store` on a database that has the newest schema. See `open_store`."""
 
-    def __init__(self, database: Database, *, clock: Callable[[], datetime]) -> None:
+    def __init__(self, database: Database, *, clock: Clock = database_time) -> None:
         self._database = database
         self._clock = clock
 
@@ -90,7 +97,8 @@ class SqlStore:
             with self._database.transaction(write=True) as connection:
                 earlier = job_of_key(connection, idempotency_key)
                 if earlier is None:
-                    return insert_job(connection, resolved, idempotency_key, self._clock()), True
+                    now = self._clock(connection)
+                    return insert_job(connection, resolved, idempotency_key, now), True
         except IntegrityError:
             # Another process has inserted the same key between our look and our insertion.
             with self._database.transaction(write=False) as connection:
@@ -149,8 +157,8 @@ class SqlStore:
     def command(self, job_id: str, command: Command) -> Job:
         """See `Store.command`."""
         with self._database.transaction(write=True) as connection:
-            now = self._clock()
             row = job_row(connection, job_id, lock=True)
+            now = self._clock(connection)
             state = commanded(JobState(row["state"]), command)
             if state is JobState.PAUSING and not lease_is_live(row, now):
                 # Its runner has gone, so nobody would ever complete the pause.
@@ -167,7 +175,7 @@ class SqlStore:
             state = JobState(row["state"])
             after = extended(state, row["iterations"], iterations)
             # Whoever runs the job notices when it commits; until then nothing changes for it.
-            changes = entering(after, self._clock()) if after is not state else {}
+            changes = entering(after, self._clock(connection)) if after is not state else {}
             return to_job(update_job(connection, row, changes | {"budget": iterations}))
 
     # recorded walks
@@ -176,7 +184,7 @@ class SqlStore:
         """See `Store.add_recording`."""
         try:
             with self._database.transaction(write=True) as connection:
-                return insert_recording(connection, walk, self._clock())
+                return insert_recording(connection, walk, self._clock(connection))
         except IntegrityError:
             # Another process has stored the same walk between our look and our insertion.
             return recording_id(walk)
@@ -193,11 +201,12 @@ class SqlStore:
     ) -> Claim | None:
         """See `Store.claim`."""
         with self._database.transaction(write=True) as connection:
-            now = self._clock()
             if job_id is not None:
                 job_row(connection, job_id)
-            query = claimable(now, job_id)
+            query = claimable(self._clock(connection), job_id)
             while (row := connection.execute(query).mappings().first()) is not None:
+                # Once more: a certain job may have been waited for.
+                now = self._clock(connection)
                 if row["state"] == JobState.PAUSING:
                     update_job(connection, row, entering(JobState.PAUSED, now))
                     continue
@@ -219,7 +228,7 @@ class SqlStore:
         """See `Store.renew`."""
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
-            expires = self._clock() + timedelta(seconds=lease_seconds)
+            expires = self._clock(connection) + timedelta(seconds=lease_seconds)
             update_job(connection, row, {"lease_expires_at": expires})
             return JobState(row["state"])
 
@@ -228,13 +237,14 @@ class SqlStore:
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             if outstanding_ask(connection, row) is None:
-                insert_ask(connection, row, ask, expected=row["iterations"], now=self._clock())
+                now = self._clock(connection)
+                insert_ask(connection, row, ask, expected=row["iterations"], now=now)
 
     def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
         """See `Store.commit`."""
         with self._database.transaction(write=True) as connection:
-            now = self._clock()
             row = held(connection, claim)
+            now = self._clock(connection)
             if done.iteration < row["iterations"]:
                 return JobState(row["state"])
             if budget(row) != claim.job.spec.iterations:
@@ -255,7 +265,8 @@ class SqlStore:
             after = state_after_release(JobState(row["state"]), state)
             # PostgreSQL cannot hold a zero byte, wherever an error's text has got it from.
             text = error.replace("\0", "") if error is not None else row["error"]
-            update_job(connection, row, entering(after, self._clock()) | {"error": text})
+            changes = entering(after, self._clock(connection)) | {"error": text}
+            update_job(connection, row, changes)
 
     # history
 
@@ -327,10 +338,6 @@ class SqlStore:
     def close(self) -> None:
         """See `Store.close`."""
         self._database.close()
-
-
-def _system_clock() -> datetime:
-    return datetime.now(UTC)
 
 
 def _checked_limit(limit: int) -> int:

@@ -1,16 +1,15 @@
-"""Evaluations of a job as one flat table, in CSV or Parquet, written as it is read.
+"""Results as tables: by column as numpy arrays, and as files in CSV or Parquet.
 
-Columns: iteration, particle, fitness; `design.<variable>`; and for every scenario
-`<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`. What does not exist is null
-(empty in CSV); floats are exact to the bit.
+A table of evaluations has the columns iteration, particle, fitness; `design.<variable>`; and for
+every case `<case>.status`, `<case>.utility` and `<case>.<objective>`. What does not exist is NaN in
+an array, null in Arrow, Parquet and pandas, and empty in CSV; floats are exact to the bit.
 """
 
 from __future__ import annotations
 
-import csv
 import io
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Final, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from services.optimizer.jobs.spec import Spec
 from sim.outcome import Status
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
 
 TableFormat = Literal["csv", "parquet"]
@@ -29,61 +29,257 @@ MEDIA_TYPES: Final[dict[TableFormat, str]] = {
     "parquet": "application/vnd.apache.parquet",
 }
 
+Floats = NDArray[np.float64]
+Column = NDArray[Any]
+
+
+class Table:
+    """Columns of equal length, by name; as a data frame has them, `len` counts the rows.
+
+    Polars, DuckDB and other libraries that know the Arrow PyCapsule interface take a table as it
+    is: `polars.DataFrame(table)`.
+    """
+
+    def __init__(self, columns: Mapping[str, Column]) -> None:
+        """Make a table of arrays.
+
+        Args:
+            columns: One-dimensional arrays of one length r, by name: float64 (NaN where there is
+                no value), int64 or text. They are not copied.
+
+        Raises:
+            ValueError: The arrays differ in length.
+        """
+        lengths = {len(column) for column in columns.values()}
+        if len(lengths) > 1:
+            raise ValueError(f"columns of a table have one length, not {sorted(lengths)}")
+        self._columns = dict(columns)
+        self._length = lengths.pop() if lengths else 0
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of the columns, in order."""
+        return tuple(self._columns)
+
+    def __getitem__(self, name: str) -> Column:
+        """One column, (r,)."""
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self)} rows, {len(self._columns)} columns>"
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        return self.to_arrow().__arrow_c_stream__(requested_schema)
+
+    def to_arrow(self) -> pa.Table:
+        """The table as `pyarrow.Table`; NaN becomes null."""
+        # Loaded with the first table: arrow takes longer to import than a short one to write.
+        import pyarrow as pa
+
+        return pa.table({name: _arrow(column) for name, column in self._columns.items()})
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The table as `pandas.DataFrame`.
+
+        Raises:
+            ImportError: pandas is not installed; gaitswarm does not need it otherwise.
+        """
+        try:
+            return self.to_arrow().to_pandas()
+        except ImportError as error:
+            raise ImportError(
+                "to_pandas() needs pandas, which is not installed: `pip install pandas`, or use"
+                " to_arrow() or the columns as numpy arrays",
+                name="pandas",
+            ) from error
+
+
+class EvaluationTable(Table):
+    """Every evaluation of a job, one row each, in order of iteration and particle.
+
+    Attributes:
+        variables: Names of the v variables, searched and fixed, in the order of `designs`.
+        cases: Names of the K cases: scenarios, or recordings' short ids.
+        objective_names: Names of the m objectives of a case.
+    """
+
+    def __init__(self, columns: Mapping[str, Column], spec: Spec) -> None:
+        """Make a table of a job's evaluations.
+
+        Args:
+            columns: All columns that the module's docstring names, arrays of one length r.
+            spec: Spec of the job.
+        """
+        super().__init__(columns)
+        self.variables = spec.design_space().names
+        self.cases = spec.case_names
+        self.objective_names = tuple(objective.name for objective in spec.objectives)
+
+    @classmethod
+    def from_pieces(cls, spec: Spec, pieces: Iterable[EvaluationColumns]) -> Self:
+        """A table of evaluations as the service reads them.
+
+        Args:
+            spec: Spec of their job.
+            pieces: The evaluations by pieces, in order.
+        """
+        # Without any piece the columns are there all the same.
+        found = [_flat(spec, _no_rows(spec)), *(_flat(spec, piece) for piece in pieces)]
+        return cls({name: np.concatenate([f[name] for f in found]) for name in found[0]}, spec)
+
+    @classmethod
+    def from_parquet(cls, spec: Spec, content: bytes) -> Self:
+        """A table from the Parquet file that `encoded_table` writes.
+
+        Args:
+            spec: Spec of the job whose evaluations are in the file.
+            content: The whole file.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        table = pq.read_table(pa.BufferReader(content))
+        columns = {name: _numpy(table.column(name)) for name in table.column_names}
+        return cls(columns, spec)
+
+    @property
+    def iteration(self) -> NDArray[np.int64]:
+        """(r,) index of the iteration, from 0."""
+        return self["iteration"]
+
+    @property
+    def particle(self) -> NDArray[np.int64]:
+        """(r,) particle of the swarm, from 0."""
+        return self["particle"]
+
+    @property
+    def fitness(self) -> Floats:
+        """(r,) fitness, to be minimized; NaN where the design failed in any case."""
+        return self["fitness"]
+
+    @property
+    def designs(self) -> Floats:
+        """(r, v) values of the variables, in their units."""
+        return self._stacked([f"design.{name}" for name in self.variables])
+
+    @property
+    def objectives(self) -> Floats:
+        """(r, K, m) raw objectives, to be minimized, in their units; NaN where there is none."""
+        names = [f"{case}.{name}" for case in self.cases for name in self.objective_names]
+        return self._stacked(names).reshape(len(self), len(self.cases), len(self.objective_names))
+
+    @property
+    def utilities(self) -> Floats:
+        """(r, K) what each design is worth in each case, to be minimized; NaN where it failed."""
+        return self._stacked([f"{case}.utility" for case in self.cases])
+
+    @property
+    def statuses(self) -> NDArray[np.str_]:
+        """(r, K) how each case ended: `ok`, or in which way it failed."""
+        return np.stack([self[f"{case}.status"] for case in self.cases], axis=1)
+
+    def _stacked(self, names: list[str]) -> Floats:
+        return np.stack([self[name] for name in names], axis=1)
+
 
 def encoded_table(
     file_format: TableFormat, spec: Spec, pieces: Iterable[EvaluationColumns]
 ) -> Iterator[bytes]:
-    """The file in parts. pieces: evaluations of a job of this spec, in order."""
-    schema = _schema(spec)
-    batches = (_batch(schema, spec, piece) for piece in pieces)
-    return (_csv if file_format == "csv" else _parquet)(schema, batches)
+    """Evaluations of a job as a file, written as they are read.
 
+    Args:
+        file_format: csv or parquet.
+        spec: Spec of the job.
+        pieces: Its evaluations by pieces, in order.
 
-def _schema(spec: Spec) -> pa.Schema:
-    # Loaded with the first table: arrow takes longer to import than a short one to write.
+    Returns:
+        The file in parts: one for every piece, and its end.
+    """
     import pyarrow as pa
 
-    results = [("status", pa.string()), ("utility", pa.float64())]
-    results += [(objective.name, pa.float64()) for objective in spec.objectives]
-    return pa.schema(
-        [
-            ("iteration", pa.int64()),
-            ("particle", pa.int64()),
-            ("fitness", pa.float64()),
-            *((f"design.{name}", pa.float64()) for name in spec.design_space().names),
-            *((f"{case}.{result}", kind) for case in spec.case_names for result, kind in results),
-        ]
+    def batch(piece: EvaluationColumns) -> pa.RecordBatch:
+        arrays = [_arrow(column) for column in _flat(spec, piece).values()]
+        return pa.record_batch(arrays, schema=schema)
+
+    empty = {name: _arrow(column) for name, column in _flat(spec, _no_rows(spec)).items()}
+    schema = pa.schema([(name, array.type) for name, array in empty.items()])
+    return (_csv if file_format == "csv" else _parquet)(schema, map(batch, pieces))
+
+
+def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
+    """The columns of the module's docstring; NaN for what is not finite."""
+    columns: dict[str, Column] = {
+        "iteration": rows.iteration,
+        "particle": rows.particle,
+        "fitness": _finite(rows.fitness),
+    }
+    for name, design in zip(spec.design_space().names, rows.designs.T, strict=True):
+        columns[f"design.{name}"] = _finite(design)
+    utilities = spec.judge(rows.objectives, rows.failed).utilities
+    for k, case in enumerate(spec.case_names):
+        columns[f"{case}.status"] = _LABELS[rows.statuses[:, k]]
+        columns[f"{case}.utility"] = _finite(utilities[:, k])
+        for objective, values in zip(spec.objectives, rows.objectives[:, k].T, strict=True):
+            columns[f"{case}.{objective.name}"] = _finite(values)
+    return columns
+
+
+_LABELS: Final = np.array([status.label for status in sorted(Status)])
+"""Text of every status, at its number."""
+
+
+def _no_rows(spec: Spec) -> EvaluationColumns:
+    cases = len(spec.case_names)
+    return EvaluationColumns(
+        iteration=np.empty(0, dtype=np.int64),
+        particle=np.empty(0, dtype=np.int64),
+        designs=np.empty((0, len(spec.design_space().names))),
+        objectives=np.empty((0, cases, len(spec.objectives))),
+        statuses=np.empty((0, cases), dtype=np.uint8),
+        fitness=np.empty(0),
     )
 
 
-def _batch(schema: pa.Schema, spec: Spec, rows: EvaluationColumns) -> pa.RecordBatch:
+def _finite(column: Floats) -> Floats:
+    return np.where(np.isfinite(column), column, np.nan)
+
+
+def _arrow(column: Column) -> pa.Array:
     import pyarrow as pa
 
-    def numbers(column: NDArray[np.float64]) -> pa.Array:
-        values = np.ascontiguousarray(column)
-        return pa.array(values, mask=~np.isfinite(values))
+    if column.dtype.kind == "U":
+        return pa.array(column.tolist(), type=pa.string())
+    return pa.array(column, mask=np.isnan(column) if column.dtype.kind == "f" else None)
 
-    utilities = spec.judge(rows.objectives, rows.failed).utilities
-    labels = {status.value: status.label for status in Status}
-    arrays = [pa.array(rows.iteration), pa.array(rows.particle), numbers(rows.fitness)]
-    arrays += [numbers(column) for column in rows.designs.T]
-    for case in range(len(spec.case_names)):
-        arrays.append(pa.array([labels[status] for status in rows.statuses[:, case].tolist()]))
-        arrays.append(numbers(utilities[:, case]))
-        arrays += [numbers(column) for column in rows.objectives[:, case].T]
-    return pa.record_batch(arrays, schema=schema)
+
+def _numpy(column: pa.ChunkedArray) -> Column:
+    import pyarrow as pa
+
+    if pa.types.is_string(column.type):
+        return np.array(column.to_pylist(), dtype=_LABELS.dtype)
+    # Null becomes NaN.
+    return np.asarray(column.to_numpy())
 
 
 def _csv(schema: pa.Schema, batches: Iterable[pa.RecordBatch]) -> Iterator[bytes]:
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(schema.names)
-    for batch in batches:
-        writer.writerows(zip(*(column.to_pylist() for column in batch.columns), strict=True))
-        yield text.getvalue().encode()
-        text.seek(0)
-        text.truncate()
-    yield text.getvalue().encode()
+    import pyarrow.csv as pc
+
+    # Names of columns and statuses have no character that would need quotes.
+    options = pc.WriteOptions(quoting_style="none", quoting_header="none", eol="\r\n")
+    sink = _Sink()
+    with pc.CSVWriter(sink, schema, write_options=options) as writer:
+        for batch in batches:
+            writer.write_batch(batch)
+            yield sink.take()
+    yield sink.take()
 
 
 def _parquet(schema: pa.Schema, batches: Iterable[pa.RecordBatch]) -> Iterator[bytes]:

@@ -26,8 +26,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
-from gaitswarm.field_errors import field_error, field_errors
-from gaitswarm.views import FieldErrorView, ProblemView
+from gaitswarm.views import FieldErrorView, ProblemView, field_errors
 from services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,
@@ -136,7 +135,7 @@ async def _on_domain_error(request: Request, error: Exception) -> Response:
         message = detail.removeprefix(f"{error.field}: ")
         errors = [FieldErrorView(field=error.field, message=message)]
     elif isinstance(error, SimulationInputError):
-        errors = [field_error("", detail)]
+        errors = [FieldErrorView.from_message("", detail)]
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
         _log.error("%s %s: %s", request.method, request.url.path, detail)
         return problem(request.url.path, status, name, detail, headers=_RETRY)
@@ -171,15 +170,11 @@ def _in_the_words_of_the_request(
     found: Sequence[Mapping[str, Any]], body: Any
 ) -> list[FieldErrorView]:
     """Of a body by its own fields; of parameters by their names."""
-    in_body = [{**entry, "loc": entry["loc"][1:]} for entry in found if entry["loc"][0] == "body"]
+    in_body, in_parameters = (
+        [{**e, "loc": e["loc"][1:]} for e in found if (e["loc"][0] == "body") is of_body]
+        for of_body in (True, False)
+    )
     if in_body and not isinstance(body, dict):
         message = "send a JSON object as application/json; /docs has examples"
         return [FieldErrorView(field="body", message=message)]
-    parameters = [
-        field_error(
-            ".".join(map(str, entry["loc"][1:])), entry["msg"].removeprefix("Value error, ")
-        )
-        for entry in found
-        if entry["loc"][0] != "body"
-    ]
-    return parameters + field_errors(in_body, body)
+    return field_errors(in_parameters, {}) + field_errors(in_body, body)

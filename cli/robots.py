@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from pydantic import ValidationError
+
     from sim.robot import RobotFiles, RobotVariant
     from sim.scenario import Scenario
 
@@ -17,7 +19,6 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     """A robot's name, a variant as JSON, or a folder. Raises InvalidRequest."""
     from pydantic import TypeAdapter, ValidationError
 
-    from sim.former_names import as_written
     from sim.robot import RobotSource
     from sim.robot.robot import SHIPPED
 
@@ -31,13 +32,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     try:
         robot: str | RobotVariant | RobotFiles = TypeAdapter(RobotSource).validate_python(data)
     except ValidationError as error:
-        # A union tells what is wrong with each of its members: only the one meant is of interest.
-        kind = "RobotFiles" if _is_files(data) else "RobotVariant"
-        chosen = [e for e in error.errors(include_url=False) if kind in str(e["loc"][0])]
-        first = (chosen or error.errors(include_url=False))[0]
-        within = as_written(data, first["loc"][1:]) if chosen and not isinstance(data, str) else ()
-        where = ".".join(str(part) for part in ("robot", *within))
-        raise InvalidRequest(first["msg"].removeprefix("Value error, "), field=where) from error
+        raise _refusal(error, data, "robot") from error
     return robot
 
 
@@ -63,10 +58,6 @@ def robot_data(text: str | None) -> str | dict[str, Any]:
         raise InvalidRequest(f"{folder} is not a robot's folder: {error}", field="robot") from error
 
 
-def _is_files(data: str | dict[str, Any]) -> bool:
-    return isinstance(data, dict) and ("toml" in data or "urdf" in data)
-
-
 def scenario_data(text: str) -> list[str | dict[str, Any]]:
     """What a spec would hold under `scenarios`: names and numbers, and the contents of files.
 
@@ -82,19 +73,30 @@ def scenario_data(text: str) -> list[str | dict[str, Any]]:
 
 def chosen_scenarios(text: str) -> tuple[Scenario, ...]:
     """The scenarios of `scenario_data`. Raises SimulationInputError, InvalidRequest."""
+    from sim.scenario import find_scenario
+
+    return tuple(
+        find_scenario(entry) if isinstance(entry, str) else _own_scenario(entry)
+        for entry in scenario_data(text)
+    )
+
+
+def _own_scenario(data: dict[str, Any]) -> Scenario:
     from pydantic import ValidationError
 
-    from sim.scenario import Scenario, find_scenario
+    from sim.scenario import Scenario
 
     try:
-        return tuple(
-            find_scenario(entry) if isinstance(entry, str) else Scenario.model_validate(entry)
-            for entry in scenario_data(text)
-        )
+        return Scenario.model_validate(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in ("scenario", *first["loc"]))
-        raise InvalidRequest(first["msg"], field=where) from error
+        raise _refusal(error, data, "scenario") from error
+
+
+def _refusal(error: ValidationError, data: Any, option: str) -> InvalidRequest:
+    from gaitswarm.views import field_errors
+
+    first = field_errors(error.errors(include_url=False), data, prefix=option)[0]
+    return InvalidRequest(first.message, field=first.field)
 
 
 def _scenario_entry(entry: str) -> str | dict[str, Any]:

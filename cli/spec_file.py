@@ -106,7 +106,7 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
 
 def invalid_request(error: ValidationError, data: Mapping[str, Any]) -> InvalidRequest:
     """What pydantic found wrong, in the words of the input: paths as in the file."""
-    from gaitswarm.field_errors import field_errors
+    from gaitswarm.views import field_errors
 
     first, *others = field_errors(error.errors(include_url=False), data)
     more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)

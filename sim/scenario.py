@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, model_validator
 
 from sim import former_names
+from sim.choice import NAME, OWN, alternatives
 from sim.errors import SimulationInputError
 from sim.former_names import current_names
 from sim.variables import Variable
@@ -165,3 +166,16 @@ def find_scenario(name: str) -> Scenario:
             return scenario
     known = ", ".join(f"{k} {s.name}" for k, s in enumerate(SCENARIOS, start=1))
     raise SimulationInputError(f"unknown scenario {name!r}; known are {known}")
+
+
+def _preset_exists(name: str) -> str:
+    find_scenario(name)
+    return name
+
+
+ScenarioChoice = Annotated[
+    Annotated[ScenarioName, AfterValidator(_preset_exists), Tag(NAME)]
+    | Annotated[Scenario, Tag(OWN)],
+    alternatives("must be the name or number of a preset, or an object: a scenario of your own"),
+]
+"""How jobs and requests choose a walk."""

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, Tag, model_validator
+
+from sim.choice import NAME, OWN, alternatives
 
 VariableName = Annotated[
     str,
@@ -47,3 +49,10 @@ class Variable(BaseModel):
         if self.kind == "integer" and not (self.low.is_integer() and self.high.is_integer()):
             raise ValueError(f"bounds of the integer variable {self.name} must be integers")
         return self
+
+
+VariableChoice = Annotated[
+    Annotated[VariableName, Tag(NAME)] | Annotated[Variable, Tag(OWN)],
+    alternatives("must be a variable's name, or an object: a variable with bounds of your own"),
+]
+"""How jobs choose what is searched."""

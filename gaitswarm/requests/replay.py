@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from gaitswarm.requests.walk import WalkRequest, resolved
 from gaitswarm.views.replay import encoded_replay
 from sim.outcome import Status
 from sim.replay import CONTROL_RATE, replay
 from sim.robot import load_robot
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, ScenarioName
+from sim.scenario import GAIT_VARIABLE_NAMES, ScenarioChoice
 from sim.simulate import simulate, with_gait
 
 
 class ReplayRequest(WalkRequest):
     """One design and the walk in which to look at it."""
 
-    scenario: ScenarioName | Scenario = Field(
+    scenario: ScenarioChoice = Field(
         default="normal-fast",
         description="Name or number of a preset (see /v1/scenarios), or your own.",
         examples=["normal-fast"],
@@ -28,12 +28,6 @@ class ReplayRequest(WalkRequest):
         le=CONTROL_RATE,
         description="Frames a second; each is the nearest tick of 2 ms, whose time is exact [Hz].",
     )
-
-    @field_validator("scenario")
-    @classmethod
-    def _preset_exists(cls, entry: str | Scenario) -> str | Scenario:
-        resolved(entry)
-        return entry
 
 
 def run_replay(request: ReplayRequest) -> bytes:

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
+from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.robot import RobotSource
-from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioName, find_scenario
+from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
 from sim.simulate import Backend, check_reach, simulate
 from sim.variables import VariableName
 
@@ -81,7 +81,7 @@ def check_names(controller: ControllerName, design: Mapping[str, float]) -> None
         raise ValueError(f"design: {', '.join(missing)} missing; {controller} needs it")
 
 
-def resolved(entry: ScenarioName | Scenario) -> Scenario:
+def resolved(entry: str | Scenario) -> Scenario:
     """The scenario in full, a preset looked up."""
     return find_scenario(entry) if isinstance(entry, str) else entry
 
@@ -89,27 +89,19 @@ def resolved(entry: ScenarioName | Scenario) -> Scenario:
 class SimulationRequest(WalkRequest):
     """One design and the walks in which to try it."""
 
-    scenarios: tuple[ScenarioName | Scenario, ...] = Field(
+    scenarios: tuple[ScenarioChoice, ...] = Field(
         default=tuple(scenario.name for scenario in SCENARIOS),
         min_length=1,
         max_length=32,
         description="Walks: names or numbers of presets (see /v1/scenarios), or your own.",
         examples=[["normal-fast", "2"]],
     )
-    preference: PreferenceName | Preference = Field(
+    preference: PreferenceChoice = Field(
         default="A", description="How objectives are weighed: A, B, C of table 4.5, or your own."
     )
     log: bool = Field(
         default=False, description="Whether to return the 500 Hz log of every walk; it is large."
     )
-
-    @field_validator("scenarios")
-    @classmethod
-    def _presets_exist(cls, entries: tuple[str | Scenario, ...]) -> tuple[str | Scenario, ...]:
-        for entry in entries:
-            if isinstance(entry, str):
-                find_scenario(entry)
-        return entries
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:

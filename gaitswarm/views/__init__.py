@@ -12,7 +12,7 @@ from gaitswarm.views.analysis import (
     RankingRequest,
     RankingView,
 )
-from gaitswarm.views.base import FieldErrorView, ProblemView, View, finite
+from gaitswarm.views.base import View, finite
 from gaitswarm.views.catalogue import (
     CatalogueView,
     ControllerView,
@@ -41,6 +41,7 @@ from gaitswarm.views.job import (
     StateView,
 )
 from gaitswarm.views.particles import ParticlesHeaderView, encoded_particles
+from gaitswarm.views.problem import FieldErrorView, ProblemView, field_errors
 from gaitswarm.views.simulation import SimulatedScenarioView, SimulationView, WalkLogView
 
 __all__ = [
@@ -76,6 +77,7 @@ __all__ = [
     "controller_views",
     "encoded_particles",
     "evaluation_views",
+    "field_errors",
     "finite",
     "preference_views",
     "scenario_views",

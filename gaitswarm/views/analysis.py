@@ -10,7 +10,7 @@ from services.optimizer.analysis.distribution import QUANTILES, Distribution
 from services.optimizer.analysis.ranking import RankedDesign
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Evaluation
-from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
+from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.service import RankedJob
 
@@ -76,7 +76,7 @@ class RankingRequest(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    preference: PreferenceName | Preference = Field(
+    preference: PreferenceChoice = Field(
         description="How objectives are weighed: A, B, C of table 4.5, or your own.",
         examples=["B"],
     )
@@ -119,7 +119,7 @@ class BestSoFarView(View):
 class RankingView(View):
     """A job's designs, judged by another preference. Nothing is simulated, nothing is stored."""
 
-    preference: PreferenceName | Preference = Field(description="As it was asked for.")
+    preference: PreferenceChoice = Field(description="As it was asked for.")
     evaluations: int = Field(description="Designs that were judged [1].", examples=[625])
     fitness_of_present_best: float | None = Field(
         description="By the preference that was asked for, of the design that is the job's best by"

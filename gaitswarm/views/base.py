@@ -1,4 +1,4 @@
-"""What every view has in common, how numbers are framed, and problems (RFC 9457)."""
+"""What every view has in common, and how numbers are framed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 
 class View(BaseModel):
@@ -43,35 +43,3 @@ def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
     text += b" " * (-len(text) % 4)
     with np.errstate(over="ignore"):
         return struct.pack("<I", len(text)) + text + numbers.astype("<f4").tobytes()
-
-
-class FieldErrorView(View):
-    """What is wrong with one field of a request."""
-
-    field: str = Field(
-        description="Path of the field, parts joined by dots; empty for the request as a whole.",
-        examples=["variables.0.low"],
-    )
-    message: str = Field(
-        description="What is wrong with it and what it must be.",
-        examples=["Input should be a finite number"],
-    )
-
-
-class ProblemView(View):
-    """A problem (RFC 9457, application/problem+json)."""
-
-    type: str = Field(
-        description="Kind of problem, the same for every occurrence of it.",
-        examples=["urn:gaitswarm:problem:invalid-request"],
-    )
-    title: str = Field(description="The kind in words.", examples=["The request is not valid"])
-    status: int = Field(description="HTTP status code.", examples=[422])
-    detail: str = Field(
-        description="What went wrong this time and what to do about it.",
-        examples=["iterations: Input should be greater than or equal to 1"],
-    )
-    instance: str = Field(description="Path of the request.", examples=["/v1/jobs"])
-    errors: list[FieldErrorView] = Field(
-        default=[], description="Every offending field; empty if no field is to blame."
-    )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
 from sim import former_names
+from sim.choice import NAME, alternatives
 from sim.former_names import current_names
 from sim.robot.description import Actuator, ContactLaw, Leg
 from sim.robot.robot import Robot, parse_robot, shipped_robot
@@ -59,7 +60,26 @@ class RobotFiles(BaseModel):
         return self
 
 
-RobotSource = RobotName | RobotVariant | RobotFiles
+_VARIANT: Final = "<variant>"
+_FILES: Final = "<files>"
+
+
+def _variant_or_files(robot: Any) -> str:
+    if isinstance(robot, BaseModel):
+        return _FILES if isinstance(robot, RobotFiles) else _VARIANT
+    return _VARIANT if RobotFiles.model_fields.keys().isdisjoint(robot) else _FILES
+
+
+RobotSource = Annotated[
+    Annotated[RobotName, Tag(NAME)]
+    | Annotated[RobotVariant, Tag(_VARIANT)]
+    | Annotated[RobotFiles, Tag(_FILES)],
+    alternatives(
+        "must be a robot's name, or an object: a variant of it, or the text of the files of your"
+        " own",
+        among_own=_variant_or_files,
+    ),
+]
 """How jobs and requests name a robot."""
 
 

@@ -40,8 +40,8 @@ def nothing_is_written(store: SqlStore) -> Iterator[None]:
 @pytest.mark.parametrize(
     ("change", "field", "hint"),
     [
-        ({"scenarios": ["on-the-moon"]}, "scenarios", "known are"),
-        ({"scenarios": ["7"]}, "scenarios", "unknown scenario '7'"),
+        ({"scenarios": ["on-the-moon"]}, "scenarios.0", "known are"),
+        ({"scenarios": ["1", "7"]}, "scenarios.1", "unknown scenario '7'"),
         ({"scenarios": []}, "scenarios", "at least 1"),
         ({"scenarios": ["1", "normal-fast"]}, "scenarios", "named twice"),
         ({"scenarios": [{**OWN, "cycle_time": 0.0}]}, "scenarios.0.cycle_time", "0.2"),

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from gaitswarm.field_errors import field_errors
+from gaitswarm.views import field_errors
 from services.optimizer.jobs.documents import SPECS
 
 
@@ -62,13 +62,55 @@ def test_a_robot_file_speaks_for_itself() -> None:
     assert found["robot"].startswith("robot.toml: ")
 
 
-def test_a_value_that_is_like_none_of_the_alternatives_hears_of_all() -> None:
-    document = {"preference": "D"}
-    with pytest.raises(ValidationError) as refused:
-        SPECS.validate_python(document)
-    messages = [error.message for error in field_errors(refused.value.errors(), document)]
-    assert any("'A', 'B' or 'C'" in message for message in messages)
-    assert len(messages) == 2
+@pytest.mark.parametrize(
+    ("document", "field", "hint"),
+    [
+        ({"preference": "D"}, "preference", "'A', 'B' or 'C'"),
+        ({"scenarios": ["1", "moon"]}, "scenarios.1", "unknown scenario 'moon'"),
+        ({"variables": ["I", "1"]}, "variables.1", "pattern"),
+        ({"robot": "octopus"}, "robot", "'szabadka2'"),
+    ],
+)
+def test_a_wrong_name_hears_nothing_of_objects(
+    document: dict[str, Any], field: str, hint: str
+) -> None:
+    found = told(document)
+    assert list(found) == [field]
+    assert hint in found[field]
+
+
+@pytest.mark.parametrize(
+    ("document", "field"),
+    [
+        ({"preference": 3}, "preference"),
+        ({"scenarios": ["1", None]}, "scenarios.1"),
+        ({"variables": ["I", ["P"]]}, "variables.1"),
+        ({"robot": 2}, "robot"),
+    ],
+)
+def test_what_is_neither_a_name_nor_an_object_hears_of_both(
+    document: dict[str, Any], field: str
+) -> None:
+    found = told(document)
+    assert list(found) == [field]
+    assert "or an object: " in found[field]
+
+
+def test_a_robot_with_one_of_its_files_hears_of_the_other() -> None:
+    assert list(told({"robot": {"urdf": "<robot/>"}})) == ["robot.toml"]
+
+
+def test_a_job_hears_of_its_own_kind_alone() -> None:
+    document = {"kind": "identification", "recordings": ["7"], "scenarios": ["moon"]}
+    assert sorted(told(document)) == ["recordings.0", "scenarios"]
+
+
+def test_an_unknown_kind_hears_of_the_known() -> None:
+    assert told({"kind": "magic"}) == {"kind": "must be tuning or identification"}
+
+
+def test_a_wrong_key_is_told_by_its_path() -> None:
+    assert list(told({"fixed": {"not a name": 1.0}})) == ["fixed.not a name"]
 
 
 def test_a_check_of_the_whole_names_the_field_that_it_blames() -> None:

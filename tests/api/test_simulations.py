@@ -99,7 +99,7 @@ def test_a_walk_that_fails_is_a_result_not_an_error(client: httpx2.Client) -> No
 @pytest.mark.parametrize(
     ("change", "field", "hint"),
     [
-        ({"scenarios": ["on-the-moon"]}, "scenarios", "known are"),
+        ({"scenarios": ["on-the-moon"]}, "scenarios.0", "known are"),
         ({"scenarios": ["1", "1"]}, "scenarios", "named twice"),
         ({"design": {"I": 0.2}}, "design", "FI1R"),
         ({"design": {**DESIGN, "warp": 9.0}}, "design", "unknown variable 'warp'"),

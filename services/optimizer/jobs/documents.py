@@ -9,16 +9,18 @@ from pydantic import Discriminator, Tag, TypeAdapter
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.tuning import JobSpec
 
+_TUNING: Final = "<tuning>"
+_IDENTIFICATION: Final = "<identification>"
+
 
 def _kind(value: Any) -> str:
     """Of a document or a spec; a job without one tunes a drive."""
-    if isinstance(value, dict):
-        return str(value.get("kind", "tuning"))
-    return str(getattr(value, "kind", "tuning"))
+    named = value if isinstance(value, dict) else {"kind": getattr(value, "kind", "tuning")}
+    return f"<{named.get('kind', 'tuning')}>"
 
 
 AnySpec = Annotated[
-    Annotated[JobSpec, Tag("tuning")] | Annotated[IdentificationSpec, Tag("identification")],
+    Annotated[JobSpec, Tag(_TUNING)] | Annotated[IdentificationSpec, Tag(_IDENTIFICATION)],
     Discriminator(
         _kind,
         custom_error_type="unknown_kind",

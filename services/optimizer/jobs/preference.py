@@ -7,9 +7,10 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
 from services.optimizer.jobs.spec import Judgement, exponential
+from sim.choice import NAME, OWN, alternatives
 
 N_PREFERRED: Final = 5
 """Objectives f1..f5 enter the product; f6 belongs to the single-scenario fitness of chapter 3."""
@@ -47,6 +48,12 @@ class Preference(BaseModel):
 
 
 PreferenceName = Literal["A", "B", "C"]
+
+PreferenceChoice = Annotated[
+    Annotated[PreferenceName, Tag(NAME)] | Annotated[Preference, Tag(OWN)],
+    alternatives("must be 'A', 'B' or 'C', or an object: a preference of your own"),
+]
+"""How jobs and requests choose a preference."""
 
 PREFERENCES: Final[dict[PreferenceName, Preference]] = {
     "A": Preference(bias=(0.9, 0.8, 0.24, 0.5, 0.8), exponent=(0.1, 0.7, 0.3, 0.3, 0.1)),

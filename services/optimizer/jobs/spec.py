@@ -23,7 +23,7 @@ from sim.case import Case
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import RobotSource
-from sim.variables import Variable, VariableName
+from sim.variables import VariableChoice, VariableName
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Spec(BaseModel):
         description="Robot to simulate, by name, or a variant with another law of friction or with"
         " backlash, or the text of the files of your own.",
     )
-    variables: tuple[VariableName | Variable, ...] | None = Field(
+    variables: tuple[VariableChoice, ...] | None = Field(
         default=None,
         min_length=1,
         max_length=128,

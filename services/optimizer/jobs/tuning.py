@@ -6,16 +6,16 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName, judge
+from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice, judge
 from services.optimizer.jobs.spec import Judgement, Spec
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import OBJECTIVES, Objective
-from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, ScenarioName, find_scenario
+from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
 
 Floats = NDArray[np.float64]
 
@@ -43,24 +43,16 @@ class JobSpec(Spec):
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller to be tuned; see /v1/controllers."
     )
-    scenarios: tuple[ScenarioName | Scenario, ...] = Field(
+    scenarios: tuple[ScenarioChoice, ...] = Field(
         default=tuple(scenario.name for scenario in SCENARIOS),
         min_length=1,
         max_length=32,
         description="Walks in which every design is judged: names or numbers of presets (see"
         " /v1/scenarios), or scenarios of your own.",
     )
-    preference: PreferenceName | Preference = Field(
+    preference: PreferenceChoice = Field(
         default="A", description="How objectives are weighed: A, B, C of table 4.5, or your own."
     )
-
-    @field_validator("scenarios")
-    @classmethod
-    def _presets_exist(cls, entries: tuple[str | Scenario, ...]) -> tuple[str | Scenario, ...]:
-        for entry in entries:
-            if isinstance(entry, str):
-                find_scenario(entry)
-        return entries
 
     @model_validator(mode="after")
     def _can_be_run(self) -> JobSpec:

@@ -1,0 +1,93 @@
+"""Problems (RFC 9457), and what pydantic finds wrong in the words of the document."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from pydantic import Field
+
+from gaitswarm.views.base import View
+from sim.choice import without_tags
+from sim.former_names import as_written
+
+_LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)
+
+
+class FieldErrorView(View):
+    """What is wrong with one field of a request."""
+
+    field: str = Field(
+        description="Path of the field, parts joined by dots; empty for the request as a whole.",
+        examples=["variables.0.low"],
+    )
+    message: str = Field(
+        description="What is wrong with it and what it must be.",
+        examples=["Input should be a finite number"],
+    )
+
+    @classmethod
+    def from_message(cls, field: str, message: str) -> FieldErrorView:
+        """An error whose message may name its field.
+
+        Args:
+            field: path of the field; empty for the whole document.
+            message: what is wrong; about a whole document it may begin with the path of the field
+                that is to blame and a colon.
+
+        Returns:
+            The error, of that field if no other is known.
+        """
+        match = _LEADING_FIELD.match(message)
+        if not field and match:
+            field, message = match.groups()
+        return cls(field=field, message=message)
+
+
+class ProblemView(View):
+    """A problem (RFC 9457, application/problem+json)."""
+
+    type: str = Field(
+        description="Kind of problem, the same for every occurrence of it.",
+        examples=["urn:gaitswarm:problem:invalid-request"],
+    )
+    title: str = Field(description="The kind in words.", examples=["The request is not valid"])
+    status: int = Field(description="HTTP status code.", examples=[422])
+    detail: str = Field(
+        description="What went wrong this time and what to do about it.",
+        examples=["iterations: Input should be greater than or equal to 1"],
+    )
+    instance: str = Field(description="Path of the request.", examples=["/v1/jobs"])
+    errors: list[FieldErrorView] = Field(
+        default=[], description="Every offending field; empty if no field is to blame."
+    )
+
+
+def field_errors(
+    errors: Iterable[Mapping[str, Any]], document: Any, *, prefix: str = ""
+) -> list[FieldErrorView]:
+    """Errors of pydantic with the paths of the document, without repeats.
+
+    Args:
+        errors: as `ValidationError.errors()`, with locations from the document's root.
+        document: what was validated, as it was read.
+        prefix: path of the document itself, if it is part of another.
+
+    Returns:
+        One error for every field and message, in the order in which they were found.
+    """
+    found = []
+    for error in errors:
+        if _follows_from_others(error):
+            continue
+        location = as_written(document, without_tags(error["loc"]))
+        path = ".".join(str(part) for part in (*([prefix] if prefix else []), *location))
+        message = str(error["msg"]).removeprefix("Value error, ")
+        found.append(FieldErrorView.from_message(path, message))
+    return list(dict.fromkeys(found))
+
+
+def _follows_from_others(error: Mapping[str, Any]) -> bool:
+    """A list whose items are wrong is then too short as well, though it was not in the input."""
+    return bool(error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"])

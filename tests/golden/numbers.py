@@ -1,0 +1,179 @@
+"""Numbers that no change may move: the published optimum, and the demo's job."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from services.optimizer.jobs.job import Evaluation
+from services.optimizer.jobs.spec import judge_outcomes
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.pso import PsoSettings
+from services.runtime import open_evaluator, open_store, run_embedded
+from sim.controllers import CONTROLLERS
+from sim.outcome import OBJECTIVE_NAMES, Status
+from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import Backend, simulate
+
+FILE: Final = Path(__file__).with_name("numbers.json")
+
+ITERATIONS: Final = 2
+"""Of the demo's job, that are kept and run again: all of them would take half a minute."""
+
+DEMO: Final = JobSpec(preference="A", optimizer=PsoSettings(particles=25), iterations=25, seed=1)
+"""The job of `make demo`: its swarm's inertia falls over 25 iterations, however many are run."""
+
+Optimum = dict[str, dict[str, float]]
+"""By scenario, by objective."""
+
+
+@dataclass(frozen=True, slots=True)
+class Swarm:
+    """One iteration of the demo's job.
+
+    designs: digest of all designs' bits. fitness: of every particle; coarse beside them, because
+    a drive's tables are quantised.
+    """
+
+    designs: str
+    fitness: list[float]
+
+
+@dataclass(frozen=True, slots=True)
+class Best:
+    """The best design of the demo's job, and the particle that found it."""
+
+    iteration: int
+    particle: int
+    fitness: float
+    design: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """optimum: objectives of design A. swarms: the demo's first iterations. best: its last word."""
+
+    optimum: Optimum
+    swarms: list[Swarm]
+    best: Best
+
+
+def objectives_of_the_optimum(
+    scenarios: tuple[Scenario, ...] = SCENARIOS, *, backend: Backend = "native"
+) -> Optimum:
+    """What the published design A is worth."""
+    design = CONTROLLERS["fuzzy-pi"].published["A"]
+    values = np.array([list(design.values())])
+    found = {}
+    for scenario in scenarios:
+        outcome = simulate(scenario, "fuzzy-pi", list(design), values, backend=backend).outcome
+        assert outcome.statuses.tolist() == [Status.OK]
+        found[scenario.name] = dict(
+            zip(OBJECTIVE_NAMES, outcome.objectives[0].tolist(), strict=True)
+        )
+    return found
+
+
+def run_demo(iterations: int) -> tuple[list[Swarm], Evaluation]:
+    """The first iterations of the demo's job, and the best design in them."""
+    with tempfile.TemporaryDirectory() as folder:
+        store = open_store(str(Path(folder) / "jobs.db"))
+        evaluator = open_evaluator("in-process")
+        enough = threading.Event()
+        job, _ = store.create_job(DEMO)
+
+        def stop_after(done: object, state: object) -> None:
+            if store.job(job.id).progress.iterations == iterations:
+                enough.set()
+
+        run_embedded(store, evaluator, job.id, on_commit=stop_after, stop=enough)
+        swarms = [_swarm(store.evaluations(job.id, index)) for index in range(iterations)]
+        best = store.best(job.id)
+        evaluator.close()
+        store.close()
+    assert best is not None
+    return swarms, best
+
+
+def _swarm(evaluations: Sequence[Evaluation]) -> Swarm:
+    designs = hashlib.sha256(b"".join(e.design.tobytes() for e in evaluations))
+    return Swarm(designs.hexdigest(), [e.fitness for e in evaluations])
+
+
+def fitness_of(design: dict[str, float]) -> float:
+    """What the demo's job says of a design."""
+    values = np.array([[design[name] for name in DEMO.design_space().names]])
+    outcomes = tuple(case.run(values) for case in DEMO.cases({}))
+    return float(judge_outcomes(DEMO, outcomes).fitness[0])
+
+
+def measure() -> Numbers:
+    """All numbers as this version has them; the whole demo takes half a minute."""
+    swarms, best = run_demo(DEMO.iterations)
+    design = dict(zip(DEMO.design_space().names, best.design.tolist(), strict=True))
+    return Numbers(
+        objectives_of_the_optimum(),
+        swarms[:ITERATIONS],
+        Best(best.iteration, best.particle, best.fitness, design),
+    )
+
+
+def write(numbers: Numbers) -> None:
+    """Keep them, exact to the bit."""
+    document = {
+        "optimum": _hex(numbers.optimum),
+        "demo": {
+            "iterations": [
+                {"designs": swarm.designs, "fitness": _hex(swarm.fitness)}
+                for swarm in numbers.swarms
+            ],
+            "best": {
+                "iteration": numbers.best.iteration,
+                "particle": numbers.best.particle,
+                "fitness": numbers.best.fitness.hex(),
+                "design": _hex(numbers.best.design),
+            },
+        },
+    }
+    FILE.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def read() -> Numbers:
+    """The numbers that are kept."""
+    document = json.loads(FILE.read_text(encoding="utf-8"))
+    best = document["demo"]["best"]
+    return Numbers(
+        _from_hex(document["optimum"]),
+        [
+            Swarm(swarm["designs"], _from_hex(swarm["fitness"]))
+            for swarm in document["demo"]["iterations"]
+        ],
+        Best(
+            best["iteration"],
+            best["particle"],
+            float.fromhex(best["fitness"]),
+            _from_hex(best["design"]),
+        ),
+    )
+
+
+def _hex(numbers: Any) -> Any:
+    """Nested numbers as hexadecimal text."""
+    if isinstance(numbers, dict):
+        return {name: _hex(value) for name, value in numbers.items()}
+    return [_hex(value) for value in numbers] if isinstance(numbers, list) else numbers.hex()
+
+
+def _from_hex(text: Any) -> Any:
+    """Inverse of `_hex`."""
+    if isinstance(text, dict):
+        return {name: _from_hex(value) for name, value in text.items()}
+    return [_from_hex(value) for value in text] if isinstance(text, list) else float.fromhex(text)

@@ -1,0 +1,121 @@
+"""Today's version gives the numbers that are kept in numbers.json; see `python -m tests.golden`.
+
+The compiled kernel gives them to the last bit, on every machine. Without a C compiler the reference
+kernel walks, and agrees to 1e-9.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sim.compiler.compilation import Target, target
+from sim.errors import SimulationInputError
+from sim.scenario import SCENARIOS
+from sim.simulate import Backend, prepare
+from tests.golden.numbers import (
+    DEMO,
+    ITERATIONS,
+    fitness_of,
+    objectives_of_the_optimum,
+    read,
+    run_demo,
+)
+
+ROOT = Path(__file__).parents[2]
+
+GOLDEN = read()
+
+# What a machine with narrower vectors would do: the kernel is compiled for it, and numpy is told by
+# its environment to leave the wider instructions alone.
+NARROW_MACHINE = """
+import json, sys
+from sim.compiler import compilation
+narrow = compilation.Target(int(sys.argv[1]), sys.argv[2])
+compilation.target = lambda: narrow
+from sim.robot import load_robot
+from sim.simulate import kernel_of
+from tests.golden.numbers import objectives_of_the_optimum
+print(json.dumps([kernel_of(load_robot("szabadka2")).lanes, objectives_of_the_optimum()]))
+"""
+
+AVX512 = "X86_V4 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"
+AVX2 = "X86_V3 AVX2 FMA3"
+
+
+@pytest.fixture(scope="module")
+def backend() -> Backend:
+    """The compiled kernel, or the reference on a machine without a compiler."""
+    try:
+        prepare(backend="native")
+    except SimulationInputError:
+        return "reference"
+    return "native"
+
+
+def as_kept(kept: Any, backend: Backend) -> Any:
+    """What a backend must give: the bits, or numbers that are as good as the same."""
+    if backend == "native":
+        return kept
+    if isinstance(kept, dict):
+        return {name: as_kept(value, backend) for name, value in kept.items()}
+    return pytest.approx(kept, rel=1e-9, abs=1e-12)
+
+
+def test_the_published_optimum_is_worth_what_it_was(backend: Backend) -> None:
+    found = objectives_of_the_optimum(backend=backend)
+    assert found == as_kept(GOLDEN.optimum, backend)
+
+
+@pytest.mark.filterwarnings("ignore:no C compiler found")
+def test_the_demos_best_design_is_worth_what_it_was(backend: Backend) -> None:
+    assert fitness_of(GOLDEN.best.design) == as_kept(GOLDEN.best.fitness, backend)
+    assert GOLDEN.best.fitness == pytest.approx(10.70496956284169)
+
+
+@pytest.mark.slow
+def test_the_demos_swarm_begins_as_it_did(backend: Backend) -> None:
+    if backend == "reference":
+        pytest.skip("NOT TESTED without a C compiler: the reference kernel needs 15 minutes")
+    swarms, _ = run_demo(ITERATIONS)
+    assert swarms == GOLDEN.swarms
+    assert [len(swarm.fitness) for swarm in swarms] == [DEMO.optimizer.particles] * ITERATIONS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("narrow", "without"),
+    [(Target(4, "x86-64-v3"), AVX512), (Target(2, ""), f"{AVX512} {AVX2}")],
+    ids=["AVX2", "plain"],
+)
+def test_a_machine_with_narrower_vectors_gives_the_same_bits(
+    backend: Backend, narrow: Target, without: str
+) -> None:
+    if backend == "reference":
+        pytest.skip("NOT TESTED without a C compiler: there is no kernel to compile more narrowly")
+    narrow = min(narrow, target(), key=lambda candidate: candidate.lanes)
+    done = subprocess.run(
+        [sys.executable, "-c", NARROW_MACHINE, str(narrow.lanes), narrow.level],
+        env=os.environ | {"PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": without},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    lanes, found = json.loads(done.stdout)
+    assert lanes == narrow.lanes
+    assert found == GOLDEN.optimum
+
+
+@pytest.mark.slow
+def test_the_reference_kernel_agrees_to_1e_9() -> None:
+    (scenario,) = (scenario for scenario in SCENARIOS if scenario.name == "turn-right-fast")
+    found = objectives_of_the_optimum((scenario,), backend="reference")
+    kept = {scenario.name: GOLDEN.optimum[scenario.name]}
+    assert found == as_kept(kept, "reference")

@@ -48,7 +48,7 @@ def interpreter() -> Callable[[], float]:
 
 def pinocchio_aba() -> Callable[[], float]:
     """Pinocchio's articulated-body algorithm alone, called from Python; us a call."""
-    model = pin.buildModelFromXML(load_robot("szabadka2").urdf, pin.JointModelFreeFlyer())
+    model = pin.buildModelFromXML(load_robot("szabadka2").urdf.text, pin.JointModelFreeFlyer())
     data, q = model.createData(), pin.neutral(model)
     v, tau = np.zeros(model.nv), np.zeros(model.nv)
     return lambda: per_call(lambda: pin.aba(model, data, q, v, tau), 20000)

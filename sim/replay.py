@@ -129,7 +129,7 @@ def _model(robot: Robot) -> Any:
     """Read by many threads at once; what they compute is in data of their own."""
     import pinocchio as pin  # noqa: PLC0415
 
-    return pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+    return pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
 
 
 def _without_jumps(poses: Floats) -> Floats:

@@ -19,7 +19,7 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import Trajectory, desired_angles, require_reachable
 from sim.kernel.native import native_kernel
 from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.parameters import body_of, gravity_on, pack_parameters
+from sim.kernel.parameters import gravity_on, pack_parameters
 from sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup
 from sim.noise import LinkNoise
 from sim.outcome import N_OBJECTIVES, Outcome, Status
@@ -231,9 +231,7 @@ def course_of(
     if not trajectory.reachable:
         return None
     ticks, n_joints = trajectory.angles.shape
-    body = body_of(robot, kernel.body)
-    mass = kernel.total_mass - kernel.body.mass + body.mass + scenario.load
-    weight = mass * -gravity_on(scenario.slope)[2]
+    weight = (robot.mass + scenario.load) * -gravity_on(scenario.slope)[2]
     joints = trajectory.angles[0]
     internal_state = np.zeros(kernel.internal_state_size)
     if robot.has_backlash:
@@ -248,7 +246,7 @@ def course_of(
             ]
         ),
         internal_state,
-        pack_parameters(robot, body, scenario, timestep),
+        pack_parameters(robot, scenario, timestep),
         codes.astype(np.int32),
         fall_height=0.5 * scenario.hip_height,
         disturbance=None if noise is None else noise.torques(ticks, n_joints),

@@ -15,7 +15,8 @@ from sim.kernel.parameters import gravity_on
 from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from sim.replay import Replay
 from sim.robot import Robot
-from sim.robot.shapes import Role, Shape, Solid, VisibleLink
+from sim.robot.shapes import Role, Shape, VisibleLink
+from sim.robot.urdf import SolidKind
 from sim.scenario import Scenario
 
 VERSION: Final = 1
@@ -41,7 +42,7 @@ _CHANNELS: Final[dict[str, tuple[str, str]]] = {
 class ShapeView(View):
     """A solid on a link."""
 
-    type: Solid = Field(
+    type: SolidKind = Field(
         description="Kind of solid; cylinders and capsules lie along their own z axis."
     )
     size: tuple[float, ...] = Field(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sim.compiler.compilation import load_library, vector_header
 from sim.controllers.base import LookupTable, Response
 from sim.errors import SimulationInputError
-from sim.kernel.parameters import BodyInertia, Layout
+from sim.kernel.parameters import Layout
 from sim.kernel.walk import Coding, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
@@ -132,9 +132,6 @@ class NativeKernel:
         self._parameters = int(library.gaitswarm_parameters())
         self._integrands = int(library.gaitswarm_integrands())
         self._log_width = int(library.gaitswarm_log_width())
-        exported = np.array((ctypes.c_double * 14).in_dll(library, "gaitswarm_body"))
-        self.total_mass = float(exported[13])
-        self.body = BodyInertia(float(exported[0]), exported[1:4], exported[4:13].reshape(3, 3))
         library.gaitswarm_walk.argtypes = [
             _pointer(_Walker),
             ctypes.c_int64,
@@ -217,7 +214,7 @@ def _generator() -> bytes:
 def _identity(robot: Robot) -> bytes:
     """All that the source depends on; run-time parameters are left out, so they share a kernel."""
     digest = hashlib.sha256(_generator())
-    digest.update(robot.urdf.encode())
+    digest.update(robot.urdf.text.encode())
     actuators = robot.actuators()
     for array in (actuators.torque, actuators.resistance, actuators.armature):
         digest.update(array.tobytes())
@@ -236,13 +233,6 @@ def _source_of(robot: Robot) -> Callable[[], str]:
 
         model = physics_model(robot)
         folder = resources.files("sim.kernel")
-        body = [
-            model.body.mass,
-            *model.body.centre,
-            *model.body.rotational.reshape(-1),
-            model.total_mass,
-        ]
-        numbers = ", ".join(float(x).hex() for x in body)
         return "\n".join(
             [
                 f"#define NJ {robot.n_joints}",
@@ -250,7 +240,6 @@ def _source_of(robot: Robot) -> Callable[[], str]:
                 f"#define NI {internal_state_size(robot)}",
                 f"#define ENCODER(q, internal) ({'internal' if robot.has_backlash else '(q) + 7'})",
                 vector_header(),
-                f"const double gaitswarm_body[14] = {{{numbers}}};",
                 emit_c(model.step, "step"),
                 (folder / "driver.c").read_text(encoding="utf-8"),
             ]

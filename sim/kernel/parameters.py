@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.contact import LAWS
 from sim.robot import Robot
+from sim.robot.inertia import parallel_axis
 from sim.scenario import Scenario
 
 GRAVITY = 9.81
 """[m/s2], table 5."""
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BodyInertia:
-    """Mass [kg], centre of mass (3,) [m] and rotational inertia about it (3, 3) [kg m2]."""
-
-    mass: float
-    centre: Floats
-    rotational: Floats
 
 
 class Layout:
@@ -84,26 +75,24 @@ def gravity_on(slope: float, direction: float = 0.0) -> Floats:
     )
 
 
-def body_of(robot: Robot, urdf_body: BodyInertia) -> BodyInertia:
-    """The body with the description's own mass, if it has one; its shape stays."""
-    mass = robot.description.body_mass
-    if mass is None:
-        return urdf_body
-    return BodyInertia(mass, urdf_body.centre, urdf_body.rotational * (mass / urdf_body.mass))
+def pack_parameters(robot: Robot, scenario: Scenario, timestep: float) -> Floats:
+    """The kernel's parameters for one robot in one scenario.
 
+    A load is a point mass at `load_height` over the body's centre.
 
-def pack_parameters(robot: Robot, body: BodyInertia, scenario: Scenario, timestep: float) -> Floats:
-    """The kernel's parameters for one robot in one scenario, (Layout.size,).
+    Args:
+        robot: The robot.
+        scenario: Its load and slope count.
+        timestep: Of the physics [s].
 
-    body: see `body_of`. A load is a point mass at `load_height` over the body's centre.
+    Returns:
+        (Layout.size,).
     """
-    d = robot.description
+    d, body = robot.description, robot.body
     actuators, contacts = robot.actuators(), robot.contacts()
     at = np.array([0.0, 0.0, d.load_height])
     inertia = (
-        body.rotational
-        + body.mass * _parallel_axis(body.centre)
-        + scenario.load * _parallel_axis(at)
+        body.rotational + body.mass * parallel_axis(body.centre) + scenario.load * parallel_axis(at)
     )
     by_foot = {
         name: np.array([getattr(contact, name) for contact in contacts])
@@ -121,7 +110,3 @@ def pack_parameters(robot: Robot, body: BodyInertia, scenario: Scenario, timeste
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         **by_foot,
     )
-
-
-def _parallel_axis(at: Floats) -> Floats:
-    return float(at @ at) * np.eye(3) - np.outer(at, at)

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-import numpy as np
-
 from sim.kernel.articulated_body import (
-    BASE,
     Acceleration,
     Inertia,
     Link,
@@ -24,7 +21,7 @@ from sim.kernel.backlash import shaft_torque
 from sim.kernel.contact import LAWS, Foot, InternalState, foot_on_ground
 from sim.kernel.integration import integrated
 from sim.kernel.motor import Electrical, electrical
-from sim.kernel.parameters import BodyInertia, Layout
+from sim.kernel.parameters import Layout
 from sim.kernel.spatial import (
     Matrix,
     Scalar,
@@ -58,7 +55,7 @@ def internal_state_size(robot: Robot) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhysicsModel:
-    """CasADi functions of one robot, and the body's own inertia.
+    """CasADi functions of one robot.
 
     step: (q, v, internal_state, duty, disturbance, p) -> (q', v', internal_state', current,
     integrands); observe: the same inputs -> (current (J), voltage (J), load torque (J), foot force
@@ -72,8 +69,6 @@ class PhysicsModel:
 
     step: Any
     observe: Any
-    body: BodyInertia
-    total_mass: float
     layout: Layout
 
 
@@ -106,7 +101,7 @@ def physics_model(robot: Robot) -> PhysicsModel:
     import casadi as ca  # noqa: PLC0415
     import pinocchio as pin  # noqa: PLC0415
 
-    model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     layout = Layout(robot)
     s = _symbols(ca, robot, layout)
     d = _dynamics(ca, robot, model, s)
@@ -129,12 +124,9 @@ def physics_model(robot: Robot) -> PhysicsModel:
         [d.electrical.supply],
         rates,
     ]
-    own = model.inertias[BASE]
     return PhysicsModel(
         step=_function(ca, "step", s, step),
         observe=_function(ca, "observe", s, observe),
-        body=BodyInertia(float(own.mass), np.array(own.lever), np.array(own.inertia)),
-        total_mass=float(pin.computeTotalMass(model)),
         layout=layout,
     )
 

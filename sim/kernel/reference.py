@@ -36,8 +36,6 @@ class ReferenceKernel:
         self._has_backlash = robot.has_backlash
         self.layout = model.layout
         self.internal_state_size = model.step.numel_in(2)
-        self.body = model.body
-        self.total_mass = model.total_mass
 
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool

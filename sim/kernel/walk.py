@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from sim.controllers.base import ControlLaw
 from sim.errors import SimulationInputError
-from sim.kernel.parameters import BodyInertia
 from sim.outcome import Status
 from sim.robot import Robot
 
@@ -131,14 +130,6 @@ class Kernel(Protocol):
     @property
     def lanes(self) -> int:
         """Walks that are stepped together."""
-
-    @property
-    def body(self) -> BodyInertia:
-        """The unloaded body's inertia."""
-
-    @property
-    def total_mass(self) -> float:
-        """Mass of the whole robot without load [kg]."""
 
     @property
     def internal_state_size(self) -> int:

@@ -4,31 +4,21 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from typing import Any, Final
-from xml.etree import ElementTree as ET
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from sim.errors import RobotFileError, SimulationInputError
-from sim.former_names import as_written
-from sim.robot.description import (
-    JOINTS_PER_LEG,
-    Actuator,
-    Contact,
-    Gearhead,
-    Leg,
-    Motor,
-    Pwm,
-    RobotDescription,
-    Sensors,
-    Supply,
-)
-from sim.robot.toml_lines import line_of
+from sim.robot.description import JOINTS_PER_LEG, Contact, RobotDescription
+from sim.robot.inertia import BodyInertia
+from sim.robot.toml_errors import first_problem
+from sim.robot.urdf import Joint, Urdf, parse_urdf
 
 SHIPPED: Final = ("szabadka2",)
 
@@ -39,8 +29,13 @@ Floats = NDArray[np.float64]
 class LegGeometry:
     """What inverse kinematics needs of a leg.
 
-    hip: coxa axis in the body frame (3,) [m]; side: +1 left, -1 right;
-    coxa, femur, tibia: link lengths [m].
+    Attributes:
+        name: of the leg.
+        hip: coxa axis in the body frame, (3,) [m].
+        side: +1 left, -1 right.
+        coxa: length of the link [m].
+        femur: length of the link [m].
+        tibia: length of the link [m].
     """
 
     name: str
@@ -53,12 +48,19 @@ class LegGeometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointActuators:
-    """Motors and gears by joint, in joint order, referred to the joint; arrays (J,).
+    """Motors and gears in joint order, referred to the joint; arrays (J,).
 
-    torque: r K_M [N m/A], also the back-EMF [V s/rad]; resistance [ohm]; inductance [H];
-    armature: J_M r^2 [kg m2]; motor_friction: B_M r^2, gear_friction: B_G at eta = 0
-    [N m s/rad], to be multiplied by 1 - eta; efficiency: eta [1]; backlash: play, end to end
-    [rad]; shaft_stiffness [N m/rad] and shaft_damping [N m s/rad] of the closed play.
+    Attributes:
+        torque: r K_M [N m/A], also the back-EMF [V s/rad].
+        resistance: [ohm].
+        inductance: [H].
+        armature: J_M r^2 [kg m2].
+        motor_friction: B_M r^2 [N m s/rad].
+        gear_friction: B_G at eta = 0 [N m s/rad], to be multiplied by 1 - eta.
+        efficiency: eta [1].
+        backlash: play, end to end [rad].
+        shaft_stiffness: of the closed play [N m/rad].
+        shaft_damping: of the closed play [N m s/rad].
     """
 
     torque: Floats
@@ -74,16 +76,22 @@ class JointActuators:
 
     @property
     def viscous(self) -> Floats:
-        """(J,) viscous friction at the joint [N m s/rad], eq. 2.8 and the gearhead's."""
+        """Viscous friction at the joint, eq. 2.8 and the gearhead's, (J,) [N m s/rad]."""
         return self.motor_friction + (1.0 - self.efficiency) * self.gear_friction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Robot:
-    """A robot description with its URDF; immutable, hence shared between threads."""
+    """A robot description with its URDF; immutable, hence shared between threads.
+
+    Attributes:
+        description: its robot.toml.
+        urdf: its robot.urdf.
+        legs: geometry of the description's legs, in its order.
+    """
 
     description: RobotDescription
-    urdf: str
+    urdf: Urdf
     legs: tuple[LegGeometry, ...]
 
     @property
@@ -93,17 +101,36 @@ class Robot:
 
     @property
     def n_joints(self) -> int:
-        """J."""
+        """Number of joints."""
         return JOINTS_PER_LEG * len(self.legs)
 
     @property
     def has_backlash(self) -> bool:
-        """Motors and links move apart: any joint has play."""
+        """Whether motors and links move apart: any joint has play."""
         return any(
             self.description.actuators[name].backlash > 0.0
             for leg in self.description.legs
             for name in leg.actuators
         )
+
+    @property
+    def body(self) -> BodyInertia:
+        """Inertia of the unloaded body; with the description's own mass its shape stays.
+
+        Raises:
+            RobotFileError: The description has a mass of the body, but the URDF's has none.
+        """
+        mass, own = self.description.body_mass, self.urdf.body
+        if mass is None:
+            return own
+        if own.mass == 0.0:
+            raise RobotFileError("robot.urdf: the body needs a mass, which body_mass then scales")
+        return BodyInertia(mass, own.centre, own.rotational * (mass / own.mass))
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole robot without load [kg]."""
+        return self.urdf.total_mass - self.urdf.body.mass + self.body.mass
 
     def contacts(self) -> tuple[Contact, ...]:
         """Each foot's contact parameters, its own or the robot's."""
@@ -137,7 +164,17 @@ class Robot:
 
 @lru_cache(maxsize=8)
 def shipped_robot(name: str) -> Robot:
-    """A robot that ships with gaitswarm. Raises SimulationInputError for an unknown name."""
+    """A robot that ships with gaitswarm.
+
+    Args:
+        name: One of `SHIPPED`.
+
+    Returns:
+        The robot.
+
+    Raises:
+        SimulationInputError: No robot of that name is shipped.
+    """
     if name not in SHIPPED:
         raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
     folder = resources.files("sim.robot") / name
@@ -148,7 +185,18 @@ def shipped_robot(name: str) -> Robot:
 
 
 def parse_robot(toml: str, urdf: str) -> Robot:
-    """A robot from the text of its two files. Raises RobotFileError that names the field."""
+    """A robot from its two files.
+
+    Args:
+        toml: Text of robot.toml.
+        urdf: Text of robot.urdf.
+
+    Returns:
+        The robot.
+
+    Raises:
+        RobotFileError: A file cannot be used; names file and field.
+    """
     try:
         document = tomllib.loads(toml)
     except tomllib.TOMLDecodeError as error:
@@ -156,98 +204,30 @@ def parse_robot(toml: str, urdf: str) -> Robot:
     try:
         description = RobotDescription.model_validate(document)
     except ValidationError as error:
-        raise RobotFileError(_describe(error, toml, document)) from error
-    joints = _joint_origins(urdf)
-    return Robot(
-        description,
-        urdf,
-        tuple(_geometry(leg.name, joints) for leg in description.legs),
-    )
-
-
-def _describe(error: ValidationError, toml: str, document: dict[str, Any]) -> str:
-    """What is wrong first, with field, line, and what the field means in which unit."""
-    first = error.errors()[0]
-    location = as_written(document, first["loc"])
-    where = ".".join(str(part) for part in location)
-    line = line_of(toml, [part for part in location if not _is_class(part)])
-    message = first["msg"].removeprefix("Value error, ")
-    meaning = _meaning(str(first["loc"][-1])) if first["loc"] else None
-    return (
-        "robot.toml"
-        + (f", line {line}" if line else "")
-        + (f": {where}" if where else "")
-        + f": {message}"
-        + (f" ({meaning})" if meaning else "")
-    )
-
-
-def _is_class(part: str | int) -> bool:
-    """Pydantic names the members of unions among the keys."""
-    return isinstance(part, str) and part[:1].isupper() and part.isidentifier()
-
-
-def _meaning(field: str) -> str | None:
-    """Description, with unit, of a field of any part of a robot description."""
-    parts: tuple[type[BaseModel], ...] = (
-        RobotDescription,
-        Motor,
-        Gearhead,
-        Actuator,
-        Supply,
-        Pwm,
-        Sensors,
-        Contact,
-        Leg,
-    )
-    for part in parts:
-        if field in part.model_fields:
-            return part.model_fields[field].description
-    return None
-
-
-def _joint_origins(urdf: str) -> dict[str, tuple[float, float, float]]:
-    """Origin of every joint in its parent's frame, by the name of the joint and of its child."""
-    try:
-        # Robot files are the user's own; no network input is ever parsed here.
-        root = ET.fromstring(urdf)  # noqa: S314
-    except ET.ParseError as error:
-        raise RobotFileError(f"robot.urdf: {error}") from error
-    origins: dict[str, tuple[float, float, float]] = {}
-    for joint in root.findall("joint"):
-        origin, child = joint.find("origin"), joint.find("child")
-        text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
-        turn = "0" if origin is None else origin.get("rpy", "0")
-        if joint.get("type") != "fixed" and set(turn.split()) - {"0", "0.0", "-0", "-0.0"}:
+        raise RobotFileError(first_problem(error, toml, document)) from error
+    tree = parse_urdf(urdf)
+    for joint in tree.joints:
+        if not joint.fixed and joint.origin.rpy.any():
+            turn = " ".join(f"{angle:g}" for angle in joint.origin.rpy)
             raise RobotFileError(
-                f"robot.urdf: joint {joint.get('name')!r}: rpy {turn!r} turns its frame, which the"
+                f"robot.urdf: joint {joint.name!r}: rpy {turn!r} turns its frame, which the"
                 " inverse kinematics does not know; let every frame be parallel to the body's"
             )
-        try:
-            x, y, z = (float(part) for part in text.split())
-        except ValueError as error:
-            raise RobotFileError(
-                f"robot.urdf: joint {joint.get('name')!r}: origin {text!r} is not three numbers"
-            ) from error
-        origins[joint.get("name", "")] = (x, y, z)
-        if child is not None:
-            origins[child.get("link", "")] = (x, y, z)
-    return origins
+    # A foot may be named by its fixed joint or by its link.
+    named = {joint.child: joint for joint in tree.joints} | {j.name: j for j in tree.joints}
+    legs = tuple(_geometry(leg.name, named) for leg in description.legs)
+    return Robot(description, tree, legs)
 
 
-def _geometry(leg: str, origins: dict[str, tuple[float, float, float]]) -> LegGeometry:
+def _geometry(leg: str, joints: Mapping[str, Joint]) -> LegGeometry:
     names = {part: f"{leg}_{part}" for part in ("coxa", "femur", "tibia", "foot")}
     for name in names.values():
-        if name not in origins:
+        if name not in joints:
             raise RobotFileError(f"robot.urdf: leg {leg!r} has no joint or frame {name!r}")
-    hip = origins[names["coxa"]]
-    if hip[1] == 0.0:
+    x, y, z = joints[names["coxa"]].origin.xyz.tolist()
+    if y == 0.0:
         raise RobotFileError(f"robot.urdf: {names['coxa']}: a hip must lie left or right of y = 0")
-    return LegGeometry(
-        name=leg,
-        hip=hip,
-        side=math.copysign(1.0, hip[1]),
-        coxa=math.hypot(*origins[names["femur"]]),
-        femur=math.hypot(*origins[names["tibia"]]),
-        tibia=math.hypot(*origins[names["foot"]]),
+    coxa, femur, tibia = (
+        math.hypot(*joints[names[end]].origin.xyz.tolist()) for end in ("femur", "tibia", "foot")
     )
+    return LegGeometry(leg, (x, y, z), math.copysign(1.0, y), coxa, femur, tibia)

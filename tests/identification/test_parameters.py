@@ -13,8 +13,7 @@ from sim.identification.parameters import (
     nominal_values,
     with_parameters,
 )
-from sim.kernel.native import native_kernel
-from sim.kernel.parameters import Layout, body_of, pack_parameters
+from sim.kernel.parameters import Layout, pack_parameters
 from sim.robot import RobotFiles, load_robot
 from sim.robot.robot import Robot
 from sim.scenario import SCENARIOS
@@ -23,9 +22,7 @@ QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
 
 
 def packed(robot: Robot) -> np.ndarray:
-    kernel = native_kernel(load_robot("szabadka2"))
-    assert kernel is not None
-    return pack_parameters(robot, body_of(robot, kernel.body), SCENARIOS[0], 2e-4)
+    return pack_parameters(robot, SCENARIOS[0], 2e-4)
 
 
 def test_the_hexapod_has_the_45_of_the_thesis() -> None:

@@ -85,7 +85,7 @@ def mjcf(
     """
     # An own mass of the body would have to be exported, too.
     assert robot.description.body_mass is None
-    urdf = ET.fromstring(robot.urdf)  # noqa: S314
+    urdf = ET.fromstring(robot.urdf.text)  # noqa: S314
     root = ET.Element("mujoco", model=robot.description.name)
     # URDF's roll, pitch, yaw turn about fixed axes.
     ET.SubElement(root, "compiler", angle="radian", eulerseq="XYZ", autolimits="false")

@@ -62,7 +62,7 @@ def into(d: mujoco.MjData, q: Floats, v: Floats) -> Floats:
 
 def test_the_exported_robot_has_our_masses_and_joints_in_our_order(robot: Robot) -> None:
     exported = model(robot)
-    total = pin.computeTotalMass(pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer()))
+    total = pin.computeTotalMass(pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer()))
     assert exported.body_mass.sum() == pytest.approx(total, rel=1e-14)
     assert model(robot, scenario=STEEP).body_mass.sum() == pytest.approx(total + 2.0, rel=1e-14)
     names = [exported.joint(k).name for k in range(1, exported.njnt)]
@@ -75,7 +75,7 @@ def test_the_exported_robot_has_our_masses_and_joints_in_our_order(robot: Robot)
 def test_joint_space_inertia_agrees_in_random_poses(robot: Robot) -> None:
     exported = model(robot)
     d = mujoco.MjData(exported)
-    rigid = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+    rigid = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     data = rigid.createData()
     joints = [rigid.joints[rigid.getJointId(name)] for name in robot.joint_names]
     order = [*range(6), *(joint.idx_v for joint in joints)]
@@ -110,7 +110,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
     """
     robot = load_robot(VARIANTS[variant])
     ours = physics_model(robot)
-    parameters = pack_parameters(robot, ours.body, scenario, TIMESTEP)
+    parameters = pack_parameters(robot, scenario, TIMESTEP)
     exported = model(robot, scenario=scenario)
     d = mujoco.MjData(exported)
     ground = GROUNDS[robot.description.contact_law](robot, TIMESTEP)

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sim.robot import Robot, RobotFiles, load_robot
+from sim.robot.urdf import parse_urdf
 
 QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
 
@@ -30,7 +31,7 @@ def robot_named(name: str) -> Robot:
     if name == "turned quadruped":
         # Its feet cannot be planned, so it cannot be loaded; its dynamics are as good as any.
         turned = urdf.replace("<origin xyz=", '<origin rpy="0.4 -0.7 0.9" xyz=')
-        return replace(robot, urdf=turned)
+        return replace(robot, urdf=parse_urdf(turned))
     return robot
 
 
@@ -42,7 +43,7 @@ class Oracle:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+        self.model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
         self.joints = [self.model.getJointId(name) for name in robot.joint_names]
         joints = [self.model.joints[index] for index in self.joints]
         self.q_index = [*range(7), *(joint.idx_q for joint in joints)]

@@ -53,7 +53,7 @@ class Found:
 def _symbolic_tree(robot: Robot) -> Any:
     """A CasADi function (q, v) -> what `Found` holds, of the model's own links and parameters."""
     model = physics_model(robot)
-    packed = pack_parameters(robot, model.body, STEEP, 2e-4)
+    packed = pack_parameters(robot, STEEP, 2e-4)
     p = {name: packed[where].tolist() for name, where in model.layout.slices.items()}
     links = links_of(Oracle(robot).model, robot.joint_names)
     inputs = ca.SX.sym("q", 7 + robot.n_joints), ca.SX.sym("v", 6 + robot.n_joints)

@@ -35,7 +35,7 @@ def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
     actuators, supply = robot.actuators(), robot.description.supply
     slope = Scenario(name="steep", cycle_time=1.5, radius=0.16, hip_height=0.15, slope=20.0)
     oracle.model.gravity.linear = gravity_on(slope.slope)
-    p = pack_parameters(robot, model.body, slope, 2e-4)
+    p = pack_parameters(robot, slope, 2e-4)
     touching, worst = 0, 0.0
     for _ in range(1000):
         q, v = random_state(rng, robot.n_joints)
@@ -73,7 +73,7 @@ def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -
     loaded = SCENARIOS[2]
     assert loaded.load == 2.0
     oracle.carry(loaded.load)
-    p = pack_parameters(robot, model.body, loaded, 2e-4)
+    p = pack_parameters(robot, loaded, 2e-4)
     actuators, still = robot.actuators(), np.zeros(robot.n_joints)
     for _ in range(20):
         q, v = random_state(rng, robot.n_joints)
@@ -108,7 +108,7 @@ def energy_drift(robot: Robot, timestep: float) -> float:
     model, oracle = physics_model(robot), Oracle(robot)
     q, v = random_state(np.random.default_rng(11), robot.n_joints)
     q[2] = 10.0
-    p = pack_parameters(robot, model.body, SCENARIOS[0], timestep)
+    p = pack_parameters(robot, SCENARIOS[0], timestep)
 
     def energy() -> float:
         potential = pin.computePotentialEnergy(oracle.model, oracle.data, oracle.q(q))

@@ -51,7 +51,7 @@ def test_inverse_kinematics_is_undone_by_pinocchios_forward_kinematics(
     )
     assert miss[0] == 0.0
     assert angles[0, 2] < 0.0, "knee up: the tibia bends down from the femur"
-    model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     data, q = model.createData(), pin.neutral(model)
     for name, angle in zip(robot.description.legs[leg].joints, angles[0], strict=True):
         q[model.joints[model.getJointId(name)].idx_q] = angle

@@ -10,7 +10,6 @@ import pytest
 
 from sim.controllers import CONTROLLERS
 from sim.kernel.observation import WalkLog
-from sim.kernel.physics_step import physics_model
 from sim.outcome import Status
 from sim.replay import Replay, replay, ticks_at
 from sim.robot import Robot, RobotVariant, load_robot, parse_robot
@@ -60,7 +59,7 @@ def test_the_bodys_pose_is_the_logs(robot: Robot, log: WalkLog) -> None:
 def test_the_poses_of_all_links_are_pinocchios(robot: Robot, log: WalkLog) -> None:
     """Joint by joint from the URDF, in another order of computation."""
     shown = replay(robot, log, rate=10)
-    model = pin.buildModelFromXML(robot.urdf, pin.JointModelFreeFlyer())
+    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     data = model.createData()
     tick = ticks_at(10, len(log.time))[7]
     q = np.concatenate([log.base_position[tick], log.base_orientation[tick], np.zeros(18)])
@@ -88,7 +87,7 @@ def test_a_foot_is_where_its_tibia_ends(robot: Robot, log: WalkLog) -> None:
 def test_at_the_start_feet_are_at_the_gaits_height(robot: Robot, log: WalkLog) -> None:
     """Soles of 10 mm, pressed together by 6.76 kg on six springs of 10 kN/m."""
     shown = replay(robot, log, rate=50)
-    height = 0.010 - physics_model(robot).total_mass * 9.81 / 60_000.0
+    height = 0.010 - robot.mass * 9.81 / 60_000.0
     np.testing.assert_allclose(shown.foot_position[0, :, 2], height, atol=1e-9)
     assert (shown.foot_force[0, :, 2] > 0.0).all()
 

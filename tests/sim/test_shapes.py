@@ -11,6 +11,7 @@ import pytest
 from sim.errors import RobotFileError
 from sim.robot import Robot, load_robot
 from sim.robot.shapes import Shape, VisibleLink, visible_links
+from sim.robot.urdf import parse_urdf
 
 WITHOUT = '<link name="body">'
 
@@ -21,7 +22,7 @@ def robot() -> Robot:
 
 
 def with_geometry(robot: Robot, geometry: str) -> Robot:
-    return replace(robot, urdf=robot.urdf.replace(WITHOUT, WITHOUT + geometry))
+    return replace(robot, urdf=parse_urdf(robot.urdf.text.replace(WITHOUT, WITHOUT + geometry)))
 
 
 def link(robot: Robot, name: str, **options: float) -> VisibleLink:
@@ -118,16 +119,16 @@ def test_what_is_fixed_to_a_part_is_of_that_part(robot: Robot) -> None:
         '<joint name="screws" type="fixed"><parent link="right_front_tibia_link"/>'
         '<child link="cover"/></joint></robot>'
     )
-    covered = replace(robot, urdf=robot.urdf.replace("</robot>", cover))
+    covered = replace(robot, urdf=parse_urdf(robot.urdf.text.replace("</robot>", cover)))
     assert [shape.role for shape in link(covered, "cover").shapes] == ["tibia"]
 
 
 @pytest.mark.parametrize(
     ("geometry", "named"),
     [
-        ('<box size="0.1 0.2"/>', "size='0.1 0.2' of a <box> is not three numbers"),
-        ('<sphere radius="round"/>', "radius='round' of a <sphere> is not a number"),
-        ("<cylinder radius='1'/>", "length='' of a <cylinder> is not a number"),
+        ('<box size="0.1 0.2"/>', "size='0.1 0.2' of <box> is not three numbers"),
+        ('<sphere radius="round"/>', "radius='round' of <sphere> is not a number"),
+        ("<cylinder radius='1'/>", "length='' of <cylinder> is not a number"),
     ],
 )
 def test_geometry_that_cannot_be_read_is_named(robot: Robot, geometry: str, named: str) -> None:

@@ -58,7 +58,7 @@ def test_every_variant_walks_every_scenario(variant: RobotVariant, scenario: Sce
 def test_karnopp_is_full_friction_against_each_axis_beyond_its_threshold() -> None:
     robot = load_robot(KARNOPP)
     model, rng = physics_model(robot), np.random.default_rng(2)
-    p = pack_parameters(robot, model.body, SCENARIOS[0], 2e-4)
+    p = pack_parameters(robot, SCENARIOS[0], 2e-4)
     still, seen = np.zeros(18), set()
     for _ in range(50):
         q = np.concatenate([[0, 0, 0.138, 0, 0, 0, 1], np.tile([0.0, -0.2, -1.6], 6)])

@@ -1,0 +1,77 @@
+"""Inertias of rigid bodies, as numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyInertia:
+    """Inertia of a rigid body in some frame.
+
+    Attributes:
+        mass: [kg].
+        centre: of mass, (3,) [m].
+        rotational: about the centre of mass, (3, 3) [kg m2].
+    """
+
+    mass: float
+    centre: Floats
+    rotational: Floats
+
+    def seen_from(self, rotation: Floats, position: Floats) -> BodyInertia:
+        """The same body in another frame.
+
+        Args:
+            rotation: from this frame to the other one, (3, 3).
+            position: of this frame's origin in the other one, (3,) [m].
+
+        Returns:
+            Its inertia there.
+        """
+        # A ball's inertia turns into itself. Pinocchio sets it apart too, and so rounds alike.
+        ball = self.rotational[2, 2] * np.eye(3)
+        turned = rotation @ (self.rotational - ball) @ rotation.T + ball
+        return BodyInertia(self.mass, rotation @ self.centre + position, turned)
+
+    def joined(self, other: BodyInertia) -> BodyInertia:
+        """Two bodies as one.
+
+        Args:
+            other: inertia of the second body in the same frame.
+
+        Returns:
+            Inertia of both.
+        """
+        mass = self.mass + other.mass
+        per_mass = 1.0 / max(mass, float(np.finfo(np.float64).eps))
+        reduced = self.mass * other.mass * per_mass
+        return BodyInertia(
+            mass,
+            self.centre * (self.mass * per_mass) + (other.mass * per_mass) * other.centre,
+            self.rotational
+            + other.rotational
+            + reduced * parallel_axis(self.centre - other.centre),
+        )
+
+
+NO_INERTIA: Final = BodyInertia(0.0, np.zeros(3), np.zeros((3, 3)))
+"""Of a link that has none."""
+
+
+def parallel_axis(offset: Floats) -> Floats:
+    """Rotational inertia of a unit point mass (Steiner's theorem).
+
+    Args:
+        offset: of the mass from the axes' origin, (3,) [m].
+
+    Returns:
+        (3, 3) [m2], to be multiplied by the mass [kg].
+    """
+    return float(offset @ offset) * np.eye(3) - np.outer(offset, offset)

@@ -1,0 +1,115 @@
+"""What is wrong with a robot.toml, told by field, line, and what the field means in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from pydantic import BaseModel, ValidationError
+
+from sim.former_names import as_written
+from sim.robot.description import (
+    Actuator,
+    Contact,
+    Gearhead,
+    Leg,
+    Motor,
+    Pwm,
+    RobotDescription,
+    Sensors,
+    Supply,
+)
+
+_TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_KEY: Final = re.compile(r"^\s*([^=#\[\]\s][^=]*?)\s*=")
+
+_PARTS: Final[tuple[type[BaseModel], ...]] = (
+    RobotDescription,
+    Motor,
+    Gearhead,
+    Actuator,
+    Supply,
+    Pwm,
+    Sensors,
+    Contact,
+    Leg,
+)
+
+
+def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]) -> str:
+    """The first thing that is wrong.
+
+    Args:
+        error: what pydantic says of the document.
+        text: of the file.
+        document: the text, parsed.
+
+    Returns:
+        One line for people, which names the field as the file does.
+    """
+    first = error.errors()[0]
+    location = as_written(document, first["loc"])
+    where = ".".join(str(part) for part in location)
+    line = line_of(text, [part for part in location if not _is_class(part)])
+    message = first["msg"].removeprefix("Value error, ")
+    meaning = _meaning(str(first["loc"][-1])) if first["loc"] else None
+    return (
+        "robot.toml"
+        + (f", line {line}" if line else "")
+        + (f": {where}" if where else "")
+        + f": {message}"
+        + (f" ({meaning})" if meaning else "")
+    )
+
+
+def line_of(text: str, path: Sequence[str | int]) -> int | None:
+    """Line of a field in a TOML file.
+
+    Follows tables, arrays of tables and dotted keys as robot files use them; inline tables count
+    as one line.
+
+    Args:
+        text: Text of the file.
+        path: Keys and indices from the root.
+
+    Returns:
+        Line of the field, or of the innermost table on its way, from 1 on; None if there is
+        neither.
+    """
+    found, depth = None, 0
+    table: list[str | int] = []
+    counts: dict[str, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := _TABLE.match(line):
+            names = _split(match[2])
+            table = list(names)
+            if match[1] == "[[":
+                index = counts.get(match[2], -1) + 1
+                counts[match[2]] = index
+                table.append(index)
+            here = table
+        elif match := _KEY.match(line):
+            here = [*table, *_split(match[1])]
+        else:
+            continue
+        if len(here) > depth and list(path[: len(here)]) == here:
+            found, depth = number, len(here)
+    return found
+
+
+def _split(key: str) -> list[str]:
+    return [part.strip().strip("\"'") for part in re.findall(r'"[^"]*"|\'[^\']*\'|[^.]+', key)]
+
+
+def _is_class(part: str | int) -> bool:
+    """Pydantic names the members of unions among the keys."""
+    return isinstance(part, str) and part[:1].isupper() and part.isidentifier()
+
+
+def _meaning(field: str) -> str | None:
+    """Description, with unit, of a field of any part of a robot description."""
+    for part in _PARTS:
+        if field in part.model_fields:
+            return part.model_fields[field].description
+    return None

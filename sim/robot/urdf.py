@@ -1,0 +1,289 @@
+"""A robot's URDF: its kinematic tree, inertias and geometry. No other module reads one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal, cast
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RobotFileError
+from sim.robot.inertia import NO_INERTIA, BodyInertia
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+Floats = NDArray[np.float64]
+
+SolidKind = Literal["box", "sphere", "cylinder", "capsule"]
+
+_SIZES: Final[Mapping[str, tuple[str, ...]]] = {
+    "box": ("size",),
+    "sphere": ("radius",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+}
+"""URDF's attributes of each solid, in the order of `Solid.size`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Origin:
+    """Where a frame lies in another one.
+
+    Attributes:
+        xyz: position, (3,) [m].
+        rpy: roll, pitch and yaw about the other frame's fixed axes, (3,) [rad].
+    """
+
+    xyz: Floats
+    rpy: Floats
+
+    def matrix(self) -> Floats:
+        """Rotation from the frame to the other one, (3, 3); exact if it does not turn."""
+        return self._rotation().as_matrix() if self.rpy.any() else np.eye(3)
+
+    def quaternion(self) -> Floats:
+        """Rotation from the frame to the other one as quaternion x y z w, (4,)."""
+        return self._rotation().as_quat()
+
+    def _rotation(self) -> Rotation:
+        # Slow to import, and most robots have no turned frame.
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+        return Rotation.from_euler("xyz", self.rpy)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """A joint of any type.
+
+    Attributes:
+        name: as in the file.
+        fixed: whether it never moves.
+        parent: link that carries it.
+        child: link that it carries.
+        origin: of the child's frame in the parent's, at rest.
+    """
+
+    name: str
+    fixed: bool
+    parent: str
+    child: str
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A simple solid that a link looks like.
+
+    Attributes:
+        kind: what it is.
+        size: edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a
+            capsule, a capsule's between the centres of its hemispheres [m].
+        origin: of its centre in the link's frame.
+    """
+
+    kind: SolidKind
+    size: Floats
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """A link.
+
+    Attributes:
+        name: as in the file.
+        inertia: in the link's frame; `NO_INERTIA` if the file gives none.
+        element: of the file.
+    """
+
+    name: str
+    inertia: BodyInertia
+    element: ET.Element
+
+    def solids(self) -> tuple[Solid, ...]:
+        """Solids of its visual geometry, or else of its collision geometry; meshes are left out.
+
+        Raises:
+            RobotFileError: A number of one cannot be read.
+        """
+        for use in ("visual", "collision"):
+            solids = [
+                self._solid(part, element)
+                for part in self.element.findall(use)
+                for element in part.findall("geometry/*")
+                if element.tag in _SIZES
+            ]
+            if solids:
+                return tuple(solids)
+        return ()
+
+    def _solid(self, part: ET.Element, solid: ET.Element) -> Solid:
+        whose = f"link {self.name!r}"
+        size = [_numbers(solid, name, whose) for name in _SIZES[solid.tag]]
+        return Solid(cast(SolidKind, solid.tag), np.concatenate(size), _origin(part, whose))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Urdf:
+    """A URDF that has been read.
+
+    Attributes:
+        text: of the file.
+        links: by name, parents before their children, the robot's body first.
+        joints: in the file's order.
+        bodies: inertia of every rigid body in the frame of its first link, the robot's body first.
+            Links that are fixed to one another are one rigid body, as in Pinocchio.
+    """
+
+    text: str
+    links: Mapping[str, Link]
+    joints: tuple[Joint, ...]
+    bodies: tuple[BodyInertia, ...]
+
+    @property
+    def body(self) -> BodyInertia:
+        """Inertia of the robot's body with all that is fixed to it."""
+        return self.bodies[0]
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of all bodies [kg]."""
+        return sum(body.mass for body in self.bodies)
+
+
+def parse_urdf(text: str) -> Urdf:
+    """Read a URDF.
+
+    Args:
+        text: Text of the file. It may come over the network: entities from outside are never
+            fetched, and entities that multiply are refused.
+
+    Returns:
+        What it says.
+
+    Raises:
+        RobotFileError: It is no XML, a number cannot be read, or its links are not one tree.
+    """
+    try:
+        root = ET.fromstring(text)  # noqa: S314  see above
+    except ET.ParseError as error:
+        raise RobotFileError(f"robot.urdf: {error}") from error
+    joints = tuple(_joint(element) for element in root.findall("joint"))
+    links: dict[str, Link] = {}
+    for element in root.findall("link"):
+        name = element.get("name", "")
+        if name in links:
+            raise RobotFileError(f"robot.urdf: there are two links {name!r}")
+        links[name] = Link(name, _inertia(element, f"link {name!r}"), element)
+    in_order = {name: links[name] for name in _from_the_body(links, joints)}
+    return Urdf(text, in_order, joints, tuple(_rigid_bodies(in_order, joints)))
+
+
+def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterator[str]:
+    """Names of the links, parents before children, each generation in the file's order."""
+    children: dict[str, list[str]] = {name: [] for name in links}
+    carried: set[str] = set()
+    for joint in joints:
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                raise RobotFileError(
+                    f"robot.urdf: joint {joint.name!r} joins a link {end!r} that is not there"
+                )
+        if joint.child in carried:
+            raise RobotFileError(f"robot.urdf: two joints carry the link {joint.child!r}")
+        carried.add(joint.child)
+        children[joint.parent].append(joint.child)
+    generation = [name for name in links if name not in carried]
+    if len(generation) != 1:
+        raise RobotFileError(
+            "robot.urdf: one link, the body, must hang on no joint; these do:"
+            f" {', '.join(map(repr, generation)) or 'none'}"
+        )
+    place = {name: k for k, name in enumerate(links)}
+    left = set(links)
+    while generation:
+        yield from generation
+        left.difference_update(generation)
+        generation = sorted(
+            (c for name in generation for c in children[name]), key=place.__getitem__
+        )
+    if left:
+        raise RobotFileError(f"robot.urdf: link {min(left)!r} hangs on no body")
+
+
+def _rigid_bodies(links: Mapping[str, Link], joints: Sequence[Joint]) -> list[BodyInertia]:
+    """Depth first in the order of the joints' names, as Pinocchio numbers its joints."""
+    carried: dict[str, list[Joint]] = {name: [] for name in links}
+    for joint in sorted(joints, key=lambda joint: joint.name, reverse=True):
+        carried[joint.parent].append(joint)
+    bodies: list[BodyInertia] = []
+    # A link, the body that it is fixed to (None: it begins one), and its frame in that body's.
+    waiting: list[tuple[str, int | None, Floats, Floats]]
+    waiting = [(name, None, np.eye(3), np.zeros(3)) for name in list(links)[:1]]
+    while waiting:
+        name, body, rotation, position = waiting.pop()
+        if body is None:
+            body = len(bodies)
+            bodies.append(NO_INERTIA)
+        bodies[body] = bodies[body].joined(links[name].inertia.seen_from(rotation, position))
+        for joint in carried[name]:
+            if joint.fixed:
+                turned, at = rotation @ joint.origin.matrix(), rotation @ joint.origin.xyz
+                waiting.append((joint.child, body, turned, position + at))
+            else:
+                waiting.append((joint.child, None, np.eye(3), np.zeros(3)))
+    return bodies
+
+
+def _joint(element: ET.Element) -> Joint:
+    name = element.get("name", "")
+    ends = [element.find(end) for end in ("parent", "child")]
+    parent, child = ("" if end is None else end.get("link", "") for end in ends)
+    fixed = element.get("type") == "fixed"
+    return Joint(name, fixed, parent, child, _origin(element, f"joint {name!r}"))
+
+
+def _inertia(link: ET.Element, whose: str) -> BodyInertia:
+    inertial = link.find("inertial")
+    if inertial is None:
+        return NO_INERTIA
+    mass, tensor = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or tensor is None:
+        raise RobotFileError(f"robot.urdf: {whose}: its <inertial> needs a <mass> and an <inertia>")
+    xx, yy, zz, xy, xz, yz = (
+        float(_numbers(tensor, name, whose)[0])
+        for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    )
+    origin = _origin(inertial, whose)
+    turn = origin.matrix()
+    rotational = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    return BodyInertia(float(_numbers(mass, "value", whose)[0]), origin.xyz, rotational)
+
+
+def _origin(element: ET.Element, whose: str) -> Origin:
+    origin = element.find("origin")
+    if origin is None:
+        return Origin(np.zeros(3), np.zeros(3))
+    xyz, rpy = (_numbers(origin, name, whose, "0 0 0") for name in ("xyz", "rpy"))
+    return Origin(xyz, rpy)
+
+
+def _numbers(element: ET.Element, attribute: str, whose: str, default: str = "") -> Floats:
+    """Numbers of an attribute: three of a vector, else one."""
+    text = element.get(attribute, default)
+    count = 3 if attribute in ("xyz", "rpy", "size") else 1
+    try:
+        values = np.array([float(part) for part in text.split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != count or not np.isfinite(values).all():
+        raise RobotFileError(
+            f"robot.urdf: {whose}: {attribute}={text!r} of <{element.tag}> is not"
+            f" {'three numbers' if count == 3 else 'a number'}"
+        )
+    return values

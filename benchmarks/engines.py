@@ -21,10 +21,11 @@ import numpy as np
 from mujoco.rollout import Rollout
 
 from benchmarks.physics import native, pinocchio_aba
+from sim.assembly import PHYSICS_RATE
 from sim.kernel.observation import WalkLog
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
-from sim.simulate import PHYSICS_RATE, simulate
+from sim.simulate import simulate
 from tests.mujoco.export import Feet, model
 from tests.mujoco.walker import CONTROL_PERIOD, drag_of
 

@@ -16,13 +16,13 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
+from sim.assembly import PHYSICS_RATE, plan_walk
 from sim.benchmark import measure
 from sim.controllers import CONTROLLERS
 from sim.kernel.physics_step import physics_model
-from sim.kernel.reference import Stepper, reference_kernel
+from sim.kernel.reference import Stepper
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
-from sim.simulate import PHYSICS_RATE, course_of
 
 
 def native() -> float:
@@ -33,9 +33,9 @@ def native() -> float:
 def interpreter() -> Callable[[], float]:
     """The same physics step in CasADi's virtual machine, without control; us a step."""
     robot = load_robot("szabadka2")
-    course = course_of(robot, reference_kernel(robot), SCENARIOS[0], 1.0 / PHYSICS_RATE)
-    assert course is not None
-    setup = course(CONTROLLERS["p"].compile({"P": 0.25}))
+    plan = plan_walk(robot, SCENARIOS[0], 1.0 / PHYSICS_RATE)
+    assert plan is not None
+    setup = plan(CONTROLLERS["p"].compile({"P": 0.25}))
     stepper = Stepper(physics_model(robot).step, setup)
 
     def run() -> float:

@@ -68,8 +68,8 @@ def read_walk(
     from cli.design_file import read_design
     from cli.robots import chosen_robot, chosen_scenarios
     from sim.robot import load_robot
-    from sim.scenario import GAIT_VARIABLE_NAMES
-    from sim.simulate import check_reach, with_gait
+    from sim.scenario import GAIT_VARIABLE_NAMES, with_gait
+    from sim.simulate import check_reach
 
     values = read_design(design, controller, trajectory)
     for name, value in values.items():

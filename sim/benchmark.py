@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.assembly import PHYSICS_RATE, Backend
 from sim.controllers import CONTROLLERS
 from sim.scenario import SCENARIOS
-from sim.simulate import PHYSICS_RATE, Backend, lanes, prepare, simulate
+from sim.simulate import lanes, prepare, simulate
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from sim import former_names
 from sim.choice import NAME, OWN, alternatives
@@ -160,12 +169,50 @@ SCENARIOS: Final[tuple[Scenario, ...]] = (
 
 
 def find_scenario(name: str) -> Scenario:
-    """Preset by name, or by its number 1..6 in table 4.2."""
+    """A preset.
+
+    Args:
+        name: Of the scenario, or its number 1 to 6 in table 4.2.
+
+    Returns:
+        The scenario.
+
+    Raises:
+        SimulationInputError: There is none; names those that there are.
+    """
     for number, scenario in enumerate(SCENARIOS, start=1):
         if name in (scenario.name, str(number)):
             return scenario
     known = ", ".join(f"{k} {s.name}" for k, s in enumerate(SCENARIOS, start=1))
     raise SimulationInputError(f"unknown scenario {name!r}; known are {known}")
+
+
+def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
+    """A scenario with other gait parameters.
+
+    Args:
+        scenario: The scenario.
+        gait: Values of some of `GAIT_VARIABLES` by name.
+
+    Returns:
+        The scenario, or a copy of it if the gait changes anything.
+
+    Raises:
+        SimulationInputError: A value is none that a scenario can have; names the field.
+    """
+    if not gait:
+        return scenario
+    values: dict[str, float] = dict(gait)
+    if "fir_ms" in values:
+        if not float(values["fir_ms"]).is_integer():
+            raise SimulationInputError(f"fir_ms: {values['fir_ms']:g} is not a whole number of ms")
+        values["fir_ms"] = int(values["fir_ms"])
+    try:
+        return Scenario.model_validate(scenario.model_dump() | values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise SimulationInputError(f"{where}: {first['msg']}") from error
 
 
 def _preset_exists(name: str) -> str:

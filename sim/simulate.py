@@ -2,52 +2,34 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
+from sim.assembly import PHYSICS_RATE, Backend, control_steps, judge, kernel_of, plan_walk
 from sim.compiler.compilation import target
 from sim.controllers import CONTROLLERS, ControlLaw
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
-from sim.gait.trajectory import Trajectory, desired_angles, require_reachable
-from sim.kernel.native import native_kernel
+from sim.gait.trajectory import desired_angles, require_reachable
 from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.parameters import gravity_on, pack_parameters
-from sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup
+from sim.kernel.walk import Coding, WalkSetup
 from sim.noise import LinkNoise
 from sim.outcome import N_OBJECTIVES, Outcome, Status
-from sim.robot import Robot, RobotFiles, RobotVariant, load_robot
-from sim.robot.posture import resting_height
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
-
-Backend = Literal["auto", "native", "reference"]
-
-PHYSICS_RATE: Final = 5000
-"""Physics steps a second [Hz]; the control rate is 500 Hz."""
-
-BACKLASH_PHYSICS_RATE: Final = 20_000
-"""Rate [Hz] for robots with backlash: without their rotors, tibias answer the ground too fast for
-5 kHz."""
-
-RobotChoice = str | RobotVariant | RobotFiles | Robot
-"""How a robot is named to the simulator."""
-
-SHORTEST_WALK: Final = 1e-3
-"""Distance [m] under which a robot counts as not walking: energy per metre has no value."""
+from sim.robot import Robot, RobotChoice, load_robot
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """Outcome of every design and, if asked for, every walk's log, in the order of the designs.
+    """What designs came to, in their order.
 
-    A design that was never simulated (unreachable) has no log; one that ended early has NaN after.
+    Attributes:
+        outcome: of all designs.
+        logs: of every walk, if they were asked for. A design that was never simulated
+            (unreachable) has none; one that ended early has NaN after its end.
     """
 
     outcome: Outcome
@@ -69,15 +51,25 @@ def simulate(
 ) -> Simulation:
     """Let every design walk through a scenario.
 
-    robot: a shipped robot by name, a variant of one, or a `Robot` of your own; with backlash it is
-        simulated at `BACKLASH_PHYSICS_RATE` at least.
-    planner: the robot that the desired angles are for, if its legs differ from the robot's.
-    designs: (n, len(variables)); columns are controller variables (all of them) and gait
-        variables (any of them, replacing the scenario's value).
-    backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first
-        that works on this machine (with a warning if it is the slow one).
+    Args:
+        scenario: Gait, posture, load and ground.
+        controller: Name of the motor controller, one of `CONTROLLERS`.
+        variables: Columns of the designs: all variables of the controller, and any of
+            `GAIT_VARIABLES`, which replace the scenario's values.
+        designs: (n, len(variables)), in the variables' units.
+        robot: A shipped robot by name, a variant of one, or a `Robot` of your own; with backlash
+            it is simulated at `BACKLASH_PHYSICS_RATE` at least.
+        planner: The robot that the desired angles are for, if its legs differ from the robot's.
+        noise: Torques on the robot's links.
+        log: Whether to keep every walk's log.
+        backend: Which kernel; with `auto` a warning says if it is the slow one.
+        physics_rate: Physics steps a second [Hz], a multiple of the control rate.
 
-    Raises SimulationInputError that names the variable for a design that cannot be simulated.
+    Returns:
+        Outcomes and logs. A design's bits do not depend on the designs beside it.
+
+    Raises:
+        SimulationInputError: A design cannot be simulated; names the variable.
     """
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
@@ -86,25 +78,24 @@ def simulate(
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
     setups: dict[int, WalkSetup] = {}
-    courses: dict[tuple[float, ...], Callable[[ControlLaw], WalkSetup] | None] = {}
+    plans: dict[tuple[float, ...], Callable[[ControlLaw], WalkSetup] | None] = {}
     for index, row in enumerate(designs.tolist()):
         design = dict(zip(variables, row, strict=True))
         gait = {name: design.pop(name) for name in variables if name in GAIT_VARIABLE_NAMES}
         control_law = CONTROLLERS[controller].compile(design)  # type: ignore[index]
         key = tuple(gait.values())
-        if key not in courses:
+        if key not in plans:
             walked = with_gait(scenario, gait)
-            courses[key] = course_of(
+            plans[key] = plan_walk(
                 machine,
-                kernel,
                 walked,
                 timestep,
                 noise,
                 trajectory=None if planner is None else desired_angles(planner, walked),
             )
-        course = courses[key]
-        if course is not None:
-            setups[index] = course(control_law)
+        plan = plans[key]
+        if plan is not None:
+            setups[index] = plan(control_law)
     results = kernel.walk(list(setups.values()), Coding.of(machine, substeps), log=log)
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
@@ -114,23 +105,6 @@ def simulate(
     return Simulation(Outcome(objectives, statuses), tuple(logs) if log else ())
 
 
-def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
-    """The scenario with some gait parameters replaced. Raises SimulationInputError."""
-    if not gait:
-        return scenario
-    values: dict[str, float] = dict(gait)
-    if "fir_ms" in values:
-        if not float(values["fir_ms"]).is_integer():
-            raise SimulationInputError(f"fir_ms: {values['fir_ms']:g} is not a whole number of ms")
-        values["fir_ms"] = int(values["fir_ms"])
-    try:
-        return Scenario.model_validate(scenario.model_dump() | values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise SimulationInputError(f"{where}: {first['msg']}") from error
-
-
 def check_reach(
     scenario: Scenario,
     variables: Sequence[str],
@@ -138,7 +112,17 @@ def check_reach(
     *,
     robot: RobotChoice,
 ) -> None:
-    """Raise UnreachablePose if the gait of this design leaves the legs' reach in this scenario."""
+    """Check that the legs reach all of a walk.
+
+    Args:
+        scenario: The walk.
+        variables: Names of the design's values.
+        design: Values, of which those of `GAIT_VARIABLES` replace the scenario's.
+        robot: The robot that is to walk.
+
+    Raises:
+        UnreachablePose: A foot's target lies outside its leg's reach.
+    """
     gait = {
         name: value
         for name, value in zip(variables, design, strict=True)
@@ -148,7 +132,15 @@ def check_reach(
 
 
 def prepare(robot: RobotChoice = "szabadka2", *, backend: Backend = "auto") -> str:
-    """Build (or find in the cache) the kernel; returns the backend in use, native or reference."""
+    """Build a robot's kernel, or find it in the cache.
+
+    Args:
+        robot: The robot that is going to walk.
+        backend: Which kernel.
+
+    Returns:
+        The backend in use, `native` or `reference`.
+    """
     return kernel_of(load_robot(robot), backend).backend
 
 
@@ -184,88 +176,3 @@ def _check_arguments(
         raise SimulationInputError(
             f"physics_rate: {physics_rate} Hz is not a multiple of the control rate from 1000 Hz"
         )
-
-
-def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[int, float]:
-    """Physics steps a control tick, and their length [s]."""
-    if robot.has_backlash:
-        physics_rate = max(physics_rate, BACKLASH_PHYSICS_RATE)
-    return round(physics_rate * CONTROL_PERIOD), 1.0 / physics_rate
-
-
-def kernel_of(robot: Robot, backend: Backend = "auto") -> Kernel:
-    """The robot's kernel, built if there is none yet; with a warning if it is the slow one."""
-    if backend != "reference":
-        native = native_kernel(robot)
-        if native is not None:
-            return native
-        if backend == "native":
-            raise SimulationInputError("backend: no C compiler found for the native kernel")
-        warnings.warn(
-            "no C compiler found: simulating with the interpreter, some hundred times slower;"
-            " install gcc or clang, or `pip install gaitswarm[compiler]`",
-            RuntimeWarning,
-            stacklevel=3,
-        )
-    # The native kernel does without CasADi and Pinocchio, which are slow to import.
-    from sim.kernel.reference import reference_kernel  # noqa: PLC0415
-
-    return reference_kernel(robot)
-
-
-def course_of(
-    robot: Robot,
-    kernel: Kernel,
-    scenario: Scenario,
-    timestep: float,
-    noise: LinkNoise | None = None,
-    *,
-    trajectory: Trajectory | None = None,
-) -> Callable[[ControlLaw], WalkSetup] | None:
-    """All of a walk but its control law, which designs of one gait share.
-
-    trajectory: desired angles, if they are not those for this robot's legs.
-    None for a gait out of the legs' reach.
-    """
-    trajectory = trajectory or desired_angles(robot, scenario)
-    if not trajectory.reachable:
-        return None
-    ticks, n_joints = trajectory.angles.shape
-    weight = (robot.mass + scenario.load) * -gravity_on(scenario.slope)[2]
-    joints = trajectory.angles[0]
-    internal_state = np.zeros(kernel.internal_state_size)
-    if robot.has_backlash:
-        internal_state[:n_joints] = joints
-    codes = np.rint(trajectory.angles * robot.description.sensors.angle_counts)
-    return partial(
-        WalkSetup,
-        np.concatenate(
-            [
-                [0.0, 0.0, resting_height(robot, joints, weight), 0.0, 0.0, 0.0, 1.0],
-                joints,
-            ]
-        ),
-        internal_state,
-        pack_parameters(robot, scenario, timestep),
-        codes.astype(np.int32),
-        fall_height=0.5 * scenario.hip_height,
-        disturbance=None if noise is None else noise.torques(ticks, n_joints),
-    )
-
-
-def judge(
-    setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
-) -> tuple[Status, NDArray[np.float64]]:
-    """Status and objectives f1..f6 (table 4.1) from the sums over physics steps."""
-    objectives = np.full(N_OBJECTIVES, np.nan)
-    if result.status is not Status.OK:
-        return result.status, objectives
-    steps = setup.ticks * substeps
-    objectives[:3] = np.sqrt(result.sums[:3] / steps)
-    objectives[5] = result.end[2] - setup.start[2]
-    distance = result.sums[4] * timestep
-    if distance < SHORTEST_WALK:
-        return Status.STALLED, objectives
-    objectives[3] = result.sums[3] * timestep / distance
-    objectives[4] = steps * timestep / distance
-    return Status.OK, objectives

@@ -30,8 +30,8 @@ def bench(
 
     from cli.output import print_text
     from services.optimizer.errors import InvalidRequest
+    from sim.assembly import Backend
     from sim.benchmark import measure
-    from sim.simulate import Backend
 
     for known in get_args(Backend):
         if backend == known:

@@ -10,8 +10,8 @@ from gaitswarm.views.replay import encoded_replay
 from sim.outcome import Status
 from sim.replay import CONTROL_RATE, replay
 from sim.robot import load_robot
-from sim.scenario import GAIT_VARIABLE_NAMES, ScenarioChoice
-from sim.simulate import simulate, with_gait
+from sim.scenario import GAIT_VARIABLE_NAMES, ScenarioChoice, with_gait
+from sim.simulate import simulate
 
 
 class ReplayRequest(WalkRequest):

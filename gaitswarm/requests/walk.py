@@ -11,11 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
+from sim.assembly import Backend
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.robot import RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
-from sim.simulate import Backend, check_reach, simulate
+from sim.simulate import check_reach, simulate
 from sim.variables import VariableName
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])

@@ -26,8 +26,8 @@ from sim.errors import SimulationInputError
 from sim.identification.parameters import with_parameters
 from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
-from sim.scenario import GAIT_VARIABLE_NAMES
-from sim.simulate import check_reach, with_gait
+from sim.scenario import GAIT_VARIABLE_NAMES, with_gait
+from sim.simulate import check_reach
 from sim.variables import Variable
 
 _PIECE: Final = 16

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.assembly import control_steps, kernel_of, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
@@ -18,7 +19,7 @@ from sim.kernel.walk import Coding
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
 from sim.robot.description import JOINTS_PER_LEG
-from sim.simulate import control_steps, course_of, kernel_of, with_gait
+from sim.scenario import with_gait
 
 Floats = NDArray[np.float64]
 
@@ -73,10 +74,10 @@ class CurrentFit:
         trajectory = desired_angles(described, scenario)
         setups = []
         for robot in robots:
-            course = course_of(robot, kernel, scenario, timestep, trajectory=trajectory)
-            if course is None:
+            plan = plan_walk(robot, scenario, timestep, trajectory=trajectory)
+            if plan is None:
                 raise SimulationInputError(f"{self.name}: the gait leaves the legs' reach")
-            setups.append(course(control_law))
+            setups.append(plan(control_law))
         results = kernel.walk(setups, Coding.of(described, substeps), log=True)
         errors = np.full((len(designs), JOINTS_PER_LEG), np.nan)
         statuses = np.full(len(designs), Status.OK, dtype=np.uint8)

@@ -7,7 +7,7 @@ frame of their own link, as in Pinocchio, which stays the oracle that this is te
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,6 @@ import numpy as np
 
 from sim.errors import RobotFileError
 from sim.kernel.spatial import (
-    ZERO,
     Matrix,
     Scalar,
     Vector,
@@ -245,7 +244,6 @@ def articulated_body(
     armature: Sequence[float],
     external: Mapping[int, Force],
     gravity: Vector,
-    invert: Callable[[Scalar], Scalar] = lambda x: 1.0 / x,
 ) -> Acceleration:
     """Second and third pass: accelerations under torques, external forces and gravity.
 
@@ -280,7 +278,7 @@ def articulated_body(
             cross(state.velocity.angular, turning),
         )
         column = Force(apply(inertia.coupling, link.axis), apply(inertia.angular, link.axis))
-        pivot = invert(dot(link.axis, column.angular) + armature[k - 1])
+        pivot = 1.0 / (dot(link.axis, column.angular) + armature[k - 1])
         force = forces[k].plus(inertia.times(coriolis))
         free = pivot * (torques[k - 1] - dot(link.axis, force.angular))
         passed.append((column, pivot, free))
@@ -300,7 +298,7 @@ def articulated_body(
     coriolises.reverse()
 
     # Accelerations are relative to free fall until gravity is put back at the end.
-    accelerations = [_solve(inertias[0], forces[0], invert)]
+    accelerations = [_solve(inertias[0], forces[0])]
     joints = []
     for k, link in enumerate(links, start=1):
         (column, pivot, free), coriolis = passed[k - 1], coriolises[k - 1]
@@ -334,7 +332,7 @@ def _body_inertia(inertia: Any) -> Inertia:
     return Inertia.of_body(mass, (x, y, z), (rows[0], rows[1], rows[2]))  # type: ignore[arg-type]
 
 
-def _solve(inertia: Inertia, force: Force, invert: Callable[[Scalar], Scalar]) -> Motion:
+def _solve(inertia: Inertia, force: Force) -> Motion:
     """Motion a with inertia a = -force, by an unrolled LDL^T factorisation."""
     rows: list[list[Scalar]] = [[*inertia.linear[i], *inertia.coupling[i]] for i in range(3)] + [
         [*transpose(inertia.coupling)[i], *inertia.angular[i]] for i in range(3)
@@ -348,7 +346,7 @@ def _solve(inertia: Inertia, force: Force, invert: Callable[[Scalar], Scalar]) -
         for k in range(j):
             pivot = pivot - lower[j][k] * lower[j][k] * pivots[k]
         pivots.append(pivot)
-        inverses.append(invert(pivot))
+        inverses.append(1.0 / pivot)
         for i in range(j + 1, n):
             entry = rows[j][i]
             for k in range(j):
@@ -363,6 +361,3 @@ def _solve(inertia: Inertia, force: Force, invert: Callable[[Scalar], Scalar]) -
         for k in range(i + 1, n):
             x[i] = x[i] - lower[k][i] * x[k]
     return Motion((x[0], x[1], x[2]), (x[3], x[4], x[5]))
-
-
-REST = Motion(ZERO, ZERO)

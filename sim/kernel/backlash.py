@@ -6,18 +6,25 @@ a second inertia that touches the link at either end of the play through a stiff
 
 from __future__ import annotations
 
-from typing import Any
+import casadi as ca
 
 from sim.kernel.spatial import Scalar
 
 
 def shaft_torque(
-    ca: Any, ahead: Scalar, rate: Scalar, play: Scalar, stiffness: float, damping: float
+    ahead: Scalar, rate: Scalar, play: Scalar, stiffness: float, damping: float
 ) -> Scalar:
-    """Torque [N m] on the link.
+    """Torque of a stiff, damped shaft on the link; it pushes, but never pulls into the play.
 
-    ahead: motor side's angle less the link's [rad], rate: its derivative [rad/s], play: end to
-    end [rad]. It never pulls the link back into the play.
+    Args:
+        ahead: Motor side's angle less the link's [rad].
+        rate: Derivative of `ahead` [rad/s].
+        play: End to end [rad].
+        stiffness: Of the closed play [N m/rad].
+        damping: Of the closed play [N m s/rad].
+
+    Returns:
+        Torque on the link [N m].
     """
     half = 0.5 * play
     drag = damping * rate

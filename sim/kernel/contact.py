@@ -1,29 +1,38 @@
-"""Ground contact of a point foot and its laws of friction (thesis 2.2.6).
+"""Ground contact of a point foot and its laws of friction, as symbols (thesis 2.2.6).
 
-Each law is a function (foot, ground, internal state, timestep) -> (force, internal state after the
-step); the internal state is what a law carries from step to step, for most of them nothing.
+What a law reads and carries from step to step, as data: `sim.kernel.parameters.CONTACT_LAWS`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
+
+import casadi as ca
 
 from sim.kernel.articulated_body import Force, LinkState
 from sim.kernel.spatial import Scalar, Vector, add, cross, dot, scale
 from sim.robot.description import ContactLaw
 
 InternalState = tuple[Scalar, ...]
+"""What a law carries of one foot from step to step; for most laws nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Foot:
     """A foot in its link's frame.
 
-    at: the tibia's end [m]; up, ahead, left: the world's axes; velocity [m/s], rising: its part
-    along `up`; normal: force of the ground's spring [N]; touching: 1 or 0.
+    Attributes:
+        at: the tibia's end [m].
+        up: the ground's normal.
+        ahead: the world's x axis.
+        left: the world's y axis.
+        velocity: of the tibia's end [m/s].
+        rising: part of the velocity along `up` [m/s].
+        normal: force of the ground's spring [N].
+        touching: 1 on the ground, 0 in the air.
     """
 
     at: Vector
@@ -36,15 +45,36 @@ class Foot:
     touching: Scalar
 
     def on_link(self, force: Vector) -> Force:
-        """A force at the foot as a spatial force on its link."""
+        """A force at the foot as a spatial force on its link.
+
+        Args:
+            force: In the link's frame [N].
+
+        Returns:
+            The same about the link's origin.
+        """
         return Force(force, cross(self.at, force))
 
 
-def foot_on_ground(ca: Any, link: LinkState, at: Vector, ground: Mapping[str, Scalar]) -> Foot:
+Friction = Callable[
+    [Foot, Mapping[str, Scalar], InternalState, Scalar], tuple[Force, InternalState]
+]
+"""A law of friction: (foot, ground, internal state, timestep) -> (force on the link, internal state
+after the step)."""
+
+
+def foot_on_ground(link: LinkState, at: Vector, ground: Mapping[str, Scalar]) -> Foot:
     """F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling.
 
-    The sole's spring hangs below the tibia's end along the ground's normal. ground: parameters of
-    the foot by the names of `sim.robot.description.Contact`.
+    The sole's spring hangs below the tibia's end along the ground's normal.
+
+    Args:
+        link: State of the tibia.
+        at: The tibia's end in its frame [m].
+        ground: Parameters of the foot by the names of `sim.robot.description.Contact`.
+
+    Returns:
+        The foot.
     """
     velocity = add(link.velocity.linear, cross(link.velocity.angular, at))
     penetration = ground["sole"] - (link.height + dot(link.up, at))
@@ -64,13 +94,19 @@ def foot_on_ground(ca: Any, link: LinkState, at: Vector, ground: Mapping[str, Sc
 
 
 def linear_zone(
-    ca: Any,
-    foot: Foot,
-    ground: Mapping[str, Scalar],
-    internal_state: InternalState,
-    timestep: Scalar,
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> tuple[Force, InternalState]:
-    """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6)."""
+    """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6).
+
+    Args:
+        foot: The foot.
+        ground: Its `friction` and `slip_velocity`.
+        internal_state: Nothing.
+        timestep: Not needed.
+
+    Returns:
+        Force on the link; nothing.
+    """
     del internal_state, timestep
     zone = ground["slip_velocity"]
     # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
@@ -82,14 +118,20 @@ def linear_zone(
 
 
 def karnopp(
-    ca: Any,
-    foot: Foot,
-    ground: Mapping[str, Scalar],
-    internal_state: InternalState,
-    timestep: Scalar,
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> tuple[Force, InternalState]:
-    """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14)."""
-    del ca, internal_state, timestep
+    """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14).
+
+    Args:
+        foot: The foot.
+        ground: Its `friction` and `stick_velocity`.
+        internal_state: Nothing.
+        timestep: Not needed.
+
+    Returns:
+        Force on the link; nothing.
+    """
+    del internal_state, timestep
     threshold, limit = ground["stick_velocity"], ground["friction"] * foot.normal
     force = scale(foot.normal, foot.up)
     for axis in (foot.ahead, foot.left):
@@ -100,16 +142,19 @@ def karnopp(
 
 
 def stick(
-    ca: Any,
-    foot: Foot,
-    ground: Mapping[str, Scalar],
-    internal_state: InternalState,
-    timestep: Scalar,
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> tuple[Force, InternalState]:
     """Spring and damper along the ground from where the foot came down, saturated at mu F_z.
 
-    internal_state: the spring's elongation along the world's x and y [m]; it shrinks when the foot
-    slips, and is gone when it lifts off.
+    Args:
+        foot: The foot.
+        ground: Its `friction`, `stick_stiffness` and `stick_damping`.
+        internal_state: The spring's elongation along the world's x and y [m].
+        timestep: Of the physics [s].
+
+    Returns:
+        Force on the link; the elongation after the step, which shrinks when the foot slips, and is
+        gone when it lifts off.
     """
     k, c = ground["stick_stiffness"], ground["stick_damping"]
     stretched, wanted = [], []
@@ -128,24 +173,7 @@ def stick(
     return foot.on_link(force), tuple(share * longer for longer in stretched)
 
 
-@dataclass(frozen=True, slots=True)
-class Law:
-    """A law of friction.
-
-    internal_state_size: numbers that it carries by foot; parameters: that it reads.
-    """
-
-    force: Callable[..., tuple[Force, InternalState]]
-    internal_state_size: int
-    parameters: Sequence[str]
-
-
-_NORMAL: Final = ("stiffness", "damping", "sole", "friction")
-
-LAWS: Final[Mapping[ContactLaw, Law]] = MappingProxyType(
-    {
-        "linear_zone": Law(linear_zone, 0, (*_NORMAL, "slip_velocity")),
-        "karnopp": Law(karnopp, 0, (*_NORMAL, "stick_velocity")),
-        "stick": Law(stick, 2, (*_NORMAL, "stick_stiffness", "stick_damping")),
-    }
+FRICTION: Final[Mapping[ContactLaw, Friction]] = MappingProxyType(
+    {"linear_zone": linear_zone, "karnopp": karnopp, "stick": stick}
 )
+"""By name."""

@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any, Final
 
+import casadi
+
 from sim.errors import SimulationError
 
 _BINARY: Final[dict[str, str]] = {
@@ -37,8 +39,6 @@ def emit_c(function: Any, name: str) -> str:
 
 class _Emitter:
     def __init__(self, function: Any) -> None:
-        import casadi  # noqa: PLC0415  only to compile
-
         self._function = function
         self._names = {
             getattr(casadi, n): n

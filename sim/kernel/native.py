@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sim.compiler.compilation import load_library, vector_header
 from sim.controllers.base import LookupTable, Response
 from sim.errors import SimulationInputError
-from sim.kernel.parameters import Layout
+from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.walk import Coding, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
@@ -229,7 +229,7 @@ def _source_of(robot: Robot) -> Callable[[], str]:
     def source() -> str:
         # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
         from sim.kernel.emit_c import emit_c  # noqa: PLC0415
-        from sim.kernel.physics_step import internal_state_size, physics_model  # noqa: PLC0415
+        from sim.kernel.physics_step import physics_model  # noqa: PLC0415
 
         model = physics_model(robot)
         folder = resources.files("sim.kernel")

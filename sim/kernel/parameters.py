@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.contact import LAWS
 from sim.robot import Robot
+from sim.robot.description import ContactLaw
 from sim.robot.inertia import parallel_axis
 from sim.scenario import Scenario
 
@@ -18,6 +22,46 @@ GRAVITY = 9.81
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True)
+class ContactData:
+    """What a law of contact needs of the kernel's inputs.
+
+    Attributes:
+        parameters: that it reads by foot, fields of `sim.robot.description.Contact`.
+        internal_state_size: numbers that it carries by foot from step to step.
+    """
+
+    parameters: tuple[str, ...]
+    internal_state_size: int = 0
+
+
+_NORMAL: Final = ("stiffness", "damping", "sole", "friction")
+
+CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
+    {
+        "linear_zone": ContactData((*_NORMAL, "slip_velocity")),
+        "karnopp": ContactData((*_NORMAL, "stick_velocity")),
+        "stick": ContactData((*_NORMAL, "stick_stiffness", "stick_damping"), 2),
+    }
+)
+"""By name; their formulas are in `sim.kernel.contact`."""
+
+
+def internal_state_size(robot: Robot) -> int:
+    """Length of the internal state: what a walk carries beside q and v.
+
+    Args:
+        robot: With backlash, angles [rad] and rates [rad/s] of its motors come first; then what
+            the law of contact carries, foot by foot.
+
+    Returns:
+        I.
+    """
+    motors = 2 * robot.n_joints if robot.has_backlash else 0
+    law = CONTACT_LAWS[robot.description.contact_law]
+    return motors + law.internal_state_size * len(robot.legs)
+
+
 class Layout:
     """Where each parameter lies in the kernel's flat parameter vector.
 
@@ -25,11 +69,18 @@ class Layout:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
     supply_resistance (1), backlash (J, if the robot has any), and by foot (L each) the parameters
     of the contact law.
+
+    Args:
+        robot: The robot.
+
+    Attributes:
+        slices: by field.
+        size: P, length of the vector.
     """
 
     def __init__(self, robot: Robot) -> None:
         n_joints, n_feet = robot.n_joints, len(robot.legs)
-        law = LAWS[robot.description.contact_law]
+        law = CONTACT_LAWS[robot.description.contact_law]
         lengths = {
             "timestep": 1,
             "gravity": 3,
@@ -50,7 +101,17 @@ class Layout:
         self.size = start
 
     def pack(self, **values: float | Floats) -> Floats:
-        """All fields by name -> (size,)."""
+        """The vector.
+
+        Args:
+            values: All fields by name, each a number or of the field's length.
+
+        Returns:
+            (size,).
+
+        Raises:
+            KeyError: A field is missing, or there is no such field.
+        """
         if values.keys() != self.slices.keys():
             raise KeyError(sorted(values.keys() ^ self.slices.keys()))
         packed = np.empty(self.size)
@@ -60,9 +121,14 @@ class Layout:
 
 
 def gravity_on(slope: float, direction: float = 0.0) -> Floats:
-    """Gravity (3,) [m/s2] in a world whose z axis is normal to the ground.
+    """Gravity in a world whose z axis is normal to the ground.
 
-    The ground rises by slope [deg] towards direction [deg], counted from x to y.
+    Args:
+        slope: By which the ground rises [deg].
+        direction: Towards which it does, counted from x to y [deg].
+
+    Returns:
+        (3,) [m/s2].
     """
     angle, towards = math.radians(slope), math.radians(direction)
     along = -GRAVITY * math.sin(angle)
@@ -96,7 +162,7 @@ def pack_parameters(robot: Robot, scenario: Scenario, timestep: float) -> Floats
     )
     by_foot = {
         name: np.array([getattr(contact, name) for contact in contacts])
-        for name in LAWS[d.contact_law].parameters
+        for name in CONTACT_LAWS[d.contact_law].parameters
     }
     return Layout(robot).pack(
         timestep=timestep,

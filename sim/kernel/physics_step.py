@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+import casadi as ca
+import pinocchio as pin
+
 from sim.kernel.articulated_body import (
     Acceleration,
     Inertia,
@@ -18,10 +21,10 @@ from sim.kernel.articulated_body import (
     links_of,
 )
 from sim.kernel.backlash import shaft_torque
-from sim.kernel.contact import LAWS, Foot, InternalState, foot_on_ground
+from sim.kernel.contact import FRICTION, Foot, InternalState, foot_on_ground
 from sim.kernel.integration import integrated
 from sim.kernel.motor import Electrical, electrical
-from sim.kernel.parameters import Layout
+from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
 from sim.kernel.spatial import (
     Matrix,
     Scalar,
@@ -45,12 +48,6 @@ INTEGRANDS: Final = (
 )
 """Rates that the driver accumulates: squared gear torque sum [N2 m2], squared accelerations
 [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]."""
-
-
-def internal_state_size(robot: Robot) -> int:
-    """Numbers of the internal state: motors behind backlash, then feet (`stick`)."""
-    motors = 2 * robot.n_joints if robot.has_backlash else 0
-    return motors + LAWS[robot.description.contact_law].internal_state_size * len(robot.legs)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,13 +95,10 @@ class _Dynamics:
 @lru_cache(maxsize=8)
 def physics_model(robot: Robot) -> PhysicsModel:
     """Derive the step from the robot's URDF. Imports CasADi and Pinocchio, hence slow to begin."""
-    import casadi as ca  # noqa: PLC0415
-    import pinocchio as pin  # noqa: PLC0415
-
     model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     layout = Layout(robot)
-    s = _symbols(ca, robot, layout)
-    d = _dynamics(ca, robot, model, s)
+    s = _symbols(robot, layout)
+    d = _dynamics(robot, model, s)
     rates = [
         *d.acceleration.base.linear,
         *d.acceleration.base.angular,
@@ -114,7 +108,7 @@ def physics_model(robot: Robot) -> PhysicsModel:
         *integrated(s.q, s.v, rates, d.attitude, s.p["timestep"][0]),
         list(d.internal_state),
         list(d.electrical.currents),
-        _integrands(ca, s, d),
+        _integrands(s, d),
     ]
     observe = [
         list(d.electrical.currents),
@@ -125,13 +119,13 @@ def physics_model(robot: Robot) -> PhysicsModel:
         rates,
     ]
     return PhysicsModel(
-        step=_function(ca, "step", s, step),
-        observe=_function(ca, "observe", s, observe),
+        step=_function("step", s, step),
+        observe=_function("observe", s, observe),
         layout=layout,
     )
 
 
-def _symbols(ca: Any, robot: Robot, layout: Layout) -> _Symbols:
+def _symbols(robot: Robot, layout: Layout) -> _Symbols:
     n = robot.n_joints
     sizes = {
         "q": 7 + n,
@@ -147,13 +141,13 @@ def _symbols(ca: Any, robot: Robot, layout: Layout) -> _Symbols:
     return _Symbols(q, v, internal_state, duty, disturbance, fields, inputs)
 
 
-def _dynamics(ca: Any, robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
+def _dynamics(robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
     """Kinematics, then the forces of actuators and ground, then accelerations."""
     links = links_of(model, robot.joint_names)
     attitude = rotation_of(s.q[3:7])
-    states, rotations = link_states(ca, links, s.q, s.v, attitude)
-    actuation = _actuate(ca, robot, s)
-    feet, ground_forces, internal_state = _feet(ca, robot, model, s, states)
+    states, rotations = link_states(links, s.q, s.v, attitude)
+    actuation = _actuate(robot, s)
+    feet, ground_forces, internal_state = _feet(robot, model, s, states)
     acceleration = articulated_body(
         links,
         base_inertia(s.p),
@@ -186,7 +180,6 @@ def _dynamics(ca: Any, robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
 
 
 def link_states(
-    ca: Any,
     links: Sequence[Link],
     q: Sequence[Scalar],
     v: Sequence[Scalar],
@@ -223,7 +216,7 @@ class _Actuation:
     internal_state: Sequence[Scalar]
 
 
-def _actuate(ca: Any, robot: Robot, s: _Symbols) -> _Actuation:
+def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
     n, data = robot.n_joints, robot.actuators()
     rotors = s.internal_state[n : 2 * n] if robot.has_backlash else s.v[6:]
     motors = electrical(
@@ -238,7 +231,7 @@ def _actuate(ca: Any, robot: Robot, s: _Symbols) -> _Actuation:
         torques = [a + b for a, b in zip(motors.torques, s.disturbance, strict=True)]
         return _Actuation(motors, torques, data.armature.tolist(), ())
     shafts = [
-        shaft_torque(ca, motor - link, rotor - rate, play, stiffness, damping)
+        shaft_torque(motor - link, rotor - rate, play, stiffness, damping)
         for motor, link, rotor, rate, play, stiffness, damping in zip(
             s.internal_state[:n],
             s.q[7:],
@@ -265,10 +258,11 @@ def _actuate(ca: Any, robot: Robot, s: _Symbols) -> _Actuation:
 
 
 def _feet(
-    ca: Any, robot: Robot, model: Any, s: _Symbols, states: Sequence[LinkState]
+    robot: Robot, model: Any, s: _Symbols, states: Sequence[LinkState]
 ) -> tuple[list[Foot], dict[int, Any], list[Scalar]]:
     """Every foot, the ground's force on its link (by the link's index), internal state."""
-    law = LAWS[robot.description.contact_law]
+    law = CONTACT_LAWS[robot.description.contact_law]
+    friction = FRICTION[robot.description.contact_law]
     start = 2 * robot.n_joints if robot.has_backlash else 0
     feet: list[Foot] = []
     forces: dict[int, Any] = {}
@@ -277,16 +271,16 @@ def _feet(
         frame = model.frames[model.getFrameId(leg.foot)]
         index = 1 + robot.joint_names.index(model.names[frame.parentJoint])
         ground = {name: s.p[name][n] for name in law.parameters}
-        foot = foot_on_ground(ca, states[index], vector(frame.placement.translation), ground)
+        foot = foot_on_ground(states[index], vector(frame.placement.translation), ground)
         begin = start + n * law.internal_state_size
         before: InternalState = tuple(s.internal_state[begin : begin + law.internal_state_size])
-        forces[index], after = law.force(ca, foot, ground, before, s.p["timestep"][0])
+        forces[index], after = friction(foot, ground, before, s.p["timestep"][0])
         feet.append(foot)
         internal_state += after
     return feet, forces, internal_state
 
 
-def _integrands(ca: Any, s: _Symbols, d: _Dynamics) -> list[Scalar]:
+def _integrands(s: _Symbols, d: _Dynamics) -> list[Scalar]:
     """The rates of INTEGRANDS at the state before the step."""
     torque = sum(ca.fabs(load) for load in d.loads)
     v, w = _triple(s.v[0:3]), _triple(s.v[3:6])
@@ -310,5 +304,5 @@ def _triple(values: Sequence[Scalar]) -> Vector:
     return x, y, z
 
 
-def _function(ca: Any, name: str, s: _Symbols, outputs: list[list[Scalar]]) -> Any:
+def _function(name: str, s: _Symbols, outputs: list[list[Scalar]]) -> Any:
     return ca.Function(name, list(s.inputs), [ca.vertcat(*o) for o in outputs], {"cse": True})

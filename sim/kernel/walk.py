@@ -131,10 +131,6 @@ class Kernel(Protocol):
     def lanes(self) -> int:
         """Walks that are stepped together."""
 
-    @property
-    def internal_state_size(self) -> int:
-        """Numbers of a walk's internal state: the length of `WalkSetup.internal_state`."""
-
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
     ) -> tuple[WalkResult, ...]:

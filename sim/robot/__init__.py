@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from sim.robot.robot import Robot, parse_robot
-from sim.robot.variant import RobotFiles, RobotName, RobotSource, RobotVariant, load_robot
+from sim.robot.variant import (
+    RobotChoice,
+    RobotFiles,
+    RobotName,
+    RobotSource,
+    RobotVariant,
+    load_robot,
+)
 
 __all__ = [
     "Robot",
+    "RobotChoice",
     "RobotFiles",
     "RobotName",
     "RobotSource",

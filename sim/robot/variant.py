@@ -83,8 +83,23 @@ RobotSource = Annotated[
 """How jobs and requests name a robot."""
 
 
-def load_robot(robot: str | RobotVariant | RobotFiles | Robot) -> Robot:
-    """The robot of that name, variant or description. Raises SimulationInputError."""
+RobotChoice = str | RobotVariant | RobotFiles | Robot
+"""How a robot is named to the simulator."""
+
+
+def load_robot(robot: RobotChoice) -> Robot:
+    """A robot by its name, variant or files.
+
+    Args:
+        robot: A shipped robot's name, a variant of one, files of one's own, or a robot, which is
+            returned as it is.
+
+    Returns:
+        The robot.
+
+    Raises:
+        SimulationInputError: There is no such robot, or its files cannot be used.
+    """
     if isinstance(robot, Robot):
         return robot
     if isinstance(robot, str):

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.assembly import PHYSICS_RATE, judge, plan_walk
 from sim.controllers.base import ControlLaw
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.quantisation import Axis
@@ -17,9 +18,9 @@ from sim.kernel.reference import reference_kernel
 from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status
-from sim.robot import load_robot
+from sim.robot import RobotChoice, load_robot
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import PHYSICS_RATE, RobotChoice, course_of, judge, simulate
+from sim.simulate import simulate
 
 RESOLUTIONS: Final = ((6, 6), (8, 8), (10, 6))
 """Bits of error and current in the tables that are compared."""
@@ -143,10 +144,10 @@ def _reference_walk(scenario: Scenario, control_law: ControlLaw, robot: RobotCho
     machine = load_robot(robot)
     kernel = reference_kernel(machine)
     timestep = 1.0 / PHYSICS_RATE
-    course = course_of(machine, kernel, scenario, timestep)
-    if course is None:
+    plan = plan_walk(machine, scenario, timestep)
+    if plan is None:
         raise SimulationInputError(f"scenario {scenario.name!r}: out of the legs' reach")
-    setup = course(control_law)
+    setup = plan(control_law)
     coding = Coding.of(machine, 10)
     (result,) = kernel.walk([setup], coding, log=False)
     status, objectives = judge(setup, result, coding.substeps, timestep)

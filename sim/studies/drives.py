@@ -12,8 +12,9 @@ import numpy as np
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.outcome import Status
+from sim.robot import RobotChoice
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
-from sim.simulate import RobotChoice, simulate
+from sim.simulate import simulate
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,11 @@ from services.optimizer.jobs.spec import judge_outcomes
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from services.runtime import open_evaluator, open_store, run_embedded
+from sim.assembly import Backend
 from sim.controllers import CONTROLLERS
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import Backend, simulate
+from sim.simulate import simulate
 
 FILE: Final = Path(__file__).with_name("numbers.json")
 

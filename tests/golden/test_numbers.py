@@ -15,10 +15,11 @@ from typing import Any
 
 import pytest
 
+from sim.assembly import Backend
 from sim.compiler.compilation import Target, target
 from sim.errors import SimulationInputError
 from sim.scenario import SCENARIOS
-from sim.simulate import Backend, prepare
+from sim.simulate import prepare
 from tests.golden.numbers import (
     DEMO,
     ITERATIONS,
@@ -40,7 +41,7 @@ from sim.compiler import compilation
 narrow = compilation.Target(int(sys.argv[1]), sys.argv[2])
 compilation.target = lambda: narrow
 from sim.robot import load_robot
-from sim.simulate import kernel_of
+from sim.assembly import kernel_of
 from tests.golden.numbers import objectives_of_the_optimum
 print(json.dumps([kernel_of(load_robot("szabadka2")).lanes, objectives_of_the_optimum()]))
 """

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from sim.assembly import control_steps, kernel_of, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.identification.current_fit import CurrentFit, motor_currents
@@ -14,7 +15,7 @@ from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.walk import Coding
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
-from sim.simulate import control_steps, course_of, kernel_of, simulate
+from sim.simulate import simulate
 from tests.identification.conftest import DESIGN, SCENARIO, TRUTH, Twin
 
 pytestmark = pytest.mark.slow
@@ -26,9 +27,9 @@ pytestmark = pytest.mark.slow
 def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
     robot = load_robot(source)
     kernel, (substeps, timestep) = kernel_of(robot), control_steps(robot)
-    course = course_of(robot, kernel, SCENARIO, timestep)
-    assert course is not None
-    setup = course(CONTROLLERS["fuzzy-pi"].compile(DESIGN))
+    plan = plan_walk(robot, SCENARIO, timestep)
+    assert plan is not None
+    setup = plan(CONTROLLERS["fuzzy-pi"].compile(DESIGN))
     (result,) = kernel.walk([setup], Coding.of(robot, substeps), log=True)
     values = np.array([list(DESIGN.values())])
     (log,) = simulate(SCENARIO, "fuzzy-pi", list(DESIGN), values, robot=robot, log=True).logs

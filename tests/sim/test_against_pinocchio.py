@@ -58,7 +58,7 @@ def _symbolic_tree(robot: Robot) -> Any:
     links = links_of(Oracle(robot).model, robot.joint_names)
     inputs = ca.SX.sym("q", 7 + robot.n_joints), ca.SX.sym("v", 6 + robot.n_joints)
     q, v = ([s[k] for k in range(s.numel())] for s in inputs)
-    states, _ = link_states(ca, links, q, v, rotation_of(q[3:7]))
+    states, _ = link_states(links, q, v, rotation_of(q[3:7]))
     rotations = [_to_world(state) for state in states]
     # The model itself has no use for the links' x and y; height is its own.
     positions = [(q[0], q[1], q[2])]

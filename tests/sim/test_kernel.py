@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from sim.assembly import PHYSICS_RATE, plan_walk
 from sim.compiler import compilation
 from sim.compiler.compilation import Target, target
 from sim.controllers import CONTROLLERS
@@ -19,7 +20,7 @@ from sim.kernel.walk import Coding, Kernel, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import PHYSICS_RATE, course_of, lanes, simulate
+from sim.simulate import lanes, simulate
 
 FUZZY = CONTROLLERS["fuzzy-pi"]
 OPTIMUM = FUZZY.published["A"]
@@ -92,9 +93,9 @@ def test_a_log_does_not_change_the_walk() -> None:
 
 
 def _setup(robot: Robot, kernel: Kernel, scenario: Scenario) -> WalkSetup:
-    course = course_of(robot, kernel, scenario, 1.0 / PHYSICS_RATE)
-    assert course is not None
-    return course(FUZZY.compile(OPTIMUM))
+    plan = plan_walk(robot, scenario, 1.0 / PHYSICS_RATE)
+    assert plan is not None
+    return plan(FUZZY.compile(OPTIMUM))
 
 
 def _sums(kernel: Kernel, setups: Sequence[WalkSetup], robot: Robot) -> list[tuple[Status, bytes]]:

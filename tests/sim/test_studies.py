@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sim.assembly import PHYSICS_RATE, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.errors import SimulationInputError
@@ -13,7 +14,6 @@ from sim.kernel.walk import Coding
 from sim.outcome import Status
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
-from sim.simulate import PHYSICS_RATE, course_of
 from sim.studies.accuracy import noise_on_links, step_halving, tables_against_inference
 from sim.studies.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
 
@@ -66,10 +66,10 @@ def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
     robot = load_robot("szabadka2")
     kernel = native_kernel(robot)
     assert kernel is not None
-    course = course_of(robot, kernel, BRIEF, 1.0 / PHYSICS_RATE)
-    assert course is not None
+    plan = plan_walk(robot, BRIEF, 1.0 / PHYSICS_RATE)
+    assert plan is not None
     with pytest.raises(SimulationInputError, match="backend='reference'"):
-        kernel.walk([course(FuzzyPi().without_table(OPTIMUM))], Coding.of(robot, 10), log=False)
+        kernel.walk([plan(FuzzyPi().without_table(OPTIMUM))], Coding.of(robot, 10), log=False)
 
 
 def test_five_kilohertz_keep_every_objective_within_one_percent() -> None:

@@ -8,18 +8,19 @@ import math
 import numpy as np
 import pytest
 
+from sim.assembly import plan_walk
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import native_kernel
 from sim.kernel.observation import walk_log
-from sim.kernel.parameters import pack_parameters
-from sim.kernel.physics_step import internal_state_size, physics_model
+from sim.kernel.parameters import internal_state_size, pack_parameters
+from sim.kernel.physics_step import physics_model
 from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
 from sim.robot.description import ContactLaw
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import course_of, simulate
+from sim.simulate import simulate
 
 pytestmark = pytest.mark.slow
 
@@ -77,9 +78,9 @@ def resting_creep(law: ContactLaw) -> float:
     kernel = native_kernel(robot)
     assert kernel is not None
     steep = SCENARIOS[0].model_copy(update={"slope": 20.0})
-    course = course_of(robot, kernel, steep, 2e-4)
-    assert course is not None
-    setup = course(CONTROLLERS["pi"].compile({"P": 1.0, "I": 1.0}))
+    plan = plan_walk(robot, steep, 2e-4)
+    assert plan is not None
+    setup = plan(CONTROLLERS["pi"].compile({"P": 1.0, "I": 1.0}))
     still = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], 1000, axis=0))
     (result,) = kernel.walk([still], Coding.of(robot, 10), log=True)
     assert result.status is Status.OK

@@ -1,0 +1,155 @@
+"""Between the entry point and the kernels: which one runs, what it walks, what a walk is worth."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers import ControlLaw
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.errors import SimulationInputError
+from sim.gait.trajectory import Trajectory, desired_angles
+from sim.kernel.native import native_kernel
+from sim.kernel.parameters import gravity_on, internal_state_size, pack_parameters
+from sim.kernel.walk import Kernel, WalkResult, WalkSetup
+from sim.noise import LinkNoise
+from sim.outcome import N_OBJECTIVES, Status
+from sim.robot import Robot
+from sim.robot.posture import resting_height
+from sim.scenario import Scenario
+
+Backend = Literal["auto", "native", "reference"]
+"""`native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first that works
+here."""
+
+PHYSICS_RATE: Final = 5000
+"""Physics steps a second [Hz]; the control rate is 500 Hz."""
+
+BACKLASH_PHYSICS_RATE: Final = 20_000
+"""Rate [Hz] for robots with backlash: without their rotors, tibias answer the ground too fast for
+5 kHz."""
+
+SHORTEST_WALK: Final = 1e-3
+"""Distance [m] under which a robot counts as not walking: energy per metre has no value."""
+
+
+def kernel_of(robot: Robot, backend: Backend = "auto") -> Kernel:
+    """The robot's kernel, built if there is none yet.
+
+    Args:
+        robot: The robot.
+        backend: Which kernel; with `auto` a warning says if it is the slow one.
+
+    Returns:
+        The kernel.
+
+    Raises:
+        SimulationInputError: The native kernel is asked for on a machine without a C compiler.
+        KernelBuildError: The compiler refused the source.
+    """
+    if backend != "reference":
+        native = native_kernel(robot)
+        if native is not None:
+            return native
+        if backend == "native":
+            raise SimulationInputError("backend: no C compiler found for the native kernel")
+        warnings.warn(
+            "no C compiler found: simulating with the interpreter, some hundred times slower;"
+            " install gcc or clang, or `pip install gaitswarm[compiler]`",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    # The native kernel does without CasADi and Pinocchio, which are slow to import.
+    from sim.kernel.reference import reference_kernel  # noqa: PLC0415
+
+    return reference_kernel(robot)
+
+
+def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[int, float]:
+    """How a control tick is divided.
+
+    Args:
+        robot: With backlash it is simulated at `BACKLASH_PHYSICS_RATE` at least.
+        physics_rate: Physics steps a second [Hz].
+
+    Returns:
+        Physics steps a control tick, and their length [s].
+    """
+    if robot.has_backlash:
+        physics_rate = max(physics_rate, BACKLASH_PHYSICS_RATE)
+    return round(physics_rate * CONTROL_PERIOD), 1.0 / physics_rate
+
+
+def plan_walk(
+    robot: Robot,
+    scenario: Scenario,
+    timestep: float,
+    noise: LinkNoise | None = None,
+    *,
+    trajectory: Trajectory | None = None,
+) -> Callable[[ControlLaw], WalkSetup] | None:
+    """All of a walk but its control law, which designs of one gait share.
+
+    Args:
+        robot: The robot that walks.
+        scenario: With the gait that it walks in.
+        timestep: Of the physics [s].
+        noise: Torques on its links.
+        trajectory: Desired angles, if they are not those for this robot's legs.
+
+    Returns:
+        From a control law to the walk; None for a gait out of the legs' reach.
+    """
+    trajectory = trajectory or desired_angles(robot, scenario)
+    if not trajectory.reachable:
+        return None
+    ticks, n_joints = trajectory.angles.shape
+    weight = (robot.mass + scenario.load) * -gravity_on(scenario.slope)[2]
+    joints = trajectory.angles[0]
+    base = [0.0, 0.0, resting_height(robot, joints, weight), 0.0, 0.0, 0.0, 1.0]
+    internal_state = np.zeros(internal_state_size(robot))
+    if robot.has_backlash:
+        internal_state[:n_joints] = joints
+    codes = np.rint(trajectory.angles * robot.description.sensors.angle_counts)
+    return partial(
+        WalkSetup,
+        np.concatenate([base, joints]),
+        internal_state,
+        pack_parameters(robot, scenario, timestep),
+        codes.astype(np.int32),
+        fall_height=0.5 * scenario.hip_height,
+        disturbance=None if noise is None else noise.torques(ticks, n_joints),
+    )
+
+
+def judge(
+    setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
+) -> tuple[Status, NDArray[np.float64]]:
+    """What a walk is worth (table 4.1).
+
+    Args:
+        setup: The walk.
+        result: What the kernel made of it.
+        substeps: Physics steps a control tick.
+        timestep: Of the physics [s].
+
+    Returns:
+        Status, and objectives f1 to f6, (6,), NaN where they do not exist.
+    """
+    objectives = np.full(N_OBJECTIVES, np.nan)
+    if result.status is not Status.OK:
+        return result.status, objectives
+    steps = setup.ticks * substeps
+    objectives[:3] = np.sqrt(result.sums[:3] / steps)
+    objectives[5] = result.end[2] - setup.start[2]
+    distance = result.sums[4] * timestep
+    if distance < SHORTEST_WALK:
+        return Status.STALLED, objectives
+    objectives[3] = result.sums[3] * timestep / distance
+    objectives[4] = steps * timestep / distance
+    return Status.OK, objectives

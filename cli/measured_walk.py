@@ -11,10 +11,10 @@ import typer
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from sim.measurement.measured_log import MeasuredLog
+    from sim.measurement.synchronise import Synchronised
     from sim.robot import Robot
     from sim.scenario import Scenario
-    from sim.validation.measured_log import MeasuredLog
-    from sim.validation.synchronise import Synchronised
 
 LARGEST_FILE: Final = 1 << 28
 """Largest log that is read [B]; a second takes about a megabyte."""
@@ -94,9 +94,9 @@ def simulated_walk(walk: Walk) -> MeasuredLog:
     import numpy as np
 
     from sim.errors import SimulationInputError
+    from sim.measurement.measured_log import simulated_log
     from sim.outcome import Status
     from sim.simulate import simulate
-    from sim.validation.simulated_log import simulated_log
 
     designs = np.array([list(walk.design.values())], dtype=np.float64)
     result = simulate(
@@ -110,8 +110,8 @@ def simulated_walk(walk: Walk) -> MeasuredLog:
 
 def synchronised(path: Path, log: MeasuredLog, simulated: MeasuredLog, walk: Walk) -> Synchronised:
     """A log beside the simulated walk. Raises InvalidRequest that names the file."""
-    from sim.validation.errors import MeasuredLogError
-    from sim.validation.synchronise import synchronise
+    from sim.errors import MeasuredLogError
+    from sim.measurement.synchronise import synchronise
 
     try:
         return synchronise(log, simulated, walk.cycle_time)
@@ -121,8 +121,8 @@ def synchronised(path: Path, log: MeasuredLog, simulated: MeasuredLog, walk: Wal
 
 def read_measured(path: Path, robot: Robot) -> MeasuredLog:
     """A log from a file. Raises InvalidRequest that names file, line, column and unit."""
-    from sim.validation.errors import MeasuredLogError
-    from sim.validation.measured_csv import parse_measured_log
+    from sim.errors import MeasuredLogError
+    from sim.measurement.measured_csv import parse_measured_log
 
     try:
         with path.open("rb") as file:

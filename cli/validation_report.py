@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Final
 from cli.atomic_file import replacing
 from cli.validation_table import alignment, confidence, percent, remarks
 from services.optimizer.errors import InvalidRequest
-from sim.validation.measured_log import Quantity
-from sim.validation.tolerance import Tolerance
+from sim.measurement.measured_log import Quantity
+from sim.validation.measures import Tolerance
 
 if TYPE_CHECKING:
+    from sim.measurement.synchronise import Synchronised
     from sim.validation.comparison import Agreement, Comparison, QuantityComparison
-    from sim.validation.synchronise import Synchronised
 
 REPORT: Final = "report.md"
 

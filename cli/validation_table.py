@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from rich.table import Table
 from rich.text import Text
 
-from sim.validation.tolerance import Tolerance
+from sim.validation.measures import Tolerance
 
 if TYPE_CHECKING:
     from sim.validation.comparison import Agreement, Comparison, QuantityComparison
@@ -95,7 +95,7 @@ def alignment(comparison: Comparison) -> str:
 
 def remarks(comparison: Comparison) -> list[str]:
     """What to know before one believes the table."""
-    from sim.validation.measured_log import Quantity
+    from sim.measurement.measured_log import Quantity
 
     said = []
     if comparison.synthetic:

@@ -3,7 +3,7 @@
 SimulationError
 ├── SimulationInputError    a value that cannot be simulated; names the field (also a ValueError)
 │   ├── UnreachablePose     a foot target outside the leg's reach; names scenario, leg, miss in mm
-│   ├── MeasuredLogError    a log that cannot be read; names line and column (sim.validation)
+│   ├── MeasuredLogError    a log that cannot be read; names line, column and unit
 │   └── RobotFileError      a robot description that cannot be used; names file and field
 └── KernelBuildError        the compiler was found but did not compile the kernel
 
@@ -25,7 +25,10 @@ class SimulationInputError(SimulationError, ValueError):
 class UnreachablePose(SimulationInputError):
     """A foot target lies outside the reach of its leg.
 
-    scenario, leg: names; miss: distance between target and reach [m]
+    Args:
+        scenario: Name of the walk.
+        leg: Name of the leg.
+        miss: Distance between target and reach [m].
     """
 
     def __init__(self, scenario: str, leg: str, miss: float) -> None:
@@ -40,6 +43,23 @@ class UnreachablePose(SimulationInputError):
     def __reduce__(self) -> tuple[type[UnreachablePose], tuple[str, str, float]]:
         """Pickle by the arguments, so that it comes back from another process as itself."""
         return type(self), (self.scenario, self.leg, self.miss)
+
+
+class MeasuredLogError(SimulationInputError):
+    """A measured log that cannot be read or compared.
+
+    Args:
+        problem: What is wrong.
+        line: Of the file, counted from 1 as editors do.
+        column: Heading with unit, as the file should have it.
+    """
+
+    def __init__(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
+        self.line = line
+        self.column = column
+        where = [] if line is None else [f"line {line}"]
+        where += [] if column is None else [f"column '{column}'"]
+        super().__init__(": ".join([*([", ".join(where)] if where else []), problem]))
 
 
 class RobotFileError(SimulationInputError):

@@ -51,7 +51,7 @@ def record(
     from cli.measured_walk import read_measured, read_walk, simulated_walk, synchronised
     from cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
-    from sim.identification.record import record as recorded
+    from sim.identification.recorded_walk import record as recorded
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
     log = read_measured(measured, walk.robot)

@@ -49,9 +49,9 @@ def synthesize(
     from cli.output import note
     from cli.parameters_table import read_truth
     from services.optimizer.errors import InvalidRequest
-    from sim.identification.parameters import identifiable_variables
-    from sim.validation.measured_csv import format_measured_log
-    from sim.validation.synthetic import Perturbation, synthetic_log
+    from sim.measurement.measured_csv import format_measured_log
+    from sim.measurement.synthetic import Perturbation, synthetic_log
+    from sim.robot.identifiable import identifiable_variables
 
     if output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")

@@ -23,9 +23,9 @@ from services.optimizer.search.pso import PsoSettings
 from services.optimizer.store.base import Page, Store
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
-from sim.identification.parameters import with_parameters
 from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
+from sim.robot.identifiable import with_parameters
 from sim.scenario import GAIT_VARIABLE_NAMES, with_gait
 from sim.simulate import check_reach
 from sim.variables import Variable

@@ -12,13 +12,13 @@ from sim.assembly import control_steps, kernel_of, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
-from sim.identification.parameters import with_parameters
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.motor import electrical
 from sim.kernel.walk import Coding
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
 from sim.robot.description import JOINTS_PER_LEG
+from sim.robot.identifiable import with_parameters
 from sim.scenario import with_gait
 
 Floats = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,12 @@ from sim.robot import RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
 from sim.simulate import check_reach
 from sim.variables import VariableName
+
+if TYPE_CHECKING:
+    from sim.measurement.synchronise import Synchronised
+
+_DECIMALS: Final = 5
+"""Of a stored current [A]: far below the converter's step, and a third of the text."""
 
 Amperes = Annotated[float, Field(ge=0.0, le=1000.0, allow_inf_nan=False)]
 
@@ -102,3 +108,24 @@ class RecordedWalk(BaseModel):
 
 Recordings = Mapping[str, RecordedWalk]
 """Recorded walks by their id."""
+
+
+def record(
+    pair: Synchronised,
+    scenario: Scenario,
+    controller: str,
+    design: Mapping[str, float],
+) -> RecordedWalk:
+    """The measured currents of two synchronised logs, on the simulated one's time axis.
+
+    scenario, controller, design: those of the walk that was simulated for the synchronisation.
+    """
+    return RecordedWalk(
+        scenario=scenario,
+        controller=cast(ControllerName, controller),
+        design=dict(design),
+        first_tick=round(float(pair.simulated.time[0]) / CONTROL_PERIOD),
+        joints=pair.measured.joints,
+        current=np.round(pair.measured.current, _DECIMALS).tolist(),
+        synthetic=pair.measured.synthetic,
+    )

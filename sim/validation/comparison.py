@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.measurement.measured_log import MeasuredLog, Quantity
+from sim.measurement.synchronise import Synchronised, synchronise
 from sim.robot.description import JOINTS_PER_LEG
 from sim.validation import measures
-from sim.validation.measured_log import MeasuredLog, Quantity
-from sim.validation.synchronise import Synchronised, synchronise
-from sim.validation.tolerance import Tolerance
+from sim.validation.measures import Tolerance
 
 Floats = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""How far a simulated signal is from a measured one: eq. 2.15 to 2.22 of the thesis.
+"""How far a simulated signal is from a measured one: eq. 2.15 to 2.22 and table 2.3 of the thesis.
 
 X is measured, Y simulated, both in the same unit and of the same shape: (T,) one signal, or (T, C)
 several that are judged together; means run over all T C samples. Rows are equally spaced in time.
@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from enum import StrEnum
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +91,7 @@ def amplitude_spectrum(signal: Floats, timestep: float) -> tuple[Floats, Floats]
     amplitude[0] /= 2.0
     if rows % 2 == 0:
         amplitude[-1] /= 2.0
-    return np.arange(len(amplitude)) / (rows * timestep), amplitude
+    return np.asarray(np.fft.rfftfreq(rows, timestep), dtype=np.float64), amplitude
 
 
 def spectral_error(measured: Floats, simulated: Floats, timestep: float) -> float:
@@ -129,3 +131,49 @@ def _samples(signal: Floats) -> Floats:
     if signal.size == 0:
         raise SimulationInputError("a signal without samples cannot be judged")
     return signal
+
+
+class Tolerance(StrEnum):
+    """What an RMAE means, by the colour that the thesis gives it; from good to bad."""
+
+    GREEN = "green"
+    YELLOW = "yellow"
+    ORANGE = "orange"
+    RED = "red"
+    PURPLE = "purple"
+
+    @property
+    def limit(self) -> float:
+        """Largest RMAE [1] that still belongs to the class."""
+        return _LIMITS[self]
+
+    @property
+    def phrase(self) -> str:
+        """What to think of it."""
+        return _PHRASES[self]
+
+    @classmethod
+    def of(cls, rmae: float) -> Tolerance:
+        """Class of a relative mean absolute error [1]; NaN is as bad as can be.
+
+        >>> [Tolerance.of(x).value for x in (0.02, 0.021, 0.31)]
+        ['green', 'yellow', 'red']
+        """
+        return next((known for known in cls if rmae <= known.limit), cls.PURPLE)
+
+
+_LIMITS: Final = {
+    Tolerance.GREEN: 0.02,
+    Tolerance.YELLOW: 0.10,
+    Tolerance.ORANGE: 0.30,
+    Tolerance.RED: 0.50,
+    Tolerance.PURPLE: math.inf,
+}
+
+_PHRASES: Final = {
+    Tolerance.GREEN: "as exact as a digital measurement",
+    Tolerance.YELLOW: "as exact as an analog measurement",
+    Tolerance.ORANGE: "moderate, acceptable under conditions",
+    Tolerance.RED: "unacceptable",
+    Tolerance.PURPLE: "a serious error",
+}

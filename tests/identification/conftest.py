@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from sim.controllers import CONTROLLERS
-from sim.identification.record import record
-from sim.identification.recorded_walk import RecordedWalk
+from sim.identification.recorded_walk import RecordedWalk, record
+from sim.measurement.measured_log import simulated_log
+from sim.measurement.synchronise import synchronise
+from sim.measurement.synthetic import Perturbation, synthetic_log
 from sim.robot import Robot, load_robot
 from sim.scenario import Scenario
 from sim.simulate import simulate
-from sim.validation.simulated_log import simulated_log
-from sim.validation.synchronise import synchronise
-from sim.validation.synthetic import Perturbation, synthetic_log
 
 DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 SCENARIO = Scenario(name="brief", cycle_time=1.0, radius=0.16, hip_height=0.15, cycles=2.0)

@@ -10,11 +10,11 @@ from sim.assembly import control_steps, kernel_of, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.identification.current_fit import CurrentFit, motor_currents
-from sim.identification.parameters import nominal_values, with_parameters
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.walk import Coding
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
+from sim.robot.identifiable import nominal_values, with_parameters
 from sim.simulate import simulate
 from tests.identification.conftest import DESIGN, SCENARIO, TRUTH, Twin
 

@@ -9,13 +9,12 @@ import pytest
 
 from sim.controllers import CONTROLLERS
 from sim.kernel.observation import WalkLog
+from sim.measurement.measured_csv import format_measured_log
+from sim.measurement.measured_log import MeasuredLog, simulated_log
+from sim.measurement.synthetic import synthetic_log
 from sim.robot import Robot, load_robot
 from sim.scenario import Scenario, find_scenario
 from sim.simulate import simulate
-from sim.validation.measured_csv import format_measured_log
-from sim.validation.measured_log import MeasuredLog
-from sim.validation.simulated_log import simulated_log
-from sim.validation.synthetic import synthetic_log
 
 DESIGN = CONTROLLERS["fuzzy-pi"].published["A"]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from cli.main import run
+from sim.measurement.measured_csv import format_measured_log
 from sim.validation.comparison import compare
-from sim.validation.measured_csv import format_measured_log
-from sim.validation.tolerance import Tolerance
+from sim.validation.measures import Tolerance
 from tests.cli.conftest import Result, run_command
 from tests.validation.conftest import TwoWalks
 

@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.errors import SimulationInputError
+from sim.errors import MeasuredLogError, SimulationInputError
+from sim.measurement.measured_csv import format_measured_log, parse_measured_log
+from sim.measurement.measured_log import MeasuredLog, Quantity
 from sim.robot import Robot
-from sim.validation.errors import MeasuredLogError
-from sim.validation.measured_csv import format_measured_log, parse_measured_log
-from sim.validation.measured_log import MeasuredLog, Quantity
 from tests.validation.walks import renamed_robot, szabadka, walking_log, without_supplements
 
 ROWS = 120

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from sim.errors import SimulationInputError
 from sim.validation import measures
-from sim.validation.tolerance import Tolerance
+from sim.validation.measures import Tolerance
 
 X = np.array([1.0, -2.0, 3.0, -2.0])
 Y = np.array([2.0, -2.0, 1.0, -1.0])

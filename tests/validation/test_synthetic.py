@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 
 from sim.errors import SimulationInputError
-from sim.simulate import simulate
-from sim.validation.comparison import compare
-from sim.validation.measured_csv import parse_measured_log
-from sim.validation.measured_log import Quantity
-from sim.validation.simulated_log import simulated_log
-from sim.validation.synthetic import (
+from sim.measurement.measured_csv import parse_measured_log
+from sim.measurement.measured_log import Quantity, simulated_log
+from sim.measurement.synthetic import (
     Instruments,
     Perturbation,
     converted,
     perturbed,
     synthetic_log,
 )
-from sim.validation.tolerance import Tolerance
+from sim.simulate import simulate
+from sim.validation.comparison import compare
+from sim.validation.measures import Tolerance
 from tests.validation.conftest import DESIGN, TwoWalks
 
 pytestmark = pytest.mark.slow

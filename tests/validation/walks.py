@@ -7,8 +7,8 @@ from importlib import resources
 
 import numpy as np
 
+from sim.measurement.measured_log import MeasuredLog
 from sim.robot import Robot, load_robot, parse_robot
-from sim.validation.measured_log import MeasuredLog
 
 CYCLE_TIME = 0.5
 CYCLE = 250

@@ -13,10 +13,10 @@ from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.spec import Judgement, Spec
 from sim.case import Case
 from sim.identification.current_fit import LINK_CURRENTS, CurrentFit
-from sim.identification.parameters import identifiable_variables
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import Objective
 from sim.robot import load_robot
+from sim.robot.identifiable import identifiable_variables
 
 Floats = NDArray[np.float64]
 

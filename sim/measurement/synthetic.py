@@ -16,14 +16,13 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
-from sim.identification.parameters import with_parameters
+from sim.measurement.measured_log import ORIGIN, SYNTHETIC, MeasuredLog, Quantity, simulated_log
 from sim.outcome import Status
 from sim.robot import Robot
 from sim.robot.description import Contact
+from sim.robot.identifiable import with_parameters
 from sim.scenario import Scenario
 from sim.simulate import simulate
-from sim.validation.measured_log import ORIGIN, SYNTHETIC, MeasuredLog, Quantity
-from sim.validation.simulated_log import simulated_log
 from sim.variables import VariableName
 
 Floats = NDArray[np.float64]

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from sim.errors import SimulationInputError
-from sim.identification.parameters import (
+from sim.kernel.parameters import Layout, pack_parameters
+from sim.robot import RobotFiles, load_robot
+from sim.robot.identifiable import (
     identifiable_variables,
     nominal_values,
     with_parameters,
 )
-from sim.kernel.parameters import Layout, pack_parameters
-from sim.robot import RobotFiles, load_robot
 from sim.robot.robot import Robot
 from sim.scenario import SCENARIOS
 

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.errors import MeasuredLogError
+from sim.measurement.measured_log import AXES, MeasuredLog, Quantity
 from sim.robot import Robot
-from sim.validation.errors import MeasuredLogError
-from sim.validation.measured_log import AXES, MeasuredLog, Quantity
 
 Floats = NDArray[np.float64]
 

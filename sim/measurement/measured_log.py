@@ -11,6 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import SimulationInputError
+from sim.kernel.observation import WalkLog
+from sim.kernel.parameters import GRAVITY
+from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG
 
 Floats = NDArray[np.float64]
@@ -156,3 +159,29 @@ class MeasuredLog:
                 None if self.body_acceleration is None else self.body_acceleration[part]
             ),
         )
+
+
+def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
+    """The quantities of table 2.2 of a walk that did not end early.
+
+    Encoders see the motors' angles, potentiometers, which every joint has, the links'; currents are
+    absolute values; every leg's board sees the one battery.
+    Raises SimulationInputError for a walk that ended early.
+    """
+    if not np.isfinite(walk.current).all():
+        raise SimulationInputError("a walk that ended early cannot be compared")
+    joints, legs = robot.joint_names, tuple(leg.name for leg in robot.legs)
+    return MeasuredLog(
+        joints=joints,
+        legs=legs,
+        time=walk.time,
+        desired_angle=walk.desired_angle,
+        control_voltage=walk.voltage,
+        joint_angle=walk.motor_angle,
+        current=np.abs(walk.current),
+        supply=np.repeat(walk.supply[:, None], len(legs), axis=1),
+        potentiometer_joints=joints,
+        potentiometer=walk.joint_angle,
+        body_acceleration=walk.body_acceleration() / GRAVITY,
+        metadata={ORIGIN: "simulated", "robot": robot.description.name},
+    )

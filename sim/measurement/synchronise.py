@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.validation.errors import MeasuredLogError
-from sim.validation.measured_log import MeasuredLog
+from sim.errors import MeasuredLogError
+from sim.measurement.measured_log import MeasuredLog
 
 Floats = NDArray[np.float64]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Query, Response, status
+from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
 from api.context import JobId, Service
 from api.openapi import problems
@@ -29,6 +29,11 @@ IdempotencyKey = Annotated[
 ]
 
 
+async def request_document(request: Request) -> Any:
+    """The body as it was sent, before defaults and presets are filled in."""
+    return await request.json()
+
+
 @router.post(
     "",
     operation_id="submit_job",
@@ -44,15 +49,19 @@ IdempotencyKey = Annotated[
     },
 )
 def submit_job(
-    spec: AnySpec, service: Service, response: Response, idempotency_key: IdempotencyKey = None
+    spec: AnySpec,
+    service: Service,
+    response: Response,
+    sent: Annotated[Any, Depends(request_document)],
+    idempotency_key: IdempotencyKey = None,
 ) -> JobView:
     """Check that the job can be simulated and queue it.
 
     The answer comes at once; a runner takes the job up when it has room. With an
-    `Idempotency-Key` used before, the same body answers 200 with the job that it made, another
-    body 409.
+    `Idempotency-Key` used before, the same body answers 200 with the job that it made, even if
+    presets have changed since; a body that asks for another job answers 409.
     """
-    job, new = service.submit(spec, idempotency_key=idempotency_key)
+    job, new = service.submit(spec, idempotency_key=idempotency_key, request=sent)
     if not new:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"

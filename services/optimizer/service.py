@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
-from typing import Final
+from typing import Any, Final
 
 from services.optimizer.analysis.distribution import Distribution, distribution
 from services.optimizer.analysis.history_cache import HistoryCache
@@ -59,13 +59,26 @@ class JobService:
         object.__setattr__(self, "_rates", MeasuredRates())
         object.__setattr__(self, "_histories", HistoryCache(self.store))
 
-    def submit(self, spec: Spec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
-        """Check that the job can be simulated and queue it; (job, whether it is new).
+    def submit(
+        self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
+    ) -> tuple[Job, bool]:
+        """Check that the job can be simulated and queue it.
 
-        Raises InvalidRequest that names the field, IdempotencyConflict.
+        Args:
+            spec: What the job is to do.
+            idempotency_key: A key by which a repeated request is recognized.
+            request: The JSON document that asked for the job, as it was sent; None: the fields
+                that were given to the spec.
+
+        Returns:
+            The job, and whether it is new.
+
+        Raises:
+            InvalidRequest: It cannot be simulated; names the field.
+            IdempotencyConflict: The key was used before, for another job.
         """
         self._check(spec)
-        return self.store.create_job(spec.resolved(), idempotency_key=idempotency_key)
+        return self.store.create_job(spec, idempotency_key=idempotency_key, request=request)
 
     def record(self, walk: RecordedWalk) -> str:
         """Keep a recorded walk, to which jobs can fit; its id."""

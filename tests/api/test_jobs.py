@@ -6,6 +6,7 @@ import httpx2
 import pytest
 
 from services.optimizer.jobs.job import Job, JobState
+from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 
@@ -52,6 +53,18 @@ def test_the_same_key_and_body_make_one_job(client: httpx2.Client, store: SqlSto
     assert again.json()["id"] == first.json()["id"]
     assert again.headers["Location"] == first.headers["Location"]
     assert len(store.jobs().items) == 1
+
+
+def test_a_repeated_request_is_the_same_after_its_preference_has_changed(
+    client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = {**SPEC, "preference": "A"}
+    first = client.post("/v1/jobs", json=request, headers={"Idempotency-Key": "k1"})
+    monkeypatch.setitem(PREFERENCES, "A", PREFERENCES["B"])
+    again = client.post("/v1/jobs", json=request, headers={"Idempotency-Key": "k1"})
+
+    assert (first.status_code, again.status_code) == (202, 200)
+    assert again.json()["id"] == first.json()["id"]
 
 
 def test_the_same_key_with_another_body_is_a_conflict(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import (
@@ -39,11 +39,25 @@ class Store(Protocol):
     LeaseLost, and change nothing, if the claim's token is no longer the job's.
     """
 
-    def create_job(self, spec: Spec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
-        """Insert a queued job of the resolved spec; (job, True).
+    def create_job(
+        self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
+    ) -> tuple[Job, bool]:
+        """Insert a queued job of the resolved spec, or find the one that the same key made before.
 
-        With a key used before: (the job it made, False) if the spec is equal, else
-        IdempotencyConflict.
+        Args:
+            spec: What the job is to do.
+            idempotency_key: Of the user; a request that is repeated with it makes no second job,
+                even if presets or defaults have changed in between.
+            request: The JSON document that asked for the job, as it was sent. None: the fields
+                that were given to the spec.
+
+        Returns:
+            The job, and whether it is new.
+
+        Raises:
+            InvalidRequest: The key is empty, too long or not printable.
+            IdempotencyConflict: The key was used for a request that is neither this one nor
+                resolves to the same spec.
         """
 
     def job(self, job_id: str) -> Job:

@@ -8,14 +8,14 @@ import math
 import re
 import secrets
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Final
 
 import numpy as np
 from sqlalchemy import ColumnElement, Connection, Select, and_, insert, or_, select, update
 
-from services.optimizer.errors import Conflict, LeaseLost, NotFound
-from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.errors import Conflict, IdempotencyConflict, LeaseLost, NotFound
 from services.optimizer.jobs.job import Answered, Ask, Claim, CompletedIteration, Job, JobState
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows import (
@@ -60,27 +60,51 @@ def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
     raise NotFound(f"there is no job {job_id!r}")
 
 
-def job_of_key(connection: Connection, idempotency_key: str | None) -> tuple[Job, AnySpec] | None:
-    """The job that was made with a key, and the spec that it was submitted with.
+@dataclass(frozen=True, slots=True)
+class Submission:
+    """A job that is to be made.
 
-    None if there is none, or no key.
+    Attributes:
+        spec: Resolved.
+        key: Idempotency key that came with the request, if any.
+        digest: Of the request, as `request_digest` has it; None without a key.
     """
-    if idempotency_key is None:
+
+    spec: Spec
+    key: str | None = None
+    digest: str | None = None
+
+
+def repeated_job(connection: Connection, asked: Submission) -> Job | None:
+    """The job that an earlier request made with the same key; None if there is none, or no key.
+
+    Raises:
+        IdempotencyConflict: That request asked for another job.
+    """
+    if asked.key is None:
         return None
-    query = select(jobs).where(jobs.c.idempotency_key == idempotency_key)
+    query = select(jobs).where(jobs.c.idempotency_key == asked.key)
     row = connection.execute(query).mappings().first()
-    return (to_job(row), submitted_spec(row)) if row is not None else None
+    if row is None:
+        return None
+    # Presets and defaults may have changed since: then equal requests ask for unequal specs. And a
+    # request that was worded in another way, or not kept, is the same if its spec is.
+    if row["request_digest"] != asked.digest and submitted_spec(row) != asked.spec:
+        raise IdempotencyConflict(
+            f"idempotency key {asked.key!r} was used before, for the different job {row['id']}; use"
+            " a new key for a new job"
+        )
+    return to_job(row)
 
 
-def insert_job(
-    connection: Connection, resolved: Spec, idempotency_key: str | None, now: datetime
-) -> Job:
+def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
     """A new queued job."""
     columns = {
         "id": new_job_id(),
         "state": JobState.QUEUED,
-        "spec": spec_document(resolved),
-        "idempotency_key": idempotency_key,
+        "spec": spec_document(asked.spec),
+        "idempotency_key": asked.key,
+        "request_digest": asked.digest,
         "created_at": now,
         "updated_at": now,
         "lease_token": 0,

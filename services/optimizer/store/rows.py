@@ -6,6 +6,8 @@ JSON has neither NaN nor infinity: an objective that does not exist is null, and
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -74,6 +76,19 @@ def submitted_spec(row: Row) -> AnySpec:
 def budget(row: Row) -> int:
     """Iterations that the job of a row of `jobs` is to run."""
     return int(row["spec"]["iterations"] if row["budget"] is None else row["budget"])
+
+
+def request_digest(request: Any) -> str:
+    """What a request is recognized by: SHA-256 of its JSON document, whatever its layout.
+
+    Args:
+        request: The document as it was parsed: objects, arrays, strings, numbers.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    canonical = json.dumps(request, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(canonical.encode()).hexdigest()
 
 
 def spec_document(spec: Spec) -> dict[str, Any]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import timedelta
-from typing import Final
+from typing import Any, Final
 
 from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.errors import BudgetChanged, IdempotencyConflict, InvalidRequest, NotFound
+from services.optimizer.errors import BudgetChanged, InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import (
     Ask,
@@ -36,6 +36,7 @@ from services.optimizer.store.recordings import (
     recording_id,
 )
 from services.optimizer.store.records import (
+    Submission,
     answered_ask,
     claimable,
     complete_iteration,
@@ -43,16 +44,23 @@ from services.optimizer.store.records import (
     held,
     insert_ask,
     insert_job,
-    job_of_key,
     job_row,
     lease_is_live,
     outstanding_ask,
     progress_after,
+    repeated_job,
     state_after_commit,
     state_after_release,
     update_job,
 )
-from services.optimizer.store.rows import LISTED, budget, to_evaluation, to_iteration, to_job
+from services.optimizer.store.rows import (
+    LISTED,
+    budget,
+    request_digest,
+    to_evaluation,
+    to_iteration,
+    to_job,
+)
 from services.optimizer.store.tables import evaluations, iterations, jobs
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -89,29 +97,28 @@ class SqlStore:
 
     # jobs, as their users see them
 
-    def create_job(self, spec: Spec, *, idempotency_key: str | None = None) -> tuple[Job, bool]:
-        """See `Store.create_job`. Raises InvalidRequest for a key that is empty or too long."""
-        resolved = spec.resolved()
+    def create_job(
+        self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
+    ) -> tuple[Job, bool]:
+        """Insert a queued job, or find the one that the same key made before."""
         _check_key(idempotency_key)
+        digest: str | None = None
+        if idempotency_key is not None:
+            sent = spec.model_dump(mode="json", exclude_unset=True) if request is None else request
+            digest = request_digest(sent)
+        asked = Submission(spec.resolved(), idempotency_key, digest)
         try:
             with self._database.transaction(write=True) as connection:
-                earlier = job_of_key(connection, idempotency_key)
+                earlier = repeated_job(connection, asked)
                 if earlier is None:
-                    now = self._clock(connection)
-                    return insert_job(connection, resolved, idempotency_key, now), True
+                    return insert_job(connection, asked, self._clock(connection)), True
         except IntegrityError:
             # Another process has inserted the same key between our look and our insertion.
             with self._database.transaction(write=False) as connection:
-                earlier = job_of_key(connection, idempotency_key)
+                earlier = repeated_job(connection, asked)
             if earlier is None:
                 raise
-        job, submitted = earlier
-        if submitted != resolved:
-            raise IdempotencyConflict(
-                f"idempotency key {idempotency_key!r} was used before, for the different job"
-                f" {job.id}; use a new key for a new job"
-            )
-        return job, False
+        return earlier, False
 
     def job(self, job_id: str) -> Job:
         """See `Store.job`."""

@@ -89,6 +89,8 @@ jobs: Final = Table(
     Column("compute_seconds", Double, nullable=False),
     # Iterations to run, where the job was extended; the spec stays what was submitted.
     Column("budget", Integer),
+    # Of the request that the idempotency key came with; NULL without a key, and for older jobs.
+    Column("request_digest", Text),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

@@ -144,6 +144,21 @@ def test_a_running_job_that_is_extended_runs_on_and_so_does_one_that_is_killed_t
     assert until(found, 5) != until(history(store, unextended), 5)
 
 
+def test_a_job_that_is_extended_between_claim_and_first_ask_is_asked_under_the_later_budget(
+    store: Store,
+) -> None:
+    before, between = finished(store), finished(store)
+    store.extend(before, BUDGET + 5)
+    run(store, before)
+    store.extend(between, BUDGET + 1)
+    claim = store.claim("runner", lease_seconds=30.0, job_id=between)
+    assert claim is not None and claim.ask is None
+    store.extend(between, BUDGET + 5)
+    done = run_claim(claim, Surroundings(store, FormulaEvaluator()))
+    assert (done.state, done.progress.iterations) == (JobState.SUCCEEDED, BUDGET + 5)
+    assert history(store, between) == history(store, before)
+
+
 def test_a_running_job_that_is_extended_in_its_last_iteration_does_not_end(store: Store) -> None:
     running, at_once = queued(store), finished(store)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,6 +53,21 @@ def test_a_runner_under_an_older_budget_is_told_before_anything_is_stored(
     with pytest.raises(BudgetChanged):
         store.commit(claim, completed(0), ask(1))
     assert store.job(claim.job.id).progress.iterations == 0
+
+
+def test_a_runner_that_begins_under_an_older_budget_is_told_so_too(store: SqlStore) -> None:
+    store.create_job(spec())
+    claim = store.claim("runner-a", lease_seconds=LEASE)
+    assert claim is not None
+    store.extend(claim.job.id, 40)
+    with pytest.raises(BudgetChanged):
+        store.begin(claim, ask(0))
+    assert store.claim("runner-a", lease_seconds=LEASE) is None
+    current = replace(claim, job=store.job(claim.job.id))
+    store.begin(current, ask(0))
+    # What was asked stays, so whoever begins once more need not know of a later budget.
+    store.extend(claim.job.id, 50)
+    store.begin(current, ask(0))
 
 
 def test_who_claims_an_extended_job_gets_the_last_ask_with_its_fitness(

@@ -5,6 +5,7 @@ and answers the last of them with an event. An action that raises voids those af
 
 event                  in phase     actions                        phase after
 Claimed                start        [Begin,] Evaluate              evaluating
+Extended               evaluating   Begin, Evaluate                evaluating
 Evaluated              evaluating   Commit                         committing
 Committed(running)     committing   Evaluate                       evaluating
 Committed(any other)   committing   -                              ended
@@ -30,7 +31,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.job import (
+    Answered,
+    Ask,
+    Claim,
+    CompletedIteration,
+    Job,
+    JobState,
+)
 from services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.events import (
@@ -90,13 +98,15 @@ class Coordination:
     """Where one run of one job is. Never changed, only replaced.
 
     The optimizer is not kept: it is made from the stored ask whenever it is needed, so that going
-    on and resuming are one and the same path. done, following: those of a commit under way.
+    on and resuming are one and the same path. answered: what the claim brought where it brought no
+    ask. done, following: those of a commit under way.
     """
 
     backoff: Backoff = field(default_factory=Backoff)
     phase: Phase = Phase.START
     job: Job | None = None
     recordings: Recordings = field(default_factory=dict)
+    answered: Answered | None = None
     ask: Ask | None = None
     done: CompletedIteration | None = None
     following: Ask | None = None
@@ -120,6 +130,8 @@ def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Act
     match state.phase, event:
         case Phase.START, Claimed(claim=claim):
             return _start(state, claim)
+        case Phase.EVALUATING, Extended(job=job):
+            return _begin(state, job)
         case Phase.EVALUATING, Evaluated():
             return _complete(state, event)
         case Phase.EVALUATING, EvaluatorLost(reason=reason):
@@ -142,17 +154,23 @@ def _start(state: Coordination, claim: Claim) -> tuple[Coordination, tuple[Actio
         phase=Phase.EVALUATING,
         job=claim.job,
         recordings=claim.recordings,
+        answered=claim.answered,
         ask=claim.ask,
     )
     if claim.ask is not None:
         return state, (_evaluate(state),)
-    if claim.answered is not None:
-        first = _following(claim.job.spec, claim.answered.ask, claim.answered.fitness)
+    return _begin(state, claim.job)
+
+
+def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
+    """From the last answered ask if there is one, under the job's present budget."""
+    if state.answered is not None:
+        first = _following(job.spec, state.answered.ask, state.answered.fitness)
     else:
-        first = _ask(create_optimizer(claim.job.spec))
+        first = _ask(create_optimizer(job.spec))
     if first is None:
-        raise ValueError(f"job {claim.job.id} has spent its budget")
-    state = replace(state, ask=first)
+        raise ValueError(f"job {job.id} has spent its budget")
+    state = replace(state, job=job, ask=first)
     return state, (Begin(first), _evaluate(state))
 
 

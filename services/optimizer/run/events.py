@@ -52,9 +52,7 @@ class Committed:
 
 @dataclass(frozen=True, slots=True)
 class Extended:
-    """The iteration is not stored: the job has got another budget, and what follows is to be asked
-    under it.
-    """
+    """Nothing is stored: the job has another budget, under which what follows is to be asked."""
 
     job: Job
 

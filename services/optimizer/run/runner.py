@@ -133,6 +133,9 @@ class _Run:
                 answer = self._do(action)
         except LeaseLost:
             return LeaseWasLost()
+        except BudgetChanged:
+            self.claim = replace(self.claim, job=self.around.store.job(self.claim.job.id))
+            return Extended(self.claim.job)
         except EvaluationStopped:
             return LeaseWasLost() if self.heartbeat.lost else StopRequested()
         if answer is None:
@@ -147,11 +150,7 @@ class _Run:
             case Evaluate(request=request):
                 return self._evaluate(request)
             case Commit(done=done, following=following):
-                try:
-                    state = self.around.store.commit(self.claim, done, following)
-                except BudgetChanged:
-                    self.claim = replace(self.claim, job=self.around.store.job(self.claim.job.id))
-                    return Extended(self.claim.job)
+                state = self.around.store.commit(self.claim, done, following)
                 if self.around.on_commit is not None:
                     self.around.on_commit(done, state)
                 return Committed(state)

@@ -110,7 +110,20 @@ class Store(Protocol):
         """Heartbeat: extend the lease; returns the state, so that pausing is seen."""
 
     def begin(self, claim: Claim, ask: Ask) -> None:
-        """Store the first ask of a job. Repeated, it keeps the ask that is there."""
+        """Store the ask that a job begins with, or goes on with after an extension.
+
+        Repeated, it keeps the ask that is there.
+
+        Args:
+            claim: Of whoever runs the job.
+            ask: What is to be evaluated next.
+
+        Raises:
+            BudgetChanged: The job has another budget than the claim's, under which the ask would
+                be another; nothing is stored.
+            Conflict: The ask is not of the job's next iteration.
+            LeaseLost: The claim is no longer the job's.
+        """
 
     def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
         """Store a completed iteration and the next ask, in one transaction.

@@ -15,13 +15,20 @@ from typing import Any, Final
 import numpy as np
 from sqlalchemy import ColumnElement, Connection, Select, and_, insert, or_, select, update
 
-from services.optimizer.errors import Conflict, IdempotencyConflict, LeaseLost, NotFound
+from services.optimizer.errors import (
+    BudgetChanged,
+    Conflict,
+    IdempotencyConflict,
+    LeaseLost,
+    NotFound,
+)
 from services.optimizer.jobs.job import Answered, Ask, Claim, CompletedIteration, Job, JobState
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
     best_particle,
+    budget,
     evaluation_rows,
     iteration_summary,
     spec_document,
@@ -244,6 +251,12 @@ def held(connection: Connection, claim: Claim) -> Row:
     owner = row["lease_owner"]
     now = f"held by {owner}" if owner is not None else f"{row['state']} and held by nobody"
     raise LeaseLost(f"{claim.runner} has lost job {claim.job.id}: it is {now}")
+
+
+def require_budget_of(claim: Claim, row: Row) -> None:
+    """Raise BudgetChanged if the job was extended since the claim's job was read."""
+    if budget(row) != claim.job.spec.iterations:
+        raise BudgetChanged(f"job {row['id']} is to run {budget(row)} iterations now")
 
 
 def lease_is_live(row: Row, now: datetime) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, Final
 from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.errors import BudgetChanged, InvalidRequest, NotFound
+from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import (
     Ask,
@@ -49,13 +49,13 @@ from services.optimizer.store.records import (
     outstanding_ask,
     progress_after,
     repeated_job,
+    require_budget_of,
     state_after_commit,
     state_after_release,
     update_job,
 )
 from services.optimizer.store.rows import (
     LISTED,
-    budget,
     request_digest,
     to_evaluation,
     to_iteration,
@@ -244,6 +244,7 @@ class SqlStore:
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             if outstanding_ask(connection, row) is None:
+                require_budget_of(claim, row)
                 now = self._clock(connection)
                 insert_ask(connection, row, ask, expected=row["iterations"], now=now)
 
@@ -254,8 +255,7 @@ class SqlStore:
             now = self._clock(connection)
             if done.iteration < row["iterations"]:
                 return JobState(row["state"])
-            if budget(row) != claim.job.spec.iterations:
-                raise BudgetChanged(f"job {row['id']} is to run {budget(row)} iterations now")
+            require_budget_of(claim, row)
             complete_iteration(connection, row, done, now)
             if following is not None:
                 insert_ask(connection, row, following, expected=done.iteration + 1, now=now)

@@ -31,7 +31,7 @@ from api.routes import (
     walks,
 )
 from api.security import SameSiteMiddleware, SecurityHeadersMiddleware
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from gaitswarm.views import PREFIX, ParticlesHeaderView
 from gaitswarm.views.replay import ReplayHeaderView
 from services.optimizer.service import JobService
@@ -51,9 +51,7 @@ _UNCOMPRESSED: Final = (
 )
 
 
-def create_app(
-    service: JobService, *, settings: ApiSettings, page_folder: Path = FOLDER
-) -> FastAPI:
+def create_app(service: JobService, *, settings: Settings, page_folder: Path = FOLDER) -> FastAPI:
     """The application around a service: routes, problems, limits, documentation, page.
 
     page_folder: of the built page; there need be none.
@@ -91,7 +89,7 @@ def create_app(
     add_problem_handlers(app)
     document_problems(app)
     document_headers(app, ReplayHeaderView, ParticlesHeaderView)
-    app.add_middleware(BodyLimitMiddleware, max_bytes=settings.max_body_bytes)
+    app.add_middleware(BodyLimitMiddleware, max_bytes=settings.api_max_body_bytes)
     app.add_middleware(
         GZipMiddleware, minimum_size=1024, compresslevel=6, exclude_content_types=_UNCOMPRESSED
     )

@@ -10,7 +10,7 @@ import anyio
 from fastapi import Depends, Path, Request
 from pydantic import Field
 
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 
@@ -23,14 +23,14 @@ class ApiContext:
     """
 
     service: JobService
-    settings: ApiSettings
+    settings: Settings
     stopping: asyncio.Event = field(default_factory=asyncio.Event)
     simulations: anyio.CapacityLimiter | None = None
 
     def simulation_slots(self) -> anyio.CapacityLimiter:
         """Limiter of simulations that compute at once; made in the event loop, on first use."""
         if self.simulations is None:
-            self.simulations = anyio.CapacityLimiter(self.settings.simulation_workers)
+            self.simulations = anyio.CapacityLimiter(self.settings.api_simulation_workers)
         return self.simulations
 
 

@@ -10,14 +10,14 @@ import sys
 from typing import cast
 
 from api.app import create_app
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 
 
 def document() -> str:
     """The document that /openapi.json answers, one field a line."""
     # No route is called, so none misses the service; nor do settings of the environment matter.
-    app = create_app(cast(JobService, None), settings=ApiSettings.model_construct())
+    app = create_app(cast(JobService, None), settings=Settings.model_construct())
     return json.dumps(app.openapi(), indent=1, ensure_ascii=False)
 
 

@@ -66,5 +66,5 @@ def _news(service: JobService, job_id: str, after: int | None) -> tuple[Job, tup
 
 async def _pause(context: ApiContext) -> None:
     """Until the next poll, or until the server stops."""
-    with anyio.move_on_after(context.settings.event_poll_seconds):
+    with anyio.move_on_after(context.settings.api_event_poll_seconds):
         await context.stopping.wait()

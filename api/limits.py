@@ -8,7 +8,7 @@ from typing import TypeVar
 from anyio.to_thread import run_sync
 
 from api.context import ApiContext
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 
 T = TypeVar("T")
@@ -21,14 +21,14 @@ async def computed(context: ApiContext, work: Callable[[], T]) -> T:
     """
     slots = context.simulation_slots()
     waiting = slots.statistics().tasks_waiting
-    if slots.available_tokens == 0 and waiting >= context.settings.simulation_queue:
+    if slots.available_tokens == 0 and waiting >= context.settings.api_simulation_queue:
         raise EvaluatorUnavailable("too many simulations are waiting; try again in a few seconds")
     return await run_sync(work, limiter=slots)
 
 
-def check_length(settings: ApiSettings, seconds: float, *, logged: bool, field: str) -> None:
+def check_length(settings: Settings, seconds: float, *, logged: bool, field: str) -> None:
     """Raise InvalidRequest of `field` for walks that last too long together [s]."""
-    limit = settings.max_logged_seconds if logged else settings.max_simulated_seconds
+    limit = settings.api_max_logged_seconds if logged else settings.api_max_simulated_seconds
     if seconds > limit:
         raise InvalidRequest(
             f"the walks last {seconds:g} s together, more than the {limit:g} s allowed"

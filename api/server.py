@@ -29,7 +29,7 @@ class ApiServer:
         config = uvicorn.Config(
             app,
             log_level=log_level,
-            timeout_graceful_shutdown=context.settings.shutdown_seconds,
+            timeout_graceful_shutdown=context.settings.api_shutdown_seconds,
             server_header=False,
         )
         self._server = _Server(config, context)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from services.runtime import EvaluatorKind
 
 SpecFile = Annotated[
     Path | None,
@@ -67,28 +64,26 @@ Db = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 EvaluatorOption = Annotated[
-    str, typer.Option("--evaluator", help="ray, or in-process (threads of this process).")
+    str | None,
+    typer.Option(
+        "--evaluator",
+        help="ray, or in-process (threads of this process). [env: GAITSWARM_EVALUATOR; default:"
+        " ray]",
+    ),
 ]
 
 Cpus = Annotated[
-    int | None, typer.Option(min=1, help="Walks to compute at once on this machine; default all.")
+    int | None,
+    typer.Option(
+        min=1,
+        help="Walks to compute at once on this machine. [env: GAITSWARM_CPUS; default: all cores]",
+    ),
 ]
 
 RayAddress = Annotated[
     str | None,
-    typer.Option(metavar="ADDRESS", help="Use this Ray cluster; else one is started, and ended."),
+    typer.Option(
+        metavar="ADDRESS",
+        help="Use this Ray cluster; else one is started, and ended. [env: GAITSWARM_RAY_ADDRESS]",
+    ),
 ]
-
-
-def evaluator_kind(name: str) -> EvaluatorKind:
-    """Raises InvalidRequest that says which there are."""
-    from typing import get_args
-
-    from services.optimizer.errors import InvalidRequest
-    from services.runtime import EvaluatorKind
-
-    for kind in get_args(EvaluatorKind):
-        if kind == name:
-            return cast("EvaluatorKind", kind)
-    known = ", ".join(get_args(EvaluatorKind))
-    raise InvalidRequest(f"{name!r} is none of {known}", field="evaluator")

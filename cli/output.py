@@ -70,11 +70,12 @@ def warnings_as_notes() -> None:
     warnings.showwarning = show
 
 
-def log_to_stderr() -> None:
-    """Show what a long-running process logs."""
+def log_to_stderr(level: str) -> None:
+    """Show what a long-running process logs, from a level such as "INFO" on."""
     logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s"
+        stream=sys.stderr, level=level, format="%(asctime)s %(levelname)s %(message)s"
     )
+    # Every start would tell of migrations that are already done.
     logging.getLogger("alembic").setLevel(logging.WARNING)
 
 

@@ -1,32 +1,131 @@
-"""Which jobs a command is about: those of a server, or those in a database."""
+"""Settings of every process of gaitswarm, from its environment."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from services.optimizer.errors import InvalidRequest, StoreUnavailable
+from services.worker import EvaluatorKind
 
-class CliSettings(BaseSettings):
-    """Read from the environment, prefix GAITSWARM_; an option of the command goes before."""
+LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
+
+
+class Settings(BaseSettings):
+    """What a process reads when it starts; each variable is a field's name after `GAITSWARM_`.
+
+    Whatever belongs to a job is in its spec instead. An empty variable counts as one that is not
+    set. Use `read_settings`, whose errors are for people.
+    """
 
     model_config = SettingsConfigDict(
         env_prefix="GAITSWARM_", env_ignore_empty=True, frozen=True, extra="ignore"
     )
 
     server: str | None = Field(
-        default=None, description="URL of a gaitswarm server that commands are sent to."
+        default=None, description="URL of a server that commands about jobs are sent to."
     )
     db: str | None = Field(
         default=None,
         description="Database of the jobs: a file name, sqlite:///FILE or"
-        " postgresql://USER:PASSWORD@HOST/DATABASE. Default: a file in the user's data directory.",
+        " postgresql://USER:PASSWORD@HOST/DATABASE. Default: `default_database`.",
     )
+    evaluator: EvaluatorKind = Field(default="ray", description="Where walks run.")
+    ray_address: str | None = Field(
+        default=None, description="Ray cluster to use; one is started if there is none."
+    )
+    cpus: int | None = Field(
+        default=None, ge=1, description="Walks to compute at once on this machine; default all."
+    )
+    concurrent_jobs: int = Field(default=2, ge=1, le=256, description="Jobs to run at once.")
+    lease_seconds: float = Field(
+        default=30.0,
+        ge=3.0,
+        le=3600.0,
+        description="After so long without a word from its process a job is taken over [s].",
+    )
+    log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
+    api_host: str = Field(default="127.0.0.1", description="Address to listen on.")
+    api_port: int = Field(
+        default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one."
+    )
+    api_max_body_bytes: int = Field(
+        default=1 << 20, ge=1, description="Largest request body that is read [B]."
+    )
+    api_event_poll_seconds: float = Field(
+        default=0.5, gt=0.0, le=60.0, description="How often an event stream asks the store [s]."
+    )
+    api_simulation_workers: int = Field(
+        default=2, ge=1, le=64, description="Walks on request that compute at the same time."
+    )
+    api_simulation_queue: int = Field(
+        default=16, ge=0, description="Further ones that may wait; more are told to come later."
+    )
+    api_max_simulated_seconds: float = Field(
+        default=300.0, gt=0.0, description="Longest walk of one request, all scenarios added [s]."
+    )
+    api_max_logged_seconds: float = Field(
+        default=40.0, gt=0.0, description="The same for a request that asks for logs [s]."
+    )
+    api_shutdown_seconds: int = Field(
+        default=5, ge=1, le=600, description="How long open requests may finish on shutdown [s]."
+    )
+
+    @property
+    def database(self) -> str:
+        """URL of the database of the jobs; the user's own unless another is named.
+
+        Raises:
+            StoreUnavailable: None is named, and there is no home directory.
+        """
+        return self.db or str(default_database())
+
+
+def read_settings(**options: Any) -> Settings:
+    """The environment's settings with a command's options laid over them.
+
+    Args:
+        **options: Values by field; None leaves a setting to the environment.
+
+    Returns:
+        The settings, checked.
+
+    Raises:
+        InvalidRequest: A value makes no sense; names the variable that it comes from, or the
+            option.
+    """
+    given = {name: value for name, value in options.items() if value is not None}
+    try:
+        return Settings(**given)
+    except ValidationError as error:
+        problems = [
+            (_source(str(problem["loc"][0]), given), problem["msg"])
+            for problem in error.errors(include_url=False, include_input=False)
+        ]
+        (field, message), *others = problems
+        more = "".join(f"; {name}: {text}" for name, text in others)
+        raise InvalidRequest(message + more, field=field) from error
 
 
 def default_database() -> Path:
-    """The user's own database, the same for every command; its directory may not exist yet."""
+    """The user's own database, the same for every process; its directory may not exist yet.
+
+    Raises:
+        StoreUnavailable: There is no home directory.
+    """
     base = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
-    return Path(base).expanduser() / "gaitswarm" / "gaitswarm.db"
+    try:
+        return Path(base).expanduser() / "gaitswarm" / "gaitswarm.db"
+    except RuntimeError as error:
+        raise StoreUnavailable(
+            "there is no home directory to keep a database in; name one with --db or GAITSWARM_DB"
+        ) from error
+
+
+def _source(field: str, given: dict[str, Any]) -> str:
+    """Where the user has set a field: an option of the command, or a variable."""
+    return field.removeprefix("api_") if field in given else f"GAITSWARM_{field.upper()}"

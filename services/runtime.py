@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from services.optimizer.errors import Conflict
 from services.optimizer.jobs.job import Claim, Job, JobState
@@ -25,8 +25,7 @@ from services.optimizer.run.runner import (
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
-
-EvaluatorKind = Literal["ray", "in-process"]
+from services.worker import EvaluatorKind
 
 EMBEDDED_LEASE_SECONDS: Final = 5.0
 """Short, because a person waits for it when the process before was killed."""
@@ -56,56 +55,55 @@ def open_evaluator(
 
 
 @dataclass(frozen=True, slots=True)
-class RuntimeSettings:
-    """What a process that runs jobs is made of.
-
-    database: URL for `open_store`. evaluator None: jobs are run elsewhere.
-    """
-
-    database: str
-    evaluator: EvaluatorKind | None = "ray"
-    ray_address: str | None = None
-    cpus: int | None = None
-    concurrent_jobs: int = 2
-    lease_seconds: float = 30.0
-
-
-@dataclass(frozen=True, slots=True)
 class Runtime:
-    """What was opened. runner is None in a process that runs no jobs."""
+    """What was opened. evaluator and runner are None in a process that runs no jobs."""
 
-    store: Store
     service: JobService
     evaluator: Evaluator | None
     runner: Runner | None
 
 
 @contextmanager
-def open_runtime(settings: RuntimeSettings) -> Iterator[Runtime]:
-    """Open what the settings name and run queued jobs until the block is left; then close it.
+def open_runtime(
+    database: str,
+    *,
+    evaluator: EvaluatorKind | None = "ray",
+    ray_address: str | None = None,
+    cpus: int | None = None,
+    concurrent_jobs: int = 2,
+    lease_seconds: float = 30.0,
+) -> Iterator[Runtime]:
+    """Open a database and run its queued jobs until the block is left; then close all.
 
-    Raises StoreUnavailable, EvaluatorUnavailable.
+    Args:
+        database: URL for `open_store`.
+        evaluator: Where walks run; None for a process that runs no jobs.
+        ray_address: Of a Ray cluster; None starts one that ends with this process.
+        cpus: Walks to compute at once on this machine; all of its cores by default.
+        concurrent_jobs: Jobs to run at once.
+        lease_seconds: After so long without a word from this process another one takes its jobs
+            over [s].
+
+    Yields:
+        What was opened.
+
+    Raises:
+        StoreUnavailable: The database cannot be opened.
+        EvaluatorUnavailable: The workers cannot be started or reached.
     """
     with ExitStack() as stack:
-        store = open_store(settings.database)
+        store = open_store(database)
         stack.callback(store.close)
         service = JobService(store)
-        if settings.evaluator is None:
-            yield Runtime(store, service, None, None)
+        if evaluator is None:
+            yield Runtime(service, None, None)
             return
-        evaluator = open_evaluator(
-            settings.evaluator, address=settings.ray_address, cpus=settings.cpus
-        )
-        stack.callback(evaluator.close)
-        runner = Runner(
-            store,
-            evaluator,
-            concurrency=settings.concurrent_jobs,
-            lease_seconds=settings.lease_seconds,
-        )
+        workers = open_evaluator(evaluator, address=ray_address, cpus=cpus)
+        stack.callback(workers.close)
+        runner = Runner(store, workers, concurrency=concurrent_jobs, lease_seconds=lease_seconds)
         stack.callback(runner.stop)
         runner.start()
-        yield Runtime(store, service, evaluator, runner)
+        yield Runtime(service, workers, runner)
 
 
 def run_embedded(
@@ -192,7 +190,6 @@ def _claim(
 __all__ = [
     "EvaluatorKind",
     "Runtime",
-    "RuntimeSettings",
     "open_evaluator",
     "open_runtime",
     "open_store",

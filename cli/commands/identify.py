@@ -93,7 +93,7 @@ def identify(
     name: JobName = None,
     truth: Truth = None,
     db: Db = None,
-    evaluator: EvaluatorOption = "ray",
+    evaluator: EvaluatorOption = None,
     cpus: Cpus = None,
     ray_address: RayAddress = None,
     as_json: Json = False,
@@ -102,13 +102,13 @@ def identify(
     from contextlib import closing
 
     from cli.embedded import Embedded
-    from cli.options import evaluator_kind
     from cli.output import note
     from cli.parameters_table import read_truth, show_parameters
     from cli.robots import chosen_robot
     from cli.spec_file import parse_spec
     from gaitswarm.jobs.local import LocalJobs
-    from gaitswarm.jobs.open import database_url
+    from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.settings import read_settings
     from services.optimizer.jobs.job import JobState
     from services.optimizer.service import JobService
     from services.runtime import open_store
@@ -126,8 +126,9 @@ def identify(
         "iterations": iterations,
     }
     specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
-    workers = Embedded(evaluator_kind(evaluator), ray_address=ray_address, cpus=cpus)
-    url = database_url(db)
+    settings = read_settings(db=db, evaluator=evaluator, ray_address=ray_address, cpus=cpus)
+    workers = Embedded(settings.evaluator, settings.ray_address, settings.cpus)
+    url = database_to_write(settings)
     with closing(open_store(url)) as store:
         service = JobService(store)
         submitted = [service.submit(spec)[0] for spec in specs]

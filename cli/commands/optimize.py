@@ -53,7 +53,7 @@ def optimize(
         ),
     ] = False,
     db: Db = None,
-    evaluator: EvaluatorOption = "ray",
+    evaluator: EvaluatorOption = None,
     cpus: Cpus = None,
     ray_address: RayAddress = None,
     as_json: Json = False,
@@ -62,25 +62,26 @@ def optimize(
     from contextlib import closing
 
     from cli.embedded import Embedded, finish, resumed_job
-    from cli.options import evaluator_kind
     from cli.output import note
     from cli.spec_file import Overrides, build_spec
     from gaitswarm.jobs.local import LocalJobs
-    from gaitswarm.jobs.open import database_url
+    from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.settings import read_settings
     from services.optimizer.errors import InvalidRequest
     from services.optimizer.service import JobService
     from services.runtime import open_store
 
     if as_json and compare_published:
         raise InvalidRequest("is for people; leave it out with --json", field="compare-published")
-    workers = Embedded(evaluator_kind(evaluator), ray_address=ray_address, cpus=cpus)
+    settings = read_settings(db=db, evaluator=evaluator, ray_address=ray_address, cpus=cpus)
+    workers = Embedded(settings.evaluator, settings.ray_address, settings.cpus)
     overrides = Overrides(
         iterations, particles, seed, preference, scenarios, controller, name, robot
     )
     asked = None
     if resume is None or spec is not None or overrides.any:
         asked = build_spec(spec, overrides)
-    url = database_url(db)
+    url = database_to_write(settings)
     with closing(open_store(url)) as store:
         service = JobService(store)
         jobs = LocalJobs(service, url)

@@ -1,20 +1,34 @@
-"""`gaitswarm serve`: the HTTP API, with a runner beside it."""
+"""`gaitswarm serve` and `gaitswarm runner`: the processes that run queued jobs."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.options import Cpus, Db, EvaluatorOption, RayAddress
 
 if TYPE_CHECKING:
-    from api.settings import ApiSettings
+    from contextlib import AbstractContextManager
+
+    from gaitswarm.settings import Settings
+    from services.runtime import Runtime
+
+ConcurrentJobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        min=1,
+        max=256,
+        help="Jobs to run at once. [env: GAITSWARM_CONCURRENT_JOBS; default: 2]",
+    ),
+]
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command."""
+    """Add the commands."""
     app.command()(serve)
+    app.command()(runner)
 
 
 def serve(
@@ -34,8 +48,8 @@ def serve(
     no_runner: Annotated[
         bool, typer.Option("--no-runner", help="Run no jobs; other processes do.")
     ] = False,
-    jobs: Annotated[int, typer.Option(min=1, max=256, help="Jobs to run at once.")] = 2,
-    evaluator: EvaluatorOption = "ray",
+    jobs: ConcurrentJobs = None,
+    evaluator: EvaluatorOption = None,
     cpus: Cpus = None,
     ray_address: RayAddress = None,
 ) -> None:
@@ -43,29 +57,28 @@ def serve(
     from api.app import create_app
     from api.page_folder import is_built
     from api.server import ApiServer
-    from cli.options import evaluator_kind
     from cli.output import log_to_stderr, note
-    from gaitswarm.jobs.open import database_url
+    from gaitswarm.settings import read_settings
     from services.optimizer.errors import EvaluatorUnavailable
-    from services.runtime import RuntimeSettings, open_runtime
 
-    log_to_stderr()
-    settings = _api_settings(host=host, port=port)
-    runtime = RuntimeSettings(
-        database_url(db),
-        evaluator=None if no_runner else evaluator_kind(evaluator),
-        ray_address=ray_address,
-        cpus=cpus,
+    settings = read_settings(
+        db=db,
+        api_host=host,
+        api_port=port,
         concurrent_jobs=jobs,
+        evaluator=evaluator,
+        cpus=cpus,
+        ray_address=ray_address,
     )
-    with open_runtime(runtime) as opened:
+    log_to_stderr(settings.log_level)
+    with _runtime(settings, runs_jobs=not no_runner) as opened:
         app = create_app(opened.service, settings=settings)
         try:
-            server = ApiServer(app, host=settings.host, port=settings.port)
+            server = ApiServer(app, host=settings.api_host, port=settings.api_port)
         except OSError as error:
             raise EvaluatorUnavailable(
-                f"cannot listen on {settings.host}, port {settings.port}: {error.strerror}; choose"
-                " another --port, or --port 0"
+                f"cannot listen on {settings.api_host}, port {settings.api_port}:"
+                f" {error.strerror}; choose another --port, or --port 0"
             ) from error
         doing = "runs no jobs" if opened.runner is None else "runs queued jobs"
         if not is_built():
@@ -74,22 +87,46 @@ def serve(
         server.run()
 
 
-def _api_settings(*, host: str | None, port: int | None) -> ApiSettings:
-    """The server's settings from the environment, with options laid over them.
+def runner(
+    db: Db = None,
+    jobs: ConcurrentJobs = None,
+    evaluator: EvaluatorOption = None,
+    cpus: Cpus = None,
+    ray_address: RayAddress = None,
+) -> None:
+    """Run queued jobs, without page and API, until Ctrl-C or SIGTERM.
 
-    Raises InvalidRequest that names the variable.
+    The jobs that are then under way go back to the queue.
     """
-    from pydantic import ValidationError
+    import logging
+    import threading
 
-    from api.settings import ApiSettings
-    from services.optimizer.errors import InvalidRequest
+    from cli.output import log_to_stderr
+    from gaitswarm.settings import read_settings
+    from services.runtime import stop_on_signals
 
-    given: dict[str, Any] = {
-        name: v for name, v in (("host", host), ("port", port)) if v is not None
-    }
-    try:
-        return ApiSettings(**given)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        name = "_".join(str(part) for part in first["loc"]).upper()
-        raise InvalidRequest(first["msg"], field=f"GAITSWARM_API_{name}") from error
+    settings = read_settings(
+        db=db, concurrent_jobs=jobs, evaluator=evaluator, cpus=cpus, ray_address=ray_address
+    )
+    log_to_stderr(settings.log_level)
+    log = logging.getLogger(__name__)
+    stop = threading.Event()
+    with stop_on_signals(stop), _runtime(settings) as opened:
+        slots = opened.evaluator.slots if opened.evaluator else 0
+        log.info("ready: %d slots, %d jobs at once", slots, settings.concurrent_jobs)
+        stop.wait()
+        log.info("stopping: jobs under way go back to the queue")
+
+
+def _runtime(settings: Settings, *, runs_jobs: bool = True) -> AbstractContextManager[Runtime]:
+    from gaitswarm.jobs.open import database_to_write
+    from services.runtime import open_runtime
+
+    return open_runtime(
+        database_to_write(settings),
+        evaluator=settings.evaluator if runs_jobs else None,
+        ray_address=settings.ray_address,
+        cpus=settings.cpus,
+        concurrent_jobs=settings.concurrent_jobs,
+        lease_seconds=settings.lease_seconds,
+    )

@@ -15,7 +15,7 @@ import pytest
 
 from api.app import create_app
 from api.server import ApiServer
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, Job
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
@@ -66,7 +66,7 @@ class Server:
     def __init__(
         self, service: JobService | None, *, page_folder: Path = Path("none"), **settings: Any
     ) -> None:
-        values = ApiSettings(**{"event_poll_seconds": 0.02, **settings})
+        values = Settings(**{"api_event_poll_seconds": 0.02, **settings})
         self.app = create_app(cast(JobService, service), settings=values, page_folder=page_folder)
         self._server = ApiServer(self.app, host="127.0.0.1", port=0, log_level="critical")
         self._thread = threading.Thread(target=self._server.run)

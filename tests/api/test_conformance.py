@@ -18,7 +18,7 @@ from schemathesis.specs.openapi.checks import (
 )
 
 from api.app import create_app
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 
@@ -33,7 +33,7 @@ CHECKS = [
 
 
 # The parameters of a test are needed before there is a server: the document is the same without.
-_APP = create_app(cast(JobService, None), settings=ApiSettings())
+_APP = create_app(cast(JobService, None), settings=Settings())
 
 # Streams end with their jobs only, and are tested apart.
 schema = schemathesis.openapi.from_dict(_APP.openapi()).exclude(operation_id="stream_events")

@@ -178,7 +178,7 @@ def test_an_idle_stream_is_kept_alive_by_comments(
 
 
 def test_a_waiting_stream_holds_no_transaction(serve, database: Path, job: Job) -> None:
-    server = serve(event_poll_seconds=30.0)
+    server = serve(api_event_poll_seconds=30.0)
 
     with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
         next(parsed(answer.iter_lines()))
@@ -191,7 +191,7 @@ def test_a_waiting_stream_holds_no_transaction(serve, database: Path, job: Job) 
 
 
 def test_a_stopping_server_ends_open_streams(serve, job: Job) -> None:
-    server = serve(event_poll_seconds=60.0, shutdown_seconds=60)
+    server = serve(api_event_poll_seconds=60.0, api_shutdown_seconds=60)
 
     with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
         stream = parsed(answer.iter_lines())

@@ -16,7 +16,7 @@ import pytest
 
 from api.app import create_app
 from api.server import ApiServer
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 
@@ -24,12 +24,12 @@ PROGRAM = """
 import sys
 from api.app import create_app
 from api.server import serve
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 
 store = open_store(sys.argv[1])
-settings = ApiSettings(event_poll_seconds=60.0, shutdown_seconds=60)
+settings = Settings(api_event_poll_seconds=60.0, api_shutdown_seconds=60)
 app = create_app(JobService(store), settings=settings)
 serve(app, host="127.0.0.1", port=0, announce=lambda url: print(url, flush=True))
 store.close()
@@ -68,7 +68,7 @@ def test_a_signal_ends_the_process_within_seconds_in_spite_of_open_streams(
 
 
 def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobService) -> None:
-    app = create_app(service, settings=ApiSettings())
+    app = create_app(service, settings=Settings())
     server = ApiServer(app, host="127.0.0.1", port=0)
     host, _, port = server.url.removeprefix("http://").partition(":")
     thread = threading.Thread(target=server.run)
@@ -84,7 +84,7 @@ def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobSe
 
 
 def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
-    app = create_app(service, settings=ApiSettings())
+    app = create_app(service, settings=Settings())
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
         ApiServer(app, host="127.0.0.1", port=taken.getsockname()[1])
 
@@ -105,10 +105,3 @@ def test_the_api_brings_in_neither_ray_nor_a_database() -> None:
     )
 
     assert done.stdout.strip() == ""
-
-
-def test_settings_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("GAITSWARM_API_PORT", "1234")
-
-    assert ApiSettings().port == 1234
-    assert ApiSettings(port=0).port == 0

@@ -122,7 +122,7 @@ def test_a_request_that_makes_no_sense_is_refused_by_field(
 
 
 def test_logs_are_limited_more_than_walks(serve) -> None:
-    client = serve(max_logged_seconds=1.0).client
+    client = serve(api_max_logged_seconds=1.0).client
 
     assert simulated(client, scenarios=[SHORT])["fitness"] is not None
     problem = refused(client, scenarios=[SHORT], log=True)

@@ -16,8 +16,8 @@ import pytest
 from api.app import create_app
 from api.context import ApiContext
 from api.server import ApiServer
-from api.settings import ApiSettings
 from cli.main import run
+from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.runtime import open_store
 
@@ -120,7 +120,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 @pytest.fixture(scope="session")
 def lasting_server() -> Iterator[tuple[str, ApiContext]]:
     """One server for all tests, its URL and what to change of it; starting one takes longer."""
-    app = create_app(cast(JobService, None), settings=ApiSettings(event_poll_seconds=0.02))
+    app = create_app(cast(JobService, None), settings=Settings(api_event_poll_seconds=0.02))
     server = ApiServer(app, host="127.0.0.1", port=0, log_level="critical")
     thread = threading.Thread(target=server.run)
     thread.start()

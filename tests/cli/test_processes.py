@@ -8,12 +8,15 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import IO, Any
 
 import pytest
 
+from services.runtime import open_store
 from tests.cli.conftest import SMALL_SPEC, Gaitswarm, WriteJson
 
 pytestmark = pytest.mark.slow
@@ -63,6 +66,29 @@ def test_a_job_submitted_to_a_server_is_run_by_it(
     job = gaitswarm("status", job_id, *where, "--json").json
     assert job["state"] == "succeeded"
     assert gaitswarm("best", job_id, *where, "--json").json == job["best"]
+
+
+def test_the_jobs_of_a_server_that_is_killed_are_free_after_the_lease_of_its_settings(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAITSWARM_LEASE_SECONDS", "3")
+    spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
+    job_id = gaitswarm("submit", "--spec", spec, "--db", db).out.strip()
+    server = _start("serve", "--db", db, "--port", "0", "--evaluator", "in-process")
+    with closing(open_store(str(db))) as store:
+        _eventually(lambda: store.job(job_id).progress.iterations > 0)
+        server.kill()
+        server.communicate()
+        killed = time.monotonic()
+        _eventually(lambda: store.claim("another", lease_seconds=3.0, job_id=job_id) is not None)
+        assert time.monotonic() - killed < 15.0
+
+
+def _eventually(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen within a minute"
+        time.sleep(0.05)
 
 
 def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_never_stopped(

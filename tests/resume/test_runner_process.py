@@ -1,4 +1,4 @@
-"""`python -m services`, the process that runs queued jobs."""
+"""`gaitswarm runner`, the process that runs queued jobs."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from cli.exit_codes import ExitCode
+from gaitswarm.jobs.open import open_jobs
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.runtime import open_store
@@ -46,7 +48,7 @@ def runner(**settings: str) -> Iterator[subprocess.Popen[str]]:
     environment = os.environ | {"PYTHONPATH": str(ROOT), "GAITSWARM_EVALUATOR": "in-process"}
     environment |= {f"GAITSWARM_{name}": value for name, value in settings.items()}
     with subprocess.Popen(
-        [sys.executable, "-m", "services"],
+        [sys.executable, "-c", "from cli.main import main; main()", "runner"],
         env=environment,
         stderr=subprocess.PIPE,
         text=True,
@@ -83,18 +85,25 @@ def test_runs_what_is_queued_and_gives_back_what_it_has_not_finished(
     store.close()
 
 
+def test_without_settings_it_runs_the_jobs_of_the_users_own_database() -> None:
+    with open_jobs(None, None, create=True) as jobs:
+        job = jobs.submit(spec(1))
+        with runner(CPUS="1"):
+            eventually(lambda: jobs.job(job.id).state is JobState.SUCCEEDED)
+
+
 @pytest.mark.parametrize(
     ("name", "value"), [("CPUS", "none"), ("LEASE_SECONDS", "0"), ("EVALUATOR", "abacus")]
 )
 def test_a_setting_that_makes_no_sense_is_named(name: str, value: str) -> None:
     with runner(**{name: value}) as started:
         _, said = started.communicate(timeout=60)
-    assert started.returncode == 78
+    assert started.returncode == ExitCode.BAD_INPUT
     assert f"GAITSWARM_{name}" in said
 
 
 def test_a_database_out_of_reach_is_reported_without_a_traceback(tmp_path: Path) -> None:
     with runner(DB=f"sqlite:///{tmp_path}/no/such/folder/jobs.db") as started:
         _, said = started.communicate(timeout=60)
-    assert started.returncode == 69
+    assert started.returncode == ExitCode.UNAVAILABLE
     assert "Traceback" not in said and "no/such/folder" in said

@@ -1,16 +1,11 @@
-"""Every class that reads settings from the environment."""
+"""The settings that a process reads from its environment."""
 
 from __future__ import annotations
 
-from api.settings import ApiSettings
-from gaitswarm.settings import CliSettings
-from services.__main__ import Settings as RunnerSettings
+from gaitswarm.settings import Settings
 
 
 def variables() -> set[str]:
-    """Names of the environment variables that some process reads."""
-    return {
-        f"{settings.model_config['env_prefix']}{field}".upper()
-        for settings in (ApiSettings, CliSettings, RunnerSettings)
-        for field in settings.model_fields
-    }
+    """Names of the environment variables."""
+    prefix = Settings.model_config["env_prefix"]
+    return {f"{prefix}{field}".upper() for field in Settings.model_fields}

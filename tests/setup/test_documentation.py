@@ -9,7 +9,7 @@ from typing import cast
 import pytest
 
 from api.app import create_app
-from api.settings import ApiSettings
+from gaitswarm.settings import Settings
 from services.optimizer.jobs.documents import SPECS
 from services.optimizer.service import JobService
 from sim.scenario import SCENARIOS
@@ -42,7 +42,7 @@ def test_every_setting_is_documented_and_no_other() -> None:
 
 
 def test_every_route_is_documented_and_no_other() -> None:
-    app = create_app(cast(JobService, None), settings=ApiSettings())
+    app = create_app(cast(JobService, None), settings=Settings())
     routes = {
         f"{method.upper()} {path}"
         for path, item in app.openapi()["paths"].items()

@@ -46,6 +46,26 @@ def test_a_certain_job_can_be_claimed_before_its_turn(store: SqlStore, clock: Cl
     assert store.claim("runner-b", lease_seconds=LEASE, job_id=wanted.id) is None
 
 
+def test_a_job_that_is_created_claimed_is_nobody_elses_while_its_lease_lives(
+    store: SqlStore, clock: Clock
+) -> None:
+    claim = store.create_claimed_job(spec(), "runner-a", lease_seconds=LEASE)
+    assert store.job(claim.job.id) == claim.job
+    assert (claim.job.state, claim.job.started_at) == (JobState.RUNNING, clock.now)
+    assert (claim.runner, claim.ask, claim.answered) == ("runner-a", None, None)
+    clock.advance(LEASE - 0.001)
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
+    clock.advance(0.001)
+    assert taken(store).token > claim.token
+
+
+def test_a_job_that_is_created_claimed_is_run_with_its_claim(store: SqlStore) -> None:
+    claim = store.create_claimed_job(spec(iterations=1), "runner-a", lease_seconds=LEASE)
+    store.begin(claim, ask(0))
+    assert store.renew(claim, lease_seconds=LEASE) is JobState.RUNNING
+    assert store.commit(claim, completed(0), None) is JobState.SUCCEEDED
+
+
 def test_a_job_is_nobody_elses_while_its_lease_lives(store: SqlStore, clock: Clock) -> None:
     begun(store)
     clock.advance(LEASE - 0.001)

@@ -60,6 +60,20 @@ class Store(Protocol):
                 resolves to the same spec.
         """
 
+    def create_claimed_job(self, spec: Spec, runner: str, *, lease_seconds: float) -> Claim:
+        """Insert a job of the resolved spec that is running from the start, held by a runner.
+
+        It is never queued, so no other runner can have it before this one's lease runs out.
+
+        Args:
+            spec: What the job is to do.
+            runner: Who holds it.
+            lease_seconds: For how long, unless the claim is renewed [s].
+
+        Returns:
+            The claim, as `claim` would have given it for a new job.
+        """
+
     def job(self, job_id: str) -> Job:
         """One job with its progress."""
 

@@ -9,7 +9,7 @@ import re
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any, Final
 
 import numpy as np
@@ -24,6 +24,7 @@ from services.optimizer.errors import (
 )
 from services.optimizer.jobs.job import Answered, Ask, Claim, CompletedIteration, Job, JobState
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.recordings import load_recordings
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
@@ -238,6 +239,24 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
                 "best_particle": particle,
             }
     return columns
+
+
+def take_job(
+    connection: Connection, row: Row, runner: str, lease_seconds: float, now: datetime
+) -> Claim:
+    """Make a locked job, which nobody else holds, the runner's: it runs, under a higher token."""
+    token = row["lease_token"] + 1
+    changes = entering(JobState.RUNNING, now) | {
+        "started_at": row["started_at"] or now,
+        "lease_owner": runner,
+        "lease_token": token,
+        "lease_expires_at": now + timedelta(seconds=lease_seconds),
+    }
+    job = to_job(update_job(connection, row, changes))
+    walks = load_recordings(connection, job.spec.recording_ids)
+    ask = outstanding_ask(connection, row)
+    answered = answered_ask(connection, row) if ask is None else None
+    return Claim(job, runner, token, ask, walks, answered)
 
 
 def held(connection: Connection, claim: Claim) -> Row:

@@ -37,7 +37,6 @@ from services.optimizer.store.recordings import (
 )
 from services.optimizer.store.records import (
     Submission,
-    answered_ask,
     claimable,
     complete_iteration,
     entering,
@@ -52,6 +51,7 @@ from services.optimizer.store.records import (
     require_budget_of,
     state_after_commit,
     state_after_release,
+    take_job,
     update_job,
 )
 from services.optimizer.store.rows import (
@@ -119,6 +119,13 @@ class SqlStore:
             if earlier is None:
                 raise
         return earlier, False
+
+    def create_claimed_job(self, spec: Spec, runner: str, *, lease_seconds: float) -> Claim:
+        """Insert a job that is running from the start, held by `runner`."""
+        with self._database.transaction(write=True) as connection:
+            now = self._clock(connection)
+            job = insert_job(connection, Submission(spec.resolved()), now)
+            return take_job(connection, job_row(connection, job.id), runner, lease_seconds, now)
 
     def job(self, job_id: str) -> Job:
         """See `Store.job`."""
@@ -217,18 +224,7 @@ class SqlStore:
                 if row["state"] == JobState.PAUSING:
                     update_job(connection, row, entering(JobState.PAUSED, now))
                     continue
-                token = row["lease_token"] + 1
-                changes = entering(JobState.RUNNING, now) | {
-                    "started_at": row["started_at"] or now,
-                    "lease_owner": runner,
-                    "lease_token": token,
-                    "lease_expires_at": now + timedelta(seconds=lease_seconds),
-                }
-                job = to_job(update_job(connection, row, changes))
-                walks = load_recordings(connection, job.spec.recording_ids)
-                ask = outstanding_ask(connection, row)
-                answered = answered_ask(connection, row) if ask is None else None
-                return Claim(job, runner, token, ask, walks, answered)
+                return take_job(connection, row, runner, lease_seconds, now)
         return None
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:

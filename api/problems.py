@@ -25,6 +25,7 @@ from typing import Any, Final, cast
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from gaitswarm.views import FieldErrorView, ProblemView, field_errors
 from services.optimizer.errors import (
@@ -44,6 +45,8 @@ _log = logging.getLogger("gaitswarm.api")
 MEDIA_TYPE: Final = "application/problem+json"
 
 _RETRY: Final = {"Retry-After": "5"}
+
+_METHODS: Final = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 
 _MOST_ERRORS: Final = 20
 """A body can be wrong in ten thousand places; nobody reads them all."""
@@ -146,7 +149,22 @@ async def _on_http_error(request: Request, raised: Exception) -> Response:
     error = cast(HTTPException, raised)
     default = (f"http-{error.status_code}", str(error.detail))
     kind, advice = _HTTP.get(error.status_code, default)
-    return problem(request.url.path, error.status_code, kind, advice, headers=error.headers)
+    headers = error.headers
+    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+        # Starlette names the methods of the first route of a path alone.
+        headers = {"Allow": ", ".join(_methods(request))}
+    return problem(request.url.path, error.status_code, kind, advice, headers=headers)
+
+
+def _methods(request: Request) -> list[str]:
+    """Those that some route takes at the path that was asked for."""
+    routes = request.app.routes
+    scopes = {method: dict(request.scope) | {"method": method} for method in _METHODS}
+    return [
+        method
+        for method, scope in scopes.items()
+        if any(route.matches(scope)[0] is Match.FULL for route in routes)
+    ]
 
 
 async def _on_invalid(request: Request, raised: Exception) -> Response:

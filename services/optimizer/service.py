@@ -161,9 +161,17 @@ class JobService:
         """Every committed evaluation. Raises Conflict for a job too large to be held in memory."""
         return self._histories.columns(job)
 
-    def column_pieces(self, job: Job) -> Iterator[EvaluationColumns]:
-        """As `columns`, piece by piece as they are consumed: for histories of any length."""
-        step = max(1, _PIECE_ROWS // job.spec.optimizer.particles)
+    def column_pieces(self, job: Job, *, rows: int = _PIECE_ROWS) -> Iterator[EvaluationColumns]:
+        """As `columns`, piece by piece as they are consumed: for histories of any length.
+
+        Args:
+            job: As it was read; iterations committed later are left out.
+            rows: Evaluations in a piece at most, but one iteration at least.
+
+        Yields:
+            Whole iterations, in order.
+        """
+        step = max(1, rows // job.spec.optimizer.particles)
         for first in range(0, job.progress.iterations, step):
             last = min(first + step, job.progress.iterations)
             piece = self.store.evaluation_columns(job.id, first, last)

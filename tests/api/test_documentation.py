@@ -67,7 +67,7 @@ def test_every_route_has_a_summary_a_description_a_tag_and_a_short_id(document: 
     for name, operation in operations(document):
         assert operation["summary"], name
         assert len(operation["description"]) > 30, name
-        assert set(operation["tags"]) <= tags, name
+        assert len(operation["tags"]) == 1 and set(operation["tags"]) <= tags, name
         assert operation["operationId"].isidentifier(), name
 
 

@@ -15,6 +15,7 @@ from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import OBJECTIVE_NAMES
+from tests.api.conftest import PARTICLES
 
 pytestmark = pytest.mark.slow
 
@@ -80,15 +81,14 @@ def test_a_job_that_has_committed_nothing_has_a_table_without_rows(
         assert pq.read_table(io.BytesIO(content)).num_rows == 0
 
 
-def test_the_file_is_written_as_it_is_read(
-    store: SqlStore, job: Job, commit, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_file_is_written_as_it_is_read(store: SqlStore, job: Job, commit) -> None:
     commit(job, 3)
-    monkeypatch.setattr("services.optimizer.service._PIECE_ROWS", 4)
-    service = JobService(store)
+    committed = store.job(job.id)
     for file_format in ("csv", "parquet"):
-        parts = encoded_table(file_format, job.spec, service.column_pieces(store.job(job.id)))
-        assert len(list(parts)) == 4
+        pieces = JobService(store).column_pieces(committed, rows=PARTICLES)
+        parts = encoded_table(file_format, job.spec, pieces)
+        # One for the head or the foot of the file, and one for every piece.
+        assert len(list(parts)) == 1 + 3
 
 
 def test_another_format_is_refused_by_name(client: httpx2.Client, job: Job) -> None:

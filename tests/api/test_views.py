@@ -101,11 +101,23 @@ def test_a_history_keeps_every_bit_of_designs_and_objectives(
         assert list(objectives.values()) == stored.objectives[0].tolist()
 
 
-def test_a_job_views_json_reads_back_as_the_same_view(store: SqlStore, job: Job, commit) -> None:
+def test_a_job_view_is_read_from_json_with_every_bit_of_the_best_design(
+    store: SqlStore, job: Job, commit
+) -> None:
     commit(job, 3)
-    view = JobView.from_job_and_best(store.job(job.id), store.best(job.id))
+    stored, best = store.job(job.id), store.best(job.id)
+    assert best is not None
 
-    assert JobView.model_validate_json(view.model_dump_json()) == view
+    sent = JobView.from_job_and_best(stored, best).model_dump_json()
+    read = JobView.model_validate_json(sent)
+
+    assert (read.id, read.state, read.spec) == (stored.id, stored.state, stored.spec)
+    assert (read.iterations, read.evaluations) == (3, 12)
+    assert read.best is not None and read.best_fitness == read.best.fitness == best.fitness
+    assert list(read.best.design.values()) == best.design.tolist()
+    walks = [list(walk.objectives.values()) for walk in read.best.scenarios.values()]
+    assert walks == best.objectives.tolist()
+    assert read.model_dump_json() == sent
 
 
 @pytest.mark.slow

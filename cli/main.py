@@ -70,6 +70,9 @@ def run(arguments: Sequence[str]) -> int:
     try:
         app(list(arguments), prog_name="gaitswarm")
     except SystemExit as ended:
+        if isinstance(ended.__context__, BrokenPipeError):
+            # Typer has caught it, and ends in 1, which here is a job that failed.
+            return ExitCode.OK
         return ended.code if isinstance(ended.code, int) else int(bool(ended.code))
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED

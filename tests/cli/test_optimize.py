@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cli.spec_file import LARGEST_FILE
+from services.runtime import open_store
 from tests.cli.conftest import SMALL_SPEC, Finished, Gaitswarm, WriteJson
 
 pytestmark = pytest.mark.slow
@@ -134,7 +135,7 @@ BAD_FILES = {
     "no object": (b"[1, 2]", "one JSON object"),
     "no text": (b"\xff\xfe\x00", "not valid JSON"),
     "a name twice": (b'{"seed": 1, "seed": 2}', "'seed' occurs twice"),
-    "nested too deeply": (b"[" * 200_000, "not valid JSON"),
+    "nested too deeply": (b"[" * 200_000 + b"]" * 200_000, "nested too deeply"),
     "too large": (b'{"name": "' + b"x" * 10 * LARGEST_FILE + b'"}', "larger than 1 MiB"),
 }
 
@@ -148,8 +149,7 @@ def test_a_file_that_is_no_spec_is_exit_code_2(
     result = gaitswarm("optimize", "--spec", path, "--db", db)
     assert result.code == 2
     assert result.err.startswith("gaitswarm: spec: ")
-    if content[:1] != b"[" or len(content) < 100:
-        assert why in result.err
+    assert why in result.err
     assert not db.exists()
 
 
@@ -181,8 +181,12 @@ def test_a_directory_that_is_not_there_is_exit_code_5_and_named(
     assert str(missing) in result.err
 
 
-def test_json_floats_survive_the_way_through_text(finished: Finished, gaitswarm: Gaitswarm) -> None:
-    first = gaitswarm("history", finished.id, "--db", finished.db, "--json").out
-    assert json.loads(json.dumps(json.loads(first))) == json.loads(first)
-    design = json.loads(first)["iterations"][0]["evaluations"][0]["design"]
-    assert any(len(repr(value)) > 14 for value in design.values())
+def test_json_has_every_bit_of_what_is_stored(finished: Finished, gaitswarm: Gaitswarm) -> None:
+    told = gaitswarm("history", finished.id, "--db", finished.db, "--json").json
+    with closing(open_store(str(finished.db))) as store:
+        stored = store.evaluations_between(finished.id, 0, 2)
+    shown = [evaluation for i in told["iterations"] for evaluation in i["evaluations"]]
+    assert [e["fitness"] for e in shown] == [e.fitness for e in stored]
+    assert [list(e["design"].values()) for e in shown] == [e.design.tolist() for e in stored]
+    walks = [list(e["scenarios"]["short"]["objectives"].values()) for e in shown]
+    assert walks == [e.objectives[0].tolist() for e in stored]

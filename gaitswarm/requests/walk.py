@@ -120,6 +120,17 @@ class SimulationRequest(WalkRequest):
         """The preference in full."""
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
+    def check_walks(self) -> None:
+        """Check every walk before the first is run.
+
+        Raises:
+            InvalidRequest: The design cannot be compiled, or a gait leaves the legs' reach; names
+                the field.
+        """
+        self.check_design()
+        for index, scenario in enumerate(self.resolved_scenarios()):
+            self.check_reach(scenario, field=f"scenarios.{index}")
+
 
 def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> SimulationView:
     """Let the design walk in every scenario.
@@ -127,11 +138,8 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
     Raises InvalidRequest that names the field for a design that cannot be compiled or a gait that
     leaves the legs' reach.
     """
+    request.check_walks()
     scenarios = request.resolved_scenarios()
-    # All walks are checked before the first is run.
-    request.check_design()
-    for index, scenario in enumerate(scenarios):
-        request.check_reach(scenario, field=f"scenarios.{index}")
     walks = [
         simulate(
             scenario,

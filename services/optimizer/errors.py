@@ -7,8 +7,9 @@ GaitswarmError
 │   ├── BudgetChanged       the job was extended since it was claimed
 │   └── IdempotencyConflict the key was used before with another body
 ├── LeaseLost               another runner, or a cancellation, has taken the job
-├── EvaluatorUnavailable    the workers cannot be reached now; try again later
-└── StoreUnavailable        the database cannot be reached, or has another schema (HTTP 503)
+└── Unavailable             not possible now, whatever was asked; try again later (HTTP 503)
+    ├── EvaluatorUnavailable    the workers cannot be reached
+    └── StoreUnavailable        the database or server cannot be reached, or has another schema
 """
 
 from __future__ import annotations
@@ -49,9 +50,13 @@ class LeaseLost(GaitswarmError):
     """The job belongs to another runner now, or was cancelled."""
 
 
-class EvaluatorUnavailable(GaitswarmError):
+class Unavailable(GaitswarmError):
+    """Not possible now, whatever was asked."""
+
+
+class EvaluatorUnavailable(Unavailable):
     """The workers cannot be reached now."""
 
 
-class StoreUnavailable(GaitswarmError):
-    """The database cannot be reached, or holds another schema."""
+class StoreUnavailable(Unavailable):
+    """The database or server cannot be reached, or holds another schema."""

@@ -1,0 +1,120 @@
+"""Errors of the library; those of a database and of a server are the same.
+
+GaitswarmError              everything that gaitswarm raises on purpose
+├── InvalidRequest          what was asked makes no sense; `field` names the argument or field
+├── NotFound                no job, iteration, recording or result of that id
+├── Conflict                not possible in the job's present state
+│   └── IdempotencyConflict the key was used before for another job
+├── JobEnded                the job that was waited for did not succeed; `job` says why
+├── LeaseLost               another process, or a cancellation, has taken the job
+└── Unavailable             not possible now, whatever was asked; try again later
+    ├── EvaluatorUnavailable    the workers or the compiler cannot be used
+    └── StoreUnavailable        the database or the server cannot be reached
+
+KeyboardInterrupt
+└── Interrupted             Ctrl-C while a job was run: it was given back, and can be gone on with
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from services.optimizer.errors import (
+    Conflict,
+    EvaluatorUnavailable,
+    GaitswarmError,
+    IdempotencyConflict,
+    InvalidRequest,
+    LeaseLost,
+    NotFound,
+    StoreUnavailable,
+    Unavailable,
+)
+from sim.errors import SimulationError, SimulationInputError
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+    from gaitswarm.views import JobView
+
+
+class JobEnded(GaitswarmError):
+    """The job that was waited for did not succeed.
+
+    Attributes:
+        job: The job as it is: paused, cancelled or failed.
+    """
+
+    def __init__(self, job: JobView) -> None:
+        self.job = job
+        super().__init__(f"job {job.id} is {job.state}" + (f": {job.error}" if job.error else ""))
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C while a job was run. What it had committed is stored, and it is queued again.
+
+    Attributes:
+        job: The job as it was given back.
+    """
+
+    def __init__(self, job: JobView, db: str) -> None:
+        self.job = job
+        super().__init__(
+            f"job {job.id} was given back after {job.iterations} of {job.iterations_planned}"
+            f" iterations; go on with gaitswarm.optimize(resume={job.id!r}, db={db!r})"
+        )
+
+
+def invalid_request(error: ValidationError, document: Mapping[str, Any]) -> InvalidRequest:
+    """What pydantic found wrong, in the words of the input.
+
+    Args:
+        error: Of validating the document.
+        document: What was validated.
+
+    Returns:
+        An error that names every bad field; its `field` is the first.
+    """
+    from gaitswarm.field_errors import field_errors
+
+    first, *others = field_errors(error.errors(include_url=False), document)
+    more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)
+    return InvalidRequest(first.message + more, field=first.field)
+
+
+@contextmanager
+def simulation_errors(field: str) -> Iterator[None]:
+    """Errors of the simulator as errors of the library.
+
+    Args:
+        field: Argument that is to blame for input that cannot be simulated.
+
+    Raises:
+        InvalidRequest: For a SimulationInputError.
+        EvaluatorUnavailable: For any other SimulationError, such as that of the compiler.
+    """
+    try:
+        yield
+    except SimulationInputError as error:
+        raise InvalidRequest(str(error), field=field) from error
+    except SimulationError as error:
+        raise EvaluatorUnavailable(str(error)) from error
+
+
+__all__ = [
+    "Conflict",
+    "EvaluatorUnavailable",
+    "GaitswarmError",
+    "IdempotencyConflict",
+    "Interrupted",
+    "InvalidRequest",
+    "JobEnded",
+    "LeaseLost",
+    "NotFound",
+    "StoreUnavailable",
+    "Unavailable",
+    "invalid_request",
+    "simulation_errors",
+]

@@ -1,0 +1,241 @@
+"""`gaitswarm.simulate`: designs walking here and now, outside any job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from typing import Final, Protocol, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
+
+from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
+from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.specs import (
+    PreferenceInput,
+    RobotInput,
+    ScenarioInput,
+    robot_source,
+    scenario_entries,
+)
+from services.optimizer.jobs.preference import judge
+from services.optimizer.run.evaluator import EvaluationRequest
+from services.runtime import open_evaluator
+from sim.case import Walk
+from sim.controllers import ControllerName
+from sim.kernel.observation import WalkLog
+from sim.outcome import Outcome, Status
+from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import Backend
+from sim.simulate import simulate as simulate_walk
+
+Floats = NDArray[np.float64]
+
+ALL_SCENARIOS: Final = tuple(scenario.name for scenario in SCENARIOS)
+"""The six scenarios of table 4.2."""
+
+
+class Columns(Protocol):
+    """What has a column for every variable: a mapping of arrays, a data frame, a `Table`."""
+
+    def keys(self) -> Iterable[str]:
+        """Names of the columns."""
+
+    def __getitem__(self, name: str, /) -> ArrayLike:
+        """One column: a number, or one number a design."""
+
+
+DesignInput: TypeAlias = Columns | Sequence[Mapping[str, float]]
+"""One design or many."""
+
+
+def simulate(
+    designs: DesignInput,
+    *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
+    controller: ControllerName = "fuzzy-pi",
+    robot: RobotInput = "szabadka2",
+    preference: PreferenceInput = "A",
+    log: bool = False,
+    backend: Backend = "auto",
+    cpus: int | None = None,
+) -> SimulationResult:
+    """Let one design or many walk, and say what they are worth.
+
+    A walk that falls, diverges or leaves the legs' reach is a result with a status, not an error.
+
+    Args:
+        designs: Value of each of the controller's variables, and of any gait variable, which then
+            replaces the scenarios' value, in the variables' units. One design is a mapping of
+            numbers; many are a mapping of arrays of one length, a data frame, or a sequence of
+            mappings.
+        scenarios: One scenario or several: names or numbers of presets, or `Scenario`.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder that holds robot.toml and
+            robot.urdf of another.
+        preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+        log: Whether to record every walk at 500 Hz.
+        backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
+            first that works on this machine.
+        cpus: Walks to compute at once, for many designs without a log; default all processors.
+
+    Returns:
+        Statuses, objectives, utilities and fitness of every design.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
+    """
+    columns = _columns(designs)
+    variables = tuple(columns)
+    rows = np.stack(list(columns.values()), axis=1)
+    request = simulation_request(
+        dict(zip(variables, rows[0].tolist(), strict=True)),
+        scenarios=scenarios,
+        controller=controller,
+        robot=robot,
+        preference=preference,
+        log=log,
+    )
+    if not np.isfinite(rows).all():
+        row, column = np.argwhere(~np.isfinite(rows))[0]
+        raise InvalidRequest(
+            f"{variables[column]} is not a finite number in design {row}", field="designs"
+        )
+    if backend not in get_args(Backend):
+        raise InvalidRequest(
+            f"{backend!r} is none of {', '.join(get_args(Backend))}", field="backend"
+        )
+    if cpus is not None and cpus < 1:
+        raise InvalidRequest("must be at least 1", field="cpus")
+    with simulation_errors("designs"):
+        return _simulated(request, variables, rows, backend, cpus)
+
+
+def simulation_request(
+    design: Mapping[str, float],
+    *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput],
+    controller: ControllerName,
+    robot: RobotInput,
+    preference: PreferenceInput,
+    log: bool,
+) -> SimulationRequest:
+    """The request that keywords mean, as `simulate` takes them. Raises InvalidRequest."""
+    document = {
+        "robot": robot_source(robot),
+        "controller": controller,
+        "design": dict(design),
+        "scenarios": scenario_entries(scenarios),
+        "preference": preference,
+        "log": log,
+    }
+    try:
+        return SimulationRequest.model_validate(document)
+    except ValidationError as error:
+        raise invalid_request(error, document) from error
+
+
+def simulate_request(request: SimulationRequest) -> SimulationResult:
+    """Let one design walk, as a server does.
+
+    Raises:
+        InvalidRequest: The design cannot be compiled, or a gait leaves the legs' reach.
+    """
+    request.check_walks()
+    design = np.array([tuple(request.design.values())], dtype=np.float64)
+    with simulation_errors("design"):
+        return _simulated(request, tuple(request.design), design, "auto", None)
+
+
+def _columns(designs: DesignInput) -> dict[str, Floats]:
+    """(n,) values by variable. Raises InvalidRequest."""
+    try:
+        found = _by_variable(designs)
+        arrays = [np.atleast_1d(np.asarray(values, np.float64)) for values in found.values()]
+        columns = np.broadcast_arrays(*arrays)
+    except (TypeError, ValueError, AttributeError, KeyError) as error:
+        raise InvalidRequest(
+            "must be one design as a mapping of numbers, or many as a mapping of arrays of one"
+            f" length or as mappings with the same variables: {error}",
+            field="designs",
+        ) from error
+    if not columns or not columns[0].size:
+        raise InvalidRequest("there is no design", field="designs")
+    if columns[0].ndim > 1:
+        raise InvalidRequest("values of a variable must have one axis", field="designs")
+    return dict(zip(found, columns, strict=True))
+
+
+def _by_variable(designs: DesignInput) -> dict[str, ArrayLike]:
+    if not isinstance(designs, Sequence):
+        return {name: designs[name] for name in designs.keys()}  # noqa: SIM118 - not all iterate
+    for design in designs[1:]:
+        if design.keys() != designs[0].keys():
+            raise KeyError("designs differ in their variables")
+    return {name: [design[name] for design in designs] for name in (designs[0] if designs else ())}
+
+
+def _simulated(
+    request: SimulationRequest,
+    variables: tuple[str, ...],
+    designs: Floats,
+    backend: Backend,
+    cpus: int | None,
+) -> SimulationResult:
+    """request: of the first design."""
+    scenarios = request.resolved_scenarios()
+    logs: dict[str, tuple[WalkLog | None, ...]] = {}
+    if len(designs) == 1 or request.log or backend != "auto":
+        outcomes = []
+        for scenario in scenarios:
+            walk = simulate_walk(
+                scenario,
+                request.controller,
+                variables,
+                designs,
+                robot=request.robot,
+                log=request.log,
+                backend=backend,
+            )
+            outcomes.append(walk.outcome)
+            if request.log:
+                logs[scenario.name] = walk.logs
+    else:
+        outcomes = list(_in_parallel(request, scenarios, variables, designs, cpus))
+    statuses = np.stack([outcome.statuses for outcome in outcomes], axis=1)
+    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+    preference = request.resolved_preference()
+    judged = judge(objectives, statuses != Status.OK, preference)
+    return SimulationResult(
+        robot=request.robot,
+        controller=request.controller,
+        preference=preference,
+        variables=variables,
+        designs=designs,
+        scenarios=tuple(scenario.name for scenario in scenarios),
+        statuses=statuses,
+        objectives=objectives,
+        utilities=_finite(judged.utilities),
+        fitness=_finite(judged.fitness),
+        logs=logs,
+    )
+
+
+def _in_parallel(
+    request: SimulationRequest,
+    scenarios: Sequence[Scenario],
+    variables: tuple[str, ...],
+    designs: Floats,
+    cpus: int | None,
+) -> Sequence[Outcome]:
+    """One outcome for every scenario, computed by threads of this process."""
+    cases = tuple(Walk(request.robot, request.controller, s, variables) for s in scenarios)
+    with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
+        return evaluator.evaluate(EvaluationRequest("", cases, designs), lambda: False)
+
+
+def _finite(values: Floats) -> Floats:
+    return np.where(np.isfinite(values), values, np.nan)

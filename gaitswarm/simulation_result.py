@@ -1,0 +1,144 @@
+"""What designs are worth that walked outside any job: statuses and objectives as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.tables import Table
+from gaitswarm.views import SimulationView
+from services.optimizer.jobs.preference import Preference
+from sim.kernel.observation import WalkLog
+from sim.outcome import OBJECTIVE_NAMES, Status
+from sim.robot import RobotSource
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScenarioResult:
+    """How n designs did in one scenario.
+
+    Attributes:
+        statuses: How each walk ended; everything but `Status.OK` is a failed walk.
+        objectives: (n,) raw objectives by name, to be minimized, NaN where there is none;
+            `gaitswarm.OBJECTIVES` has their units.
+        utility: (n,) bias-weighted product of f1..f5 (eq. 4.1), to be minimized; NaN where the
+            walk failed.
+        logs: Every walk's log at 500 Hz, None for a gait out of reach; empty unless asked for.
+    """
+
+    statuses: tuple[Status, ...]
+    objectives: Mapping[str, Floats]
+    utility: Floats
+    logs: tuple[WalkLog | None, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulationResult:
+    """What n designs are worth in K scenarios; `result["normal-fast"]` is one scenario's part.
+
+    Attributes:
+        robot: Robot that walked.
+        controller: Controller that drove it.
+        preference: By which utilities and fitness were computed.
+        variables: Names of the v variables of the designs.
+        designs: (n, v) their values, in the variables' units.
+        scenarios: Names of the K scenarios.
+        statuses: (n, K) how each walk ended, values of `Status`.
+        objectives: (n, K, 6) raw objectives f1..f6 of table 4.1, to be minimized, in the units of
+            `gaitswarm.OBJECTIVES`; NaN where there is none.
+        utilities: (n, K) bias-weighted products of f1..f5 (eq. 4.1), to be minimized; NaN where
+            the walk failed.
+        fitness: (n,) geometric means of the utilities (eq. 4.2), to be minimized; NaN where any
+            walk failed.
+        logs: Every walk's log by scenario, in the order of the designs; empty unless asked for.
+    """
+
+    robot: RobotSource
+    controller: str
+    preference: Preference
+    variables: tuple[str, ...]
+    designs: Floats
+    scenarios: tuple[str, ...]
+    statuses: NDArray[np.uint8]
+    objectives: Floats
+    utilities: Floats
+    fitness: Floats
+    logs: Mapping[str, tuple[WalkLog | None, ...]] = field(repr=False, default_factory=dict)
+
+    @classmethod
+    def from_view(cls, view: SimulationView) -> Self:
+        """A server's answer as arrays.
+
+        Args:
+            view: Result of one design.
+        """
+        results = list(view.scenarios.values())
+        values = [[list(result.objectives.values()) for result in results]]
+        logs = {
+            name: (None if result.log is None else _log(result.log.columns),)
+            for name, result in view.scenarios.items()
+        }
+        recorded = any(log is not None for walks in logs.values() for log in walks)
+        return cls(
+            robot=view.robot,
+            controller=view.controller,
+            preference=view.preference,
+            variables=tuple(view.design),
+            designs=np.array([list(view.design.values())], dtype=np.float64),
+            scenarios=tuple(view.scenarios),
+            statuses=np.array([[Status.from_label(r.status) for r in results]], dtype=np.uint8),
+            objectives=np.array(values, dtype=np.float64),
+            utilities=np.array([[result.utility for result in results]], dtype=np.float64),
+            fitness=np.array([view.fitness], dtype=np.float64),
+            logs=logs if recorded else {},
+        )
+
+    def __getitem__(self, scenario: str) -> ScenarioResult:
+        k = self.scenarios.index(scenario) if scenario in self.scenarios else None
+        if k is None:
+            raise KeyError(f"{scenario!r}; walked were {', '.join(self.scenarios)}")
+        return ScenarioResult(
+            statuses=tuple(Status(status) for status in self.statuses[:, k].tolist()),
+            objectives=dict(zip(OBJECTIVE_NAMES, self.objectives[:, k].T, strict=True)),
+            utility=self.utilities[:, k],
+            logs=self.logs.get(scenario, ()),
+        )
+
+    def table(self) -> Table:
+        """One row for every walk, designs in order and each one's scenarios in order.
+
+        Returns:
+            A table with the columns design (index from 0), scenario, status, utility, the
+            objectives by name, and `design.<variable>`.
+        """
+        n, k = self.statuses.shape
+        columns: dict[str, NDArray[Any]] = {
+            "design": np.repeat(np.arange(n), k),
+            "scenario": np.tile(np.array(self.scenarios), n),
+            "status": np.array([Status(s).label for s in self.statuses.ravel().tolist()]),
+            "utility": self.utilities.ravel(),
+        }
+        columns |= {
+            name: self.objectives[:, :, m].ravel() for m, name in enumerate(OBJECTIVE_NAMES)
+        }
+        for name, values in zip(self.variables, self.designs.T, strict=True):
+            columns[f"design.{name}"] = np.repeat(values, k)
+        return Table(columns)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """`table()` as a data frame. Raises ImportError without pandas."""
+        return self.table().to_pandas()
+
+
+def _log(columns: Mapping[str, Any]) -> WalkLog:
+    arrays = {name: np.array(c.values, dtype=np.float64) for name, c in columns.items()}
+    return WalkLog(**arrays)

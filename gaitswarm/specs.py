@@ -1,0 +1,149 @@
+"""Jobs, robots and scenarios as a program names them: objects, names, folders, or documents."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias, TypedDict, cast
+
+from pydantic import ValidationError
+
+from gaitswarm.errors import InvalidRequest, invalid_request
+from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.preference import Preference, PreferenceName
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.search.pso import PsoSettings
+from sim.controllers import ControllerName
+from sim.robot import RobotFiles, RobotVariant
+from sim.robot.robot import SHIPPED
+from sim.scenario import Scenario
+from sim.variables import Variable
+
+Document: TypeAlias = Mapping[str, Any]
+"""A mapping as read from JSON."""
+
+RobotInput: TypeAlias = str | os.PathLike[str] | RobotVariant | RobotFiles | Document
+"""A shipped robot by name, a variant of one, or one's own by folder or by the text of its files."""
+
+ScenarioInput: TypeAlias = str | Scenario | Document
+"""A preset by name or number, or one's own."""
+
+PreferenceInput: TypeAlias = PreferenceName | Preference | Document
+"""A, B or C of table 4.5, or one's own."""
+
+SpecInput: TypeAlias = Spec | Document
+"""A job of any kind, as object or as document."""
+
+
+class SpecOptions(TypedDict, total=False):
+    """What a job is asked to do, by keyword. Each has a default: the job of the thesis's chapter 4.
+
+    Attributes:
+        name: Name of the job, for people.
+        robot: Robot to simulate: a shipped one by name, a `RobotVariant`, or the folder that holds
+            robot.toml and robot.urdf of another.
+        controller: Motor controller to tune.
+        scenarios: Walks in which every design is judged; one, or several.
+        variables: What may be searched: names, with the catalogue's bounds, or `Variable` with
+            others. Default: all that the controller has, less `fixed`.
+        fixed: Variables held at one value, by name, in their units.
+        preference: How objectives are weighed.
+        optimizer: Settings of the search.
+        particles: Size of the swarm, in place of `optimizer`'s.
+        iterations: Budget: iterations of the swarm.
+        seed: Source of all randomness; the same seed gives the same bits.
+    """
+
+    name: str
+    robot: RobotInput
+    controller: ControllerName
+    scenarios: ScenarioInput | Iterable[ScenarioInput]
+    variables: Sequence[str | Variable | Document]
+    fixed: Mapping[str, float]
+    preference: PreferenceInput
+    optimizer: PsoSettings | Document
+    particles: int
+    iterations: int
+    seed: int
+
+
+def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
+    """The spec that is meant by a spec and keywords laid over it.
+
+    Args:
+        spec: Object or document; None for the defaults.
+        options: Keywords that the caller gave.
+
+    Returns:
+        A valid spec; whether it can be simulated is not checked yet.
+
+    Raises:
+        InvalidRequest: It makes no sense; names every bad field.
+    """
+    if isinstance(spec, Spec) and not options:
+        return cast(AnySpec, spec)
+    document = dict(spec.model_dump() if isinstance(spec, Spec) else spec or {})
+    given: dict[str, Any] = dict(options)
+    if "robot" in given:
+        given["robot"] = robot_source(given["robot"])
+    if "scenarios" in given:
+        given["scenarios"] = scenario_entries(given["scenarios"])
+    if "particles" in given:
+        settings = given.get("optimizer", document.get("optimizer", {}))
+        if isinstance(settings, PsoSettings):
+            settings = settings.model_dump()
+        particles = given.pop("particles")
+        # What is no mapping is left for validation to refuse.
+        sized = {**settings, "particles": particles} if isinstance(settings, Mapping) else settings
+        given["optimizer"] = sized
+    document |= given
+    try:
+        return SPECS.validate_python(document)
+    except ValidationError as error:
+        raise invalid_request(error, document) from error
+
+
+def scenario_entries(
+    scenarios: ScenarioInput | Iterable[ScenarioInput],
+) -> tuple[ScenarioInput, ...]:
+    """One scenario or several, as the tuple that specs and requests have."""
+    if isinstance(scenarios, str | Scenario | Mapping):
+        return (scenarios,)
+    return tuple(scenarios)
+
+
+def robot_source(robot: RobotInput) -> str | RobotVariant | RobotFiles | dict[str, Any]:
+    """What a spec has under `robot`.
+
+    Args:
+        robot: A name of a shipped robot, a folder with robot.toml and robot.urdf, or what a spec
+            may have.
+
+    Returns:
+        The same; for a folder the text of its files, not checked yet.
+
+    Raises:
+        InvalidRequest: There is no such robot or folder, or its files cannot be read.
+    """
+    if isinstance(robot, str | os.PathLike):
+        if robot in SHIPPED:
+            return str(robot)
+        return _read_folder(Path(robot))
+    return dict(robot) if isinstance(robot, Mapping) else robot
+
+
+def _read_folder(folder: Path) -> dict[str, Any]:
+    if not folder.is_dir():
+        raise InvalidRequest(
+            f"unknown robot {str(folder)!r}; known are {', '.join(SHIPPED)}, or name a folder that"
+            " holds robot.toml and robot.urdf",
+            field="robot",
+        )
+    try:
+        return {
+            kind: (folder / f"robot.{kind}").read_text(encoding="utf-8")
+            for kind in ("toml", "urdf")
+        }
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidRequest(f"{folder} is not a robot's folder: {error}", field="robot") from error

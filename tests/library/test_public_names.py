@@ -1,0 +1,102 @@
+"""What `import gaitswarm` gives: quickly, typed, and documented to the last argument."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gaitswarm
+
+ROOT = Path(__file__).parents[2]
+
+
+def declared() -> dict[str, str]:
+    """Module of every public name, as type checkers see it."""
+    tree = ast.parse(Path(gaitswarm.__file__).read_text(encoding="utf-8"))
+    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
+    return {
+        alias.name: str(node.module)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def test_type_checkers_see_the_names_that_there_are() -> None:
+    assert sorted([*declared(), "__version__"]) == sorted(gaitswarm.__all__)
+    for name, module in declared().items():
+        assert getattr(gaitswarm, name) is getattr(import_module(module), name)
+
+
+@pytest.mark.parametrize("package", ["gaitswarm", "services", "sim"])
+def test_packages_whose_types_users_see_are_marked_as_typed(package: str) -> None:
+    assert files(package).joinpath("py.typed").is_file()
+
+
+def test_importing_it_imports_nothing_else_of_size() -> None:
+    program = (
+        "import json, sys; before = set(sys.modules); import gaitswarm; import gaitswarm.jobs;"
+        "print(json.dumps(sorted({m.split('.')[0] for m in set(sys.modules) - before})))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert set(json.loads(done.stdout)) - sys.stdlib_module_names == {"gaitswarm"}
+
+
+def test_its_version_is_that_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert gaitswarm.__version__ == project["version"]
+
+
+def test_names_can_be_listed_before_they_are_used_and_others_do_not_exist() -> None:
+    assert set(gaitswarm.__all__) <= set(dir(gaitswarm))
+    with pytest.raises(AttributeError, match="optimise"):
+        _ = gaitswarm.optimise
+
+
+def documented() -> Iterator[tuple[str, Any]]:
+    """Public functions, and classes with their public methods; models document their fields."""
+    for name in gaitswarm.__all__:
+        value = getattr(gaitswarm, name)
+        if inspect.isfunction(value):
+            yield name, value
+        elif inspect.isclass(value) and value.__module__.startswith("gaitswarm."):
+            if hasattr(value, "model_fields"):
+                continue
+            inherited = {member for base in value.__mro__[1:] for member in vars(base)}
+            for member, attribute in vars(value).items():
+                function = getattr(attribute, "__func__", attribute)
+                own = not member.startswith("_") and member not in inherited
+                if inspect.isfunction(function) and own:
+                    yield f"{name}.{member}", function
+
+
+DOCUMENTED = dict(documented())
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_every_argument_is_documented(name: str) -> None:
+    function = DOCUMENTED[name]
+    text = inspect.getdoc(function) or ""
+    sections = dict(re.findall(r"^(\w+):\n((?:[ ]{4}.*\n?|\n)+)", text, re.MULTILINE))
+    arguments = [
+        parameter.name
+        for parameter in inspect.signature(function).parameters.values()
+        if parameter.name not in ("self", "cls") and parameter.kind != parameter.VAR_KEYWORD
+    ]
+    written = re.findall(r"^    (\w+): \S", sections.get("Args", ""), re.MULTILINE)
+    assert text
+    assert [argument for argument in arguments if argument not in written] == []

@@ -12,8 +12,6 @@ from cli.robots import chosen_robot, scenario_data
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from pydantic import ValidationError
-
     from services.optimizer.jobs.documents import AnySpec
 
 LARGEST_FILE: Final = 1 << 20
@@ -93,6 +91,7 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
     """A checked spec that can be simulated. Raises InvalidRequest that names every bad field."""
     from pydantic import ValidationError
 
+    from gaitswarm.errors import invalid_request
     from services.optimizer.jobs.documents import SPECS
     from services.optimizer.service import check_can_be_simulated
 
@@ -102,15 +101,6 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
         raise invalid_request(error, data) from error
     check_can_be_simulated(spec)
     return spec
-
-
-def invalid_request(error: ValidationError, data: Mapping[str, Any]) -> InvalidRequest:
-    """What pydantic found wrong, in the words of the input: paths as in the file."""
-    from gaitswarm.views import field_errors
-
-    first, *others = field_errors(error.errors(include_url=False), data)
-    more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)
-    return InvalidRequest(first.message + more, field=first.field)
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Robust controllers for walking robots: simulate designs, run jobs, ask a database or a server.
+"""The Python library: simulate designs, run jobs, ask about them.
 
     import gaitswarm
 

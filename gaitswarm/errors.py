@@ -77,7 +77,7 @@ def invalid_request(error: ValidationError, document: Mapping[str, Any]) -> Inva
     Returns:
         An error that names every bad field; its `field` is the first.
     """
-    from gaitswarm.field_errors import field_errors
+    from gaitswarm.views import field_errors
 
     first, *others = field_errors(error.errors(include_url=False), document)
     more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)

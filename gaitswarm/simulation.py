@@ -23,12 +23,12 @@ from gaitswarm.specs import (
 from services.optimizer.jobs.preference import judge
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.runtime import open_evaluator
+from sim.assembly import Backend
 from sim.case import Walk
 from sim.controllers import ControllerName
 from sim.kernel.observation import WalkLog
 from sim.outcome import Outcome, Status
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import Backend
 from sim.simulate import simulate as simulate_walk
 
 Floats = NDArray[np.float64]

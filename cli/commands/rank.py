@@ -50,7 +50,7 @@ def _request(preference: str, top: int) -> RankingRequest:
 
     from pydantic import ValidationError
 
-    from cli.spec_file import invalid_request
+    from gaitswarm.errors import invalid_request
     from gaitswarm.views import RankingRequest
     from services.optimizer.errors import InvalidRequest
 

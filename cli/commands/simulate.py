@@ -51,7 +51,7 @@ def simulate(
     from cli.design_file import read_design
     from cli.output import note
     from cli.robots import chosen_robot, scenario_data
-    from cli.spec_file import invalid_request
+    from gaitswarm.errors import invalid_request
     from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
     data = {

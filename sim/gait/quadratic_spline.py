@@ -1,22 +1,15 @@
 """The foot's curve of 2011: a straight support and a swing by a quadratic spline.
 
-Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. The driving of 2011 sent 40 points a
-step and took 25.2 / w_S seconds for one (`STEP_TIME`).
+Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. The robot of 2011 was sent 40
+points a step, and took 25.2 / w_S seconds for one at the speed w_S = 7.5, 10, 12, 15 or 20.
 """
 
 from __future__ import annotations
-
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-
-POINTS_A_STEP: Final = 40
-
-STEP_TIME: Final = 25.2
-"""Seconds for one step at walking speed w_S = 1; the robot knew 7.5, 10, 12, 15 and 20."""
 
 
 def quadratic_spline(

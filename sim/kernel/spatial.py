@@ -17,8 +17,6 @@ Scalar = Any
 Vector = tuple[Scalar, Scalar, Scalar]
 Matrix = tuple[Vector, Vector, Vector]
 
-ZERO: Vector = (0.0, 0.0, 0.0)
-
 
 def vector(values: Sequence[Scalar] | NDArray[np.float64]) -> Vector:
     """Three numbers; rounding noise of unit-sized constants becomes a structural zero."""

@@ -127,27 +127,6 @@ def _changed(part: Part, variables: Mapping[str, str], values: Mapping[str, floa
         raise SimulationInputError(f"{culprit}: {first['msg']}") from error
 
 
-def nominal_values(robot: Robot) -> dict[str, float]:
-    """What the description says of them, by name; no body_mass if the URDF alone gives it."""
-    d = robot.description
-    values = {
-        "battery_voltage": d.supply.voltage,
-        "battery_resistance": d.supply.resistance,
-    }
-    if d.body_mass is not None:
-        values["body_mass"] = d.body_mass
-    efficiencies = robot.actuators().efficiency.tolist()
-    values |= {
-        f"efficiency_{joint}": eta
-        for joint, eta in zip(robot.joint_names, efficiencies, strict=True)
-    }
-    return values | {
-        f"{field}_{leg.name}": getattr(contact, field)
-        for field in _CONTACT
-        for leg, contact in zip(d.legs, robot.contacts(), strict=True)
-    }
-
-
 def _named(variable: Variable, of: str) -> Variable:
     return variable.model_copy(
         update={

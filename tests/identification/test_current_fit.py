@@ -14,9 +14,10 @@ from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.walk import Coding
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
-from sim.robot.identifiable import nominal_values, with_parameters
+from sim.robot.identifiable import with_parameters
 from sim.simulate import simulate
 from tests.identification.conftest import DESIGN, SCENARIO, TRUTH, Twin
+from tests.sim.test_identifiable import described_values
 
 pytestmark = pytest.mark.slow
 
@@ -39,7 +40,7 @@ def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
 
 def test_the_truth_leaves_nothing_but_the_instruments_errors(twin: Twin) -> None:
     fit = CurrentFit("a walk", "szabadka2", twin.recording, tuple(TRUTH))
-    nominal = nominal_values(twin.robot) | {"body_mass": 3.2}
+    nominal = described_values(twin.robot) | {"body_mass": 3.2}
     designs = np.array([list(TRUTH.values()), [nominal[name] for name in TRUTH]])
     outcome = fit.run(designs)
     assert outcome.statuses.tolist() == [Status.OK, Status.OK]

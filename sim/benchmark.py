@@ -15,7 +15,17 @@ from sim.simulate import lanes, prepare, simulate
 
 @dataclass(frozen=True, slots=True)
 class BenchmarkResult:
-    """us_per_step_per_walker [us]; real_time_factor_per_core: simulated over elapsed seconds."""
+    """How fast a pass was.
+
+    Attributes:
+        us_per_step_per_walker: wall time of a physics step of one walker [us].
+        real_time_factor_per_core: simulated over elapsed seconds [1].
+        lanes: walkers that are stepped together.
+        backend: `native` or `reference`.
+        walkers: walks of every scenario.
+        simulated_seconds: of all walks together [s].
+        elapsed_seconds: wall time of the pass [s].
+    """
 
     us_per_step_per_walker: float
     real_time_factor_per_core: float
@@ -35,8 +45,16 @@ def measure(
 ) -> BenchmarkResult:
     """Time whole walks (control, physics, objectives) of the six scenarios in this thread.
 
-    The walkers are the published optimum A; every scenario counts with its share of the job. The
-    fastest of `repeats` passes is reported: anything slower is the machine's other work.
+    The walkers are the published optimum A; every scenario counts with its share of the job.
+
+    Args:
+        repeats: Passes, of which the fastest counts: anything slower is the machine's other work.
+        walkers: Walks of every scenario; the reference kernel walks one, in one scenario.
+        backend: Which kernel.
+        robot: A shipped robot.
+
+    Returns:
+        The fastest pass.
     """
     controller = CONTROLLERS["fuzzy-pi"]
     design = controller.published["A"]

@@ -37,12 +37,29 @@ class Case(Protocol):
         """Columns of its outcomes' objectives, in order."""
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
-        """designs: (n, v). Raises SimulationInputError for one that cannot be simulated."""
+        """Put designs to the test.
+
+        Args:
+            designs: (n, v), columns as the case names them.
+
+        Returns:
+            Objectives and statuses in the order of the designs.
+
+        Raises:
+            SimulationInputError: A design cannot be simulated.
+        """
 
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """Designs of a controller walk through a scenario. variables: columns of the designs."""
+    """Designs of a controller walk through a scenario.
+
+    Attributes:
+        robot: that walks.
+        controller: name of its motor controller.
+        scenario: that it walks through.
+        variables: columns of the designs.
+    """
 
     robot: RobotSource
     controller: str
@@ -51,20 +68,20 @@ class Walk:
 
     @property
     def name(self) -> str:
-        """See `Case.name`."""
+        """Name of the scenario."""
         return self.scenario.name
 
     @property
     def duration(self) -> float:
-        """See `Case.duration`."""
+        """Simulated time of one walk [s]."""
         return self.scenario.duration
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """See `Case.objectives`: f1..f6 of table 4.1."""
+        """f1 to f6 of table 4.1."""
         return OBJECTIVES
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
-        """See `Case.run`."""
+        """Let every design walk."""
         walked = simulate(self.scenario, self.controller, self.variables, designs, robot=self.robot)
         return walked.outcome

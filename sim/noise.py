@@ -21,7 +21,15 @@ class LinkNoise(BaseModel):
     seed: int = Field(default=1, ge=0, lt=2**63, description="Same seed, same noise.")
 
     def torques(self, ticks: int, joints: int) -> NDArray[np.float64]:
-        """(ticks, joints) [N m]; a longer walk has the same noise as a shorter one, and more."""
+        """Torques of a whole walk; a longer one has the same noise as a shorter one, and more.
+
+        Args:
+            ticks: Control ticks.
+            joints: Number of joints.
+
+        Returns:
+            (ticks, joints) [N m].
+        """
         generator = np.random.Generator(np.random.Philox(key=[self.seed, self.link]))
         kind = np.arange(joints) % JOINTS_PER_LEG == self.link - 1
         torques = np.zeros((ticks, joints))

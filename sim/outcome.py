@@ -36,7 +36,17 @@ class Status(IntEnum):
 
     @classmethod
     def from_label(cls, label: str) -> Status:
-        """Inverse of `label`; KeyError for an unknown one."""
+        """Inverse of `label`.
+
+        Args:
+            label: As printed and stored.
+
+        Returns:
+            The status.
+
+        Raises:
+            KeyError: There is none of that label.
+        """
         return cls[label.upper()]
 
 
@@ -51,7 +61,13 @@ _PHRASES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """One thing to be minimized."""
+    """One thing to be minimized.
+
+    Attributes:
+        name: as in tables and JSON.
+        unit: of its values.
+        description: for people.
+    """
 
     name: str
     unit: str
@@ -74,11 +90,12 @@ N_OBJECTIVES: Final = len(OBJECTIVES)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """Results of a batch of designs in one case.
+    """Results of a batch of n designs in one case.
 
-    objectives: (n, m) float64, columns as in the case's `objectives` (`OBJECTIVES` for a walk);
-        a value that does not exist (the design did not walk) is NaN.
-    statuses: (n,) uint8, values of `Status`.
+    Attributes:
+        objectives: (n, m) float64, columns as in the case's `objectives` (`OBJECTIVES` for a walk);
+            a value that does not exist (the design did not walk) is NaN.
+        statuses: (n,) uint8, values of `Status`.
     """
 
     objectives: NDArray[np.float64]

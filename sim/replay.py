@@ -24,12 +24,24 @@ CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)
 class Replay:
     """A walk up to its end, F frames of B links, J joints, L legs; arrays by frame.
 
-    duration: walked [s]; links: in the order of `link_pose`. time (F,) [s], exact;
-    link_pose (F, B, 7) in the world: position [m], quaternion x y z w, whose sign never jumps;
-    foot_position (F, L, 3): the tibia's end, a sole's length above the ground where it stands [m];
-    foot_force (F, L, 3) in the world [N]; by joint (F, J): joint_angle, desired_angle, motor_angle
-    [rad], current [A], voltage [V], load_torque [N m]; in the body's frame: body_acceleration
-    (F, 3) [m/s2], body_velocity (F, 6) linear [m/s] and angular [rad/s]; supply (F,) [V].
+    Attributes:
+        duration: walked [s].
+        links: in the order of `link_pose`.
+        time: (F,) [s], exact.
+        link_pose: in the world, (F, B, 7): position [m], quaternion x y z w, whose sign never
+            jumps.
+        foot_position: the tibia's end, a sole's length above the ground where it stands,
+            (F, L, 3) [m].
+        foot_force: in the world, (F, L, 3) [N].
+        joint_angle: of the links, (F, J) [rad].
+        desired_angle: (F, J) [rad].
+        motor_angle: (F, J) [rad].
+        current: (F, J) [A].
+        voltage: (F, J) [V].
+        load_torque: (F, J) [N m].
+        body_acceleration: in the body's frame, (F, 3) [m/s2].
+        body_velocity: in the body's frame, (F, 6) linear [m/s] and angular [rad/s].
+        supply: (F,) [V].
     """
 
     duration: float
@@ -50,9 +62,16 @@ class Replay:
 
 
 def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Replay:
-    """The ticks of a walk nearest to a rate [Hz] of at most `CONTROL_RATE`.
+    """The ticks of a walk nearest to a rate.
 
-    load: mass carried on the body [kg], to be seen.
+    Args:
+        robot: That walked.
+        log: Of the walk.
+        rate: Frames a second, `CONTROL_RATE` at most [Hz].
+        load: Mass carried on the body, to be seen [kg].
+
+    Returns:
+        The walk up to its end.
     """
     walked = log.until_end()
     ticks = ticks_at(rate, len(walked.time))
@@ -89,7 +108,15 @@ def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Rep
 
 
 def ticks_at(rate: float, ticks: int) -> NDArray[np.int64]:
-    """Control ticks before `ticks` that are nearest to multiples of 1 / rate, from 0 on."""
+    """Control ticks that are nearest to multiples of 1 / rate, from 0 on.
+
+    Args:
+        rate: [Hz].
+        ticks: Number of ticks that there are.
+
+    Returns:
+        (F,), all less than `ticks`.
+    """
     frames = np.rint(np.arange(ticks * rate / CONTROL_RATE + 1.0) * (CONTROL_RATE / rate))
     nearest: NDArray[np.int64] = frames[frames < ticks].astype(np.int64)
     return nearest

@@ -22,11 +22,18 @@ Ints = NDArray[np.int64]
 class LookupTable:
     """A quantised function of error, current and velocity error, as the microcontroller has it.
 
-    values: (n_error, n_current, n_velocity) int8, each a power of two, 1 for an input that does
-    not matter. Gains have 16 fractional bits and shifts round half up; indices clamp:
+    Gains have 16 fractional bits and shifts round half up; indices clamp:
     i_error = n_error / 2 + (error * error_gain) >> 16, i_current = (current * current_gain) >> 16,
     i_velocity = n_velocity / 2 + (change * velocity_gain) >> 16, where change is the error's over
     one tick. The output is value * output_gain.
+
+    Attributes:
+        values: (n_error, n_current, n_velocity) int8, each a power of two, 1 for an input that
+            does not matter.
+        output_gain: of a value.
+        error_gain: index per count of error.
+        current_gain: index per count of current.
+        velocity_gain: index per count of change.
     """
 
     values: NDArray[np.int8]
@@ -42,7 +49,16 @@ class LookupTable:
             )
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
-        """Output (J,) with the fraction bits of `output_gain`; inputs (J,) in coded counts."""
+        """Look up what the table holds.
+
+        Args:
+            error: Coded angle errors, (J,) [counts].
+            current: Coded absolute currents, (J,) [counts].
+            change: Of the errors over one tick, (J,) [counts].
+
+        Returns:
+            Outputs (J,), with the fraction bits of `output_gain`.
+        """
         rows, columns, layers = self.values.shape
         row = np.clip(descale(error * self.error_gain, FRACTION_BITS) + rows // 2, 0, rows - 1)
         column = np.clip(descale(current * self.current_gain, FRACTION_BITS), 0, columns - 1)
@@ -56,16 +72,32 @@ class Response(Protocol):
     """What a control law looks up: a table, or for comparison the inference that it came from."""
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
-        """See `LookupTable.respond`."""
+        """Output of every joint.
+
+        Args:
+            error: Coded angle errors, (J,) [counts].
+            current: Coded absolute currents, (J,) [counts].
+            change: Of the errors over one tick, (J,) [counts].
+
+        Returns:
+            (J,) fixed-point numbers.
+        """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlLaw:
     """A controller as it runs on the robot: integers only, errors and PWM in coded counts.
 
-    Direct part, >> 16: error * proportional_gain + change * derivative_gain + `direct` table's
-    output. Integral part: the sum over ticks of error * integral_gain + `integrated` table's
-    output, clamped to the PWM's range, >> 20. change: the error's over one tick.
+    With change the error's over one tick, the direct part is the sum of error * proportional_gain,
+    change * derivative_gain and what `direct` answers, >> 16; the integral part is the sum over
+    ticks of error * integral_gain and what `integrated` answers, clamped to the PWM's range, >> 20.
+
+    Attributes:
+        proportional_gain: with 16 fraction bits.
+        integral_gain: with 20 fraction bits.
+        derivative_gain: with 16 fraction bits.
+        direct: adds to the direct part.
+        integrated: adds to the integral part.
     """
 
     proportional_gain: int = 0
@@ -79,7 +111,11 @@ class ControlLaw:
 class Universe:
     """An input or output of a fuzzy inference, of which the inference itself sees shares.
 
-    full_range: share 1 [unit]; counts: coded counts of one unit, as a table takes or gives them.
+    Attributes:
+        name: of the input or output.
+        unit: of its values.
+        full_range: share 1, in the unit.
+        counts: coded counts of one unit, as a table takes or gives them.
     """
 
     name: str
@@ -92,7 +128,12 @@ class Universe:
 class Inference:
     """One output of a fuzzy controller: the inference, and the table that is shipped in its place.
 
-    inputs, axes: by the system's inputs, in their order.
+    Attributes:
+        output: its universe.
+        inputs: their universes, in the system's order.
+        system: the inference.
+        axes: of the table, by input.
+        table: what is shipped.
     """
 
     output: Universe
@@ -122,10 +163,27 @@ class Controller(Protocol):
         """Designs from the literature, by the preference or study that they belong to."""
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """Integers for the kernel. Raises SimulationInputError that names the variable."""
+        """A design as it runs on the robot.
+
+        Args:
+            design: Value of every variable by name.
+
+        Returns:
+            Integers for the kernel.
+
+        Raises:
+            SimulationInputError: A value is missing or cannot be represented; names the variable.
+        """
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """By output, the fuzzy inferences that its tables stand for; none if it is not fuzzy.
+        """The fuzzy inferences that a design's tables stand for.
 
-        Raises SimulationInputError that names the variable.
+        Args:
+            design: Value of every variable by name.
+
+        Returns:
+            By output; none if the controller is not fuzzy.
+
+        Raises:
+            SimulationInputError: A value is missing or cannot be represented; names the variable.
         """

@@ -26,7 +26,20 @@ CURRENT_COUNTS: Final = 2079.0
 
 
 def required(design: Mapping[str, float], name: str, *, low: float, high: float) -> float:
-    """A design's value, checked against what the controller can represent."""
+    """A design's value, checked against what the controller can represent.
+
+    Args:
+        design: Values by name.
+        name: Of the value.
+        low: Least value.
+        high: Largest value.
+
+    Returns:
+        The value.
+
+    Raises:
+        SimulationInputError: It is missing, no number, or out of bounds.
+    """
     try:
         value = float(design[name])
     except KeyError:
@@ -41,7 +54,20 @@ def required(design: Mapping[str, float], name: str, *, low: float, high: float)
 
 
 def required_integer(design: Mapping[str, float], name: str, *, low: int, high: int) -> int:
-    """A design's whole value."""
+    """A design's whole value.
+
+    Args:
+        design: Values by name.
+        name: Of the value.
+        low: Least value.
+        high: Largest value.
+
+    Returns:
+        The value.
+
+    Raises:
+        SimulationInputError: It is missing, not whole, or out of bounds.
+    """
     value = required(design, name, low=low, high=high)
     if not value.is_integer():
         raise SimulationInputError(f"{name}: {value:g} is not a whole number {low} to {high}")
@@ -49,16 +75,39 @@ def required_integer(design: Mapping[str, float], name: str, *, low: int, high: 
 
 
 def to_fixed(value: float, fraction_bits: int) -> int:
-    """Nearest fixed-point number, as its integer."""
+    """Nearest fixed-point number.
+
+    Args:
+        value: To be represented.
+        fraction_bits: Of the fixed-point number.
+
+    Returns:
+        Its integer.
+    """
     return math.floor(value * (1 << fraction_bits) + 0.5)
 
 
 def descale(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
-    """Fixed point to integer, halves up."""
+    """Fixed point to integer, halves up.
+
+    Args:
+        value: Fixed-point numbers, of any shape.
+        bits: Their fraction bits.
+
+    Returns:
+        Integers of the same shape.
+    """
     integer: NDArray[np.int64] = (value + (1 << (bits - 1))) >> bits
     return integer
 
 
 def integral_gain(gain: float) -> int:
-    """PWM counts per (error count x second) -> fixed point per tick."""
+    """Gain of the integrator in fixed point.
+
+    Args:
+        gain: PWM counts per (error count x second).
+
+    Returns:
+        PWM counts per (error count x tick), with `INTEGRAL_BITS` fraction bits.
+    """
     return to_fixed(gain * CONTROL_PERIOD, INTEGRAL_BITS)

@@ -34,7 +34,18 @@ CURRENT: Final = Axis(bits=6, centred=False)
 
 
 def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Shape) -> Mamdani:
-    """The rules of table 4.3 with their weights, over normalised error, current and output."""
+    """The rules of table 4.3, over normalised error, current and output.
+
+    Args:
+        fw1: Weight of rule 1.
+        fw23: Weight of rules 2 and 3.
+        fw4: Weight of rule 4.
+        fw56: Weight of rules 5 and 6.
+        shape: Of the output's sets.
+
+    Returns:
+        The inference.
+    """
     rules = (
         Rule({"error": "zero"}, "null", fw1),
         Rule({"error": "positive"}, "positive", fw23),
@@ -57,13 +68,26 @@ def quantised_table(
     error: Axis = ERROR,
     current: Axis = CURRENT,
 ) -> NDArray[np.int8]:
-    """The inference on the axes' grid in 1/127ths of the output range, read-only."""
+    """The inference of `inference_system` on the axes' grid.
+
+    Args:
+        fw1: Weight of rule 1.
+        fw23: Weight of rules 2 and 3.
+        fw4: Weight of rule 4.
+        fw56: Weight of rules 5 and 6.
+        shape: Of the output's sets.
+        error: Axis of the angle error.
+        current: Axis of the current.
+
+    Returns:
+        (n_error, n_current) in 1/127ths of the output range, read-only.
+    """
     system = inference_system(fw1, fw23, fw4, fw56, shape)
     return quantised(system, {"error": error, "current": current})
 
 
 class FuzzyPi:
-    """See the module."""
+    """The Fuzzy-PI of chapter 4."""
 
     name: Final = "fuzzy-pi"
     description: Final = (
@@ -146,16 +170,28 @@ class FuzzyPi:
     )
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """See `Controller.compile`."""
+        """The table of 10 x 6 bits, and the integrator's gain."""
         return self.compile_with(design, ERROR, CURRENT)
 
     def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
-        """The same controller with a table of other resolution."""
+        """The same controller with a table of other resolution.
+
+        Args:
+            design: Value of every variable by name.
+            error: Axis of the angle error.
+            current: Axis of the current.
+
+        Returns:
+            Its control law.
+
+        Raises:
+            SimulationInputError: A value is missing or cannot be represented; names the variable.
+        """
         p = _Parameters.of(design)
         return ControlLaw(integral_gain=p.integral, direct=p.table(error, current))
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """See `Controller.inferences`."""
+        """The inference of its proportional part."""
         p = _Parameters.of(design)
         fuzzy_p = Inference(
             output=Universe("FO", "PWM counts", p.output_range, counts=1 << FRACTION_BITS),
@@ -170,7 +206,17 @@ class FuzzyPi:
         return (fuzzy_p,)
 
     def without_table(self, design: Mapping[str, float]) -> ControlLaw:
-        """The same controller by full inference, for comparison (reference kernel only)."""
+        """The same controller by full inference, for comparison (reference kernel only).
+
+        Args:
+            design: Value of every variable by name.
+
+        Returns:
+            Its control law.
+
+        Raises:
+            SimulationInputError: A value is missing or cannot be represented; names the variable.
+        """
         p = _Parameters.of(design)
         system = inference_system(*p.weights, p.shape)
         exact = ExactInference(system, p.error_range, p.current_range, p.output_range)

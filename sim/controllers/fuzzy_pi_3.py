@@ -40,7 +40,17 @@ _INTEGRAL_AXES: Final = {"error": COARSE_ERROR, "current": COARSE_CURRENT, "velo
 
 
 def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
-    """FzzP of angle error and current: rules 1 and 3 to 6."""
+    """FzzP of angle error and current: rules 1 and 3 to 6.
+
+    Args:
+        w1: Weight of rule 1.
+        w34: Weight of rules 3 and 4.
+        w56: Weight of rules 5 and 6.
+        shape: Of the output's sets.
+
+    Returns:
+        The inference.
+    """
     rules = (
         Rule({"error": "zero"}, "null", w1),
         Rule({"error": "positive"}, "positive", w34),
@@ -52,7 +62,17 @@ def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
 
 
 def integral_system(w1: float, w2: float, w78: float, shape: Shape) -> Mamdani:
-    """FzzI of angle error, current and velocity error: rules 1, 2, 7 and 8."""
+    """FzzI of angle error, current and velocity error: rules 1, 2, 7 and 8.
+
+    Args:
+        w1: Weight of rule 1.
+        w2: Weight of rule 2.
+        w78: Weight of rules 7 and 8.
+        shape: Of the output's sets.
+
+    Returns:
+        The inference.
+    """
     rules = (
         Rule({"error": "zero"}, "null", w1),
         Rule({"velocity": "zero"}, "null", w2),
@@ -74,7 +94,7 @@ def _integral_table(w1: float, w2: float, w78: float, shape: Shape) -> NDArray[n
 
 
 class FuzzyPi3:
-    """See the module."""
+    """The Fuzzy-PI of chapter 3."""
 
     name: Final = "fuzzy-pi-3"
     description: Final = (
@@ -184,12 +204,12 @@ class FuzzyPi3:
     )
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """See `Controller.compile`."""
+        """A table of the voltage, and one of the integrated voltage's rate."""
         voltage, rate = self.inferences(design)
         return ControlLaw(direct=voltage.table, integrated=rate.table)
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """See `Controller.inferences`."""
+        """The inferences of the voltage, and of the integrated voltage's rate."""
         error_range = required(design, "A_ERR", low=64.0, high=65535.0)
         current_range = required(design, "I_MA", low=0.1, high=30.0)
         velocity_range = required(design, "V_ERR", low=100.0, high=1e7)

@@ -42,7 +42,14 @@ _D: Final = Variable(
 
 @dataclass(frozen=True, slots=True)
 class LinearController:
-    """PWM = P error + I integral of error dt + D derivative of error; terms left out are zero."""
+    """PWM = P error + I integral of error dt + D derivative of error; terms left out are zero.
+
+    Attributes:
+        name: as in job specs and on the command line.
+        description: what it is, with its source.
+        variables: its gains.
+        published: designs from the literature, by study.
+    """
 
     name: str
     description: str
@@ -50,7 +57,7 @@ class LinearController:
     published: Mapping[str, Mapping[str, float]]
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """See `Controller.compile`."""
+        """Gains in fixed point."""
         gains = {v.name: required(design, v.name, low=0.0, high=100.0) for v in self.variables}
         return ControlLaw(
             proportional_gain=to_fixed(gains["P"], FRACTION_BITS),
@@ -59,7 +66,7 @@ class LinearController:
         )
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """See `Controller.inferences`."""
+        """None: it is not fuzzy."""
         del design
         return ()
 

@@ -33,13 +33,26 @@ class Shape(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class FuzzySet:
-    """A symmetric membership function: its peak, and the triangle's distance from peak to foot."""
+    """A symmetric membership function.
+
+    Attributes:
+        peak: where the membership is one.
+        half_width: the triangle's distance from peak to foot.
+    """
 
     peak: float
     half_width: float
 
     def membership(self, x: Floats, shape: Shape = Shape.TRIANGLE) -> Floats:
-        """Degree of membership of every x, in [0, 1]; (n,) -> (n,)."""
+        """Degrees of membership.
+
+        Args:
+            x: Points of the universe, (n,).
+            shape: Of the function.
+
+        Returns:
+            (n,) in [0, 1].
+        """
         distance = np.abs(x - self.peak) / self.half_width
         if shape is Shape.TRIANGLE:
             return np.maximum(0.0, 1.0 - distance)
@@ -53,7 +66,13 @@ class FuzzySet:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """IF every antecedent (input -> set name) THEN consequent; inputs left out don't matter."""
+    """IF every antecedent holds THEN consequent.
+
+    Attributes:
+        antecedents: by input the name of its set; inputs left out don't matter.
+        consequent: name of the output's set.
+        weight: of the rule, in [0, 1].
+    """
 
     antecedents: Mapping[str, str]
     consequent: str
@@ -64,7 +83,11 @@ class Rule:
 class Mamdani:
     """A fuzzy inference system with one output.
 
-    inputs: by name, the sets by name; outputs: the output's sets by name, all of one shape.
+    Attributes:
+        inputs: by name, the sets by name.
+        outputs: the output's sets by name, all of one shape.
+        rules: all of them.
+        output_shape: of the output's sets.
     """
 
     inputs: Mapping[str, Mapping[str, FuzzySet]]
@@ -73,7 +96,14 @@ class Mamdani:
     output_shape: Shape = Shape.TRIANGLE
 
     def degrees(self, grid: Mapping[str, Floats]) -> list[Floats]:
-        """Per input, how far each rule's antecedent holds: (n_rules, n_i), 1 where left out."""
+        """How far each rule's antecedents hold.
+
+        Args:
+            grid: By input its values, (n_i,).
+
+        Returns:
+            By input (n_rules, n_i), 1 where a rule leaves the input out.
+        """
         return [
             np.stack(
                 [
@@ -97,10 +127,13 @@ class Mamdani:
         return np.stack([s.membership(points, self.output_shape) for s in self.outputs.values()])
 
     def infer(self, grid: Mapping[str, Floats]) -> Floats:
-        """Crisp output in [-1, 1] over the product of the inputs' values.
+        """Crisp output over the product of the inputs' values.
 
-        grid: by input, in the order of `inputs`, the values (n_i,), inside the range.
-        Returns (n_1, n_2, ...).
+        Args:
+            grid: By input, in the order of `inputs`, its values inside the range, (n_i,).
+
+        Returns:
+            (n_1, n_2, ...) in [-1, 1].
         """
         degrees = self.degrees(grid)
         along = [
@@ -110,7 +143,14 @@ class Mamdani:
         return self._crisp(along, tuple(degree.shape[1] for degree in degrees))
 
     def infer_at(self, points: Mapping[str, Floats]) -> Floats:
-        """Crisp output at points: by input, in the order of `inputs`, coordinates (n,) -> (n,)."""
+        """Crisp output at points.
+
+        Args:
+            points: By input, in the order of `inputs`, its coordinates inside the range, (n,).
+
+        Returns:
+            (n,) in [-1, 1].
+        """
         degrees = self.degrees(points)
         return self._crisp(degrees, degrees[0].shape[1:])
 
@@ -131,8 +171,14 @@ def output_points() -> Floats:
 def centroid(levels: Floats, memberships: Floats) -> Floats:
     """Centre of area of the clipped sets' union.
 
-    levels: (n_sets, ...); memberships: (n_sets, 101). Returns (...), 0 where nothing fires.
     Sums run over the points in order, so that the compiled version gives the same bits.
+
+    Args:
+        levels: At which the sets are clipped, (n_sets, ...).
+        memberships: Of the points of the output universe, (n_sets, 101).
+
+    Returns:
+        (...), 0 where nothing fires.
     """
     flat = levels.reshape(len(levels), -1)
     moment = np.zeros(flat.shape[1])

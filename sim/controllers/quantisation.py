@@ -20,7 +20,12 @@ OUTPUT_SCALE: Final = 127
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One input of a table. centred: about zero, as errors are; else from zero up, as currents."""
+    """One input of a table.
+
+    Attributes:
+        bits: of the index.
+        centred: about zero, as errors are; else from zero up, as currents.
+    """
 
     bits: int
     centred: bool
@@ -36,16 +41,29 @@ class Axis:
         return np.arange(n) / (n - 1)
 
     def gain(self, full_range: float) -> int:
-        """Fixed-point index per unit of an input with this range."""
+        """Fixed-point index per unit of an input.
+
+        Args:
+            full_range: Of the input, in its unit.
+
+        Returns:
+            The gain, with 16 fraction bits.
+        """
         n = 1 << self.bits
         return to_fixed((n // 2 - 1 if self.centred else n - 1) / full_range, FRACTION_BITS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactInference:
-    """`Response` by the inference itself in 64-bit numbers, which no table stands between.
+    """Answers by the inference itself in 64-bit numbers, which no table stands between.
 
-    Ranges in coded counts. For the reference kernel only.
+    For the reference kernel only.
+
+    Attributes:
+        system: the inference.
+        error_range: coded counts of share 1.
+        current_range: coded counts of share 1.
+        output_range: PWM counts of share 1.
     """
 
     system: Mamdani
@@ -56,7 +74,7 @@ class ExactInference:
     def respond(
         self, error: NDArray[np.int64], current: NDArray[np.int64], change: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """See `LookupTable.respond`; of two inputs."""
+        """What the inference answers; the change does not matter."""
         del change
         crisp = self.system.infer_at(
             {
@@ -68,14 +86,28 @@ class ExactInference:
 
 
 def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1) -> int:
-    """Memory of a lookup table, eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits)."""
+    """Memory of a lookup table, eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits).
+
+    Args:
+        input_bits: By input.
+        output_bits: Of an output.
+        outputs: How many there are.
+
+    Returns:
+        [B].
+    """
     return outputs * output_bits * (1 << sum(input_bits)) // 8
 
 
 def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> NDArray[np.int8]:
-    """The inference on the axes' grid in 1/127ths of the output range, read-only.
+    """An inference on the axes' grid.
 
-    axes: by input of the system, in its order. Returns (2 ** bits of each axis).
+    Args:
+        system: The inference.
+        axes: By input of the system, in its order.
+
+    Returns:
+        (2 ** bits of each axis) in 1/127ths of the output range, read-only.
     """
     crisp = infer(system, {name: axis.grid() for name, axis in axes.items()})
     table = np.rint(crisp * OUTPUT_SCALE).astype(np.int8)

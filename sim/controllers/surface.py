@@ -21,7 +21,14 @@ SURFACE_AXES: Final = ("error", "current")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memberships:
-    """An input's or output's range and sets. values (n,) [its unit]; degrees: by set, (n,) [1]."""
+    """An input's or output's range and sets.
+
+    Attributes:
+        universe: of the input or output.
+        centred: about zero; else from zero up.
+        values: (n,), in its unit.
+        degrees: by set, (n,) [1].
+    """
 
     universe: Universe
     centred: bool
@@ -33,8 +40,13 @@ class Memberships:
 class Surface:
     """One output over (error, current), in its unit.
 
-    held: by input that is neither, the value at which it is held [its unit]; inference, table:
-    (n_error, n_current), at the inputs' `values`.
+    Attributes:
+        source: what it is the surface of.
+        inputs: by name.
+        output: of the inference.
+        held: by input that is neither, the value at which it is held, in its unit.
+        inference: (n_error, n_current), at the inputs' `values`.
+        table: (n_error, n_current), at the inputs' `values`.
     """
 
     source: Inference
@@ -65,7 +77,14 @@ def surface(
 ) -> Surface:
     """An output on an even grid of whole counts.
 
-    velocity: at which an input of that name is held, rounded to whole counts a tick [counts/s].
+    Args:
+        source: The inference, and the table in its place.
+        error_points: Points along the error.
+        current_points: Points along the current.
+        velocity: At which an input of that name is held, rounded to whole counts a tick [counts/s].
+
+    Returns:
+        The surface.
     """
     points = {"error": error_points, "current": current_points, "velocity": error_points}
     inputs = {

@@ -13,9 +13,14 @@ def half_ellipse(
 ) -> tuple[Floats, Floats]:
     """Foot position in its leg's frame.
 
-    phase: (...) share of the cycle since the start of support, in [0, 1); stride, height [m];
-    duty_factor: support's share of the cycle.
-    Returns forward (...) from +stride/2 to -stride/2 and back, and lift (...) >= 0 [m].
+    Args:
+        phase: Share of the cycle since the start of support, in [0, 1), (...).
+        stride: Length of the support [m].
+        height: Of the swing [m].
+        duty_factor: Support's share of the cycle [1].
+
+    Returns:
+        Forward (...) from +stride/2 to -stride/2 and back, and lift (...) >= 0 [m].
     """
     supporting = phase < duty_factor
     support = phase / duty_factor

@@ -15,9 +15,15 @@ def leg_angles(
 ) -> tuple[Floats, Floats]:
     """Knee-up solution for a tibia end relative to the coxa axis.
 
-    forward, lateral (outward), vertical (up): (T,) [m].
-    Returns angles (T, 3) [rad] (coxa forward, femur up, tibia up) and the miss (T,) [m] by which
-    the target lies outside the leg's reach, 0 inside; angles of a missed target point towards it.
+    Args:
+        leg: Lengths of the leg.
+        forward: (T,) [m].
+        lateral: Outward, (T,) [m].
+        vertical: Upward, (T,) [m].
+
+    Returns:
+        Angles (T, 3) [rad] (coxa forward, femur up, tibia up), and the miss (T,) [m] by which the
+        target lies outside the leg's reach, 0 inside; angles of a missed target point towards it.
     """
     alpha = np.arctan2(forward, lateral)
     outward = np.hypot(forward, lateral) - leg.coxa

@@ -23,9 +23,11 @@ _CURVES: Final = {"half_ellipse": half_ellipse, "quadratic_spline": quadratic_sp
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Desired angles (T, J) [rad] at the control rate; row 0 is the pose at rest.
+    """Desired angles at the control rate.
 
-    miss: (L,) largest distance by which a leg's target lies outside its reach [m].
+    Attributes:
+        angles: (T, J) [rad]; row 0 is the pose at rest.
+        miss: largest distance by which a leg's target lies outside its reach, (L,) [m].
     """
 
     angles: Floats
@@ -33,17 +35,32 @@ class Trajectory:
 
     @property
     def reachable(self) -> bool:
-        """Every target can be reached."""
+        """Whether every target can be reached."""
         return not self.miss.any()
 
 
 def n_ticks(scenario: Scenario) -> int:
-    """Control ticks of the whole walk."""
+    """Control ticks of a whole walk.
+
+    Args:
+        scenario: The walk.
+
+    Returns:
+        At least one.
+    """
     return max(1, round(scenario.duration / CONTROL_PERIOD))
 
 
 def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
-    """The whole walk's desired angles, filtered as the robot's controller receives them."""
+    """A whole walk's desired angles, filtered as the robot's controller receives them.
+
+    Args:
+        robot: Whose legs are planned for.
+        scenario: Gait and posture.
+
+    Returns:
+        The angles, and by how much the legs miss.
+    """
     ticks = np.arange(n_ticks(scenario))
     # Signals of a slow trajectory source are held between its updates (stepped, section 5.4).
     updates = np.floor(ticks * (CONTROL_PERIOD * scenario.trajectory_rate) + 1e-9)
@@ -76,7 +93,15 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
 
 
 def low_pass(angles: Floats, fir_ms: int) -> Floats:
-    """Moving average over the last `fir_ms` ms, (T, J) -> (T, J), at rest before t = 0."""
+    """Moving average, at rest before t = 0.
+
+    Args:
+        angles: (T, J).
+        fir_ms: Length of the filter [ms].
+
+    Returns:
+        (T, J).
+    """
     taps = max(1, round(fir_ms * 1e-3 / CONTROL_PERIOD))
     at_rest = np.repeat(angles[:1], taps - 1, axis=0)
     windows = np.lib.stride_tricks.sliding_window_view(np.concatenate([at_rest, angles]), taps, 0)
@@ -84,7 +109,16 @@ def low_pass(angles: Floats, fir_ms: int) -> Floats:
 
 
 def require_reachable(robot: Robot, scenario: Scenario) -> None:
-    """Raise UnreachablePose for the leg that misses by most."""
+    """Check that a robot's legs reach all of a walk.
+
+    Args:
+        robot: The robot.
+        scenario: The walk.
+
+    Raises:
+        UnreachablePose: A foot's target lies outside its leg's reach; names the leg that misses by
+            most.
+    """
     trajectory = desired_angles(robot, scenario)
     if not trajectory.reachable:
         worst = int(np.argmax(trajectory.miss))

@@ -37,8 +37,14 @@ LINK_CURRENTS: Final = tuple(
 class CurrentFit:
     """Designs are parameters of the robot; each walks as the recorded one did.
 
-    variables: columns of the designs, names of `identifiable_variables`. Desired angles are those
-    of the robot as described: its controller knows nothing of the true parameters.
+    Desired angles are those of the robot as described: its controller knows nothing of the true
+    parameters.
+
+    Attributes:
+        name: of the recorded walk, unique in its job.
+        robot: as described.
+        walk: that was recorded.
+        variables: columns of the designs, names of `identifiable_variables`.
     """
 
     name: str
@@ -48,16 +54,16 @@ class CurrentFit:
 
     @property
     def duration(self) -> float:
-        """See `Case.duration`."""
+        """Simulated time of one design [s]."""
         return self.walk.walked_seconds
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """See `Case.objectives`: one mean absolute error a link."""
+        """One mean absolute error by link."""
         return LINK_CURRENTS
 
     def run(self, designs: Floats) -> Outcome:
-        """See `Case.run`. A design that does not walk to the end has failed."""
+        """Let robots with these parameters walk; one that does not walk to the end has failed."""
         described = load_robot(self.robot)
         if self.walk.joints != described.joint_names:
             raise SimulationInputError(
@@ -96,9 +102,14 @@ class CurrentFit:
 
 
 def motor_currents(robot: Robot, states: Floats) -> Floats:
-    """Currents [A] of every motor at every control tick, (T, J), from a kernel's states.
+    """Currents of every motor at every control tick, by the kernel's formula on whole columns.
 
-    states: see `walk.WalkResult`. The same formula as in the kernel, on whole columns.
+    Args:
+        robot: That walked.
+        states: What the kernel kept, as in `WalkResult`.
+
+    Returns:
+        (T, J) [A].
     """
     n = robot.n_joints
     duty = states[:, -n:]

@@ -95,7 +95,14 @@ class RecordedWalk(BaseModel):
         return {name: v for name, v in self.design.items() if name not in GAIT_VARIABLE_NAMES}
 
     def check_reach(self, robot: RobotSource) -> None:
-        """Raise UnreachablePose if the gait leaves the legs' reach."""
+        """Check that a robot's legs reach all of the walk.
+
+        Args:
+            robot: The robot.
+
+        Raises:
+            UnreachablePose: A foot's target lies outside its leg's reach.
+        """
         check_reach(self.scenario, tuple(self.design), tuple(self.design.values()), robot=robot)
 
     @cached_property
@@ -118,7 +125,14 @@ def record(
 ) -> RecordedWalk:
     """The measured currents of two synchronised logs, on the simulated one's time axis.
 
-    scenario, controller, design: those of the walk that was simulated for the synchronisation.
+    Args:
+        pair: The measured and the simulated log.
+        scenario: Of the walk that was simulated.
+        controller: Of the walk that was simulated.
+        design: Of the walk that was simulated, by variable.
+
+    Returns:
+        What a fit needs of the measured walk.
     """
     return RecordedWalk(
         scenario=scenario,

@@ -45,8 +45,12 @@ class Inertia:
     """Rigid or articulated inertia in a link's frame: force = linear a + coupling alpha,
     moment = coupling^T a + angular alpha.
 
-    rigid: mass [kg] and first moment [kg m] of a rigid body, None for an articulated inertia. A
-    rigid one is cheaper to move: its linear part is isotropic, its coupling a mere vector.
+    Attributes:
+        linear: [kg].
+        coupling: [kg m].
+        angular: [kg m2].
+        rigid: mass [kg] and first moment [kg m] of a rigid body, which is cheaper to move: its
+            linear part is isotropic, its coupling a mere vector. None for an articulated inertia.
     """
 
     linear: Matrix
@@ -56,12 +60,28 @@ class Inertia:
 
     @classmethod
     def of_body(cls, mass: Scalar, moment: Vector, angular: Matrix) -> Inertia:
-        """mass [kg], first moment m c [kg m], rotational inertia about the origin [kg m2]."""
+        """Inertia of a rigid body.
+
+        Args:
+            mass: [kg].
+            moment: First moment m c [kg m].
+            angular: Rotational inertia about the link's origin [kg m2].
+
+        Returns:
+            The same as a spatial inertia.
+        """
         diagonal = ((mass, 0.0, 0.0), (0.0, mass, 0.0), (0.0, 0.0, mass))
         return cls(diagonal, transpose(skew(moment)), angular, rigid=(mass, moment))
 
     def times(self, motion: Motion) -> Force:
-        """Inertia times motion."""
+        """Inertia times motion.
+
+        Args:
+            motion: Of the link, in its frame.
+
+        Returns:
+            Momentum of a velocity, force of an acceleration.
+        """
         return Force(
             add(apply(self.linear, motion.linear), apply(self.coupling, motion.angular)),
             add(
@@ -71,7 +91,14 @@ class Inertia:
         )
 
     def plus(self, other: Inertia) -> Inertia:
-        """Sum, in the same frame; no longer known to be rigid."""
+        """Sum, no longer known to be rigid.
+
+        Args:
+            other: In the same frame.
+
+        Returns:
+            The sum.
+        """
         return Inertia(
             mirrored(plus(self.linear, other.linear)),
             plus(self.coupling, other.coupling),
@@ -79,7 +106,15 @@ class Inertia:
         )
 
     def less_outer(self, scaled: Force, column: Force) -> Inertia:
-        """Less the product scaled column^T, which is symmetric."""
+        """Difference to the product scaled column^T, which is symmetric.
+
+        Args:
+            scaled: The column times a number.
+            column: In this inertia's frame.
+
+        Returns:
+            The difference.
+        """
         return Inertia(
             mirrored(minus(self.linear, outer(scaled.linear, column.linear))),
             minus(self.coupling, outer(scaled.linear, column.angular)),
@@ -87,7 +122,15 @@ class Inertia:
         )
 
     def in_parent(self, rotation: Matrix, offset: Vector) -> Inertia:
-        """Seen from the parent's frame, in which this frame is turned and displaced."""
+        """The same seen from the parent's frame.
+
+        Args:
+            rotation: From this frame to the parent's.
+            offset: Of this frame's origin in the parent's [m].
+
+        Returns:
+            The inertia there.
+        """
         inverse = transpose(rotation)
         angular = mirrored(multiply(multiply(rotation, self.angular), inverse))
         if self.rigid is None:
@@ -107,7 +150,12 @@ class Inertia:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Spatial velocity or acceleration."""
+    """Spatial velocity or acceleration.
+
+    Attributes:
+        linear: [m/s] or [m/s2].
+        angular: [rad/s] or [rad/s2].
+    """
 
     linear: Vector
     angular: Vector
@@ -115,17 +163,37 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Force:
-    """Spatial force or momentum."""
+    """Spatial force or momentum.
+
+    Attributes:
+        linear: [N] or [N s].
+        angular: about the frame's origin [N m] or [N m s].
+    """
 
     linear: Vector
     angular: Vector
 
     def plus(self, other: Force) -> Force:
-        """Sum, in the same frame."""
+        """Sum.
+
+        Args:
+            other: In the same frame.
+
+        Returns:
+            The sum.
+        """
         return Force(add(self.linear, other.linear), add(self.angular, other.angular))
 
     def in_parent(self, rotation: Matrix, offset: Vector) -> Force:
-        """Seen from the parent's frame, in which this frame is turned and displaced."""
+        """The same seen from the parent's frame.
+
+        Args:
+            rotation: From this frame to the parent's.
+            offset: Of this frame's origin in the parent's [m].
+
+        Returns:
+            The force there.
+        """
         linear = apply(rotation, self.linear)
         return Force(linear, add(apply(rotation, self.angular), cross(offset, linear)))
 
@@ -134,8 +202,13 @@ class Force:
 class Link:
     """One link and the revolute joint before it.
 
-    parent: index of the parent link, 0 is the base; axis: constant unit axis in the link's frame;
-    placement: rotation and offset [m] of the joint in the parent's frame.
+    Attributes:
+        joint: its name.
+        parent: index of the parent link, 0 is the base.
+        axis: constant unit axis in the link's frame.
+        rotation: of the joint in the parent's frame, at rest.
+        offset: of the joint in the parent's frame [m].
+        inertia: in the link's frame.
     """
 
     joint: str
@@ -150,8 +223,11 @@ class Link:
 class LinkState:
     """Where a link is and how it moves: what external forces may depend on.
 
-    up, ahead: the ground's normal and the world's x axis in the link's frame; height: of the
-    link's origin over ground [m].
+    Attributes:
+        velocity: in the link's frame.
+        up: the ground's normal in the link's frame.
+        ahead: the world's x axis in the link's frame.
+        height: of the link's origin over ground [m].
     """
 
     velocity: Motion
@@ -162,16 +238,30 @@ class LinkState:
 
 @dataclass(frozen=True, slots=True)
 class Acceleration:
-    """base: spatial acceleration in the base's frame; joints: (J,) [rad/s2]."""
+    """Accelerations of a tree.
+
+    Attributes:
+        base: in the base's frame.
+        joints: (J,) [rad/s2].
+    """
 
     base: Motion
     joints: tuple[Scalar, ...]
 
 
 def links_of(model: Any, joint_order: Sequence[str]) -> tuple[Link, ...]:
-    """The links of a Pinocchio model with a free-flyer base, in the given order of joints.
+    """The links of a Pinocchio model with a free-flyer base.
 
-    Raises RobotFileError for a joint that is not revolute, or an order that misses one.
+    Args:
+        model: `pinocchio.Model`.
+        joint_order: Names of all its joints but the free-flyer.
+
+    Returns:
+        The links in the order of the joints.
+
+    Raises:
+        RobotFileError: A joint is not revolute, or the order misses one or has a child before its
+            parent.
     """
     if sorted(joint_order) != sorted(list(model.names)[BASE + 1 :]):
         raise RobotFileError(
@@ -209,9 +299,17 @@ def kinematics(
     cosines: Sequence[Scalar],
     rates: Sequence[Scalar],
 ) -> tuple[list[LinkState], list[Matrix]]:
-    """First pass: the state of every link (the base first) and each joint's rotation to its parent.
+    """First pass: where every link is and how it moves.
 
-    sines, cosines: of the joint angles, (J,); rates: joint velocities (J,) [rad/s].
+    Args:
+        links: Of the robot.
+        base: State of the base.
+        sines: Of the joint angles, (J,).
+        cosines: Of the joint angles, (J,).
+        rates: Joint velocities, (J,) [rad/s].
+
+    Returns:
+        State of every link (the base first), and each joint's rotation to its parent.
     """
     states, rotations = [base], []
     for link, sine, cosine, rate in zip(links, sines, cosines, rates, strict=True):
@@ -247,8 +345,19 @@ def articulated_body(
 ) -> Acceleration:
     """Second and third pass: accelerations under torques, external forces and gravity.
 
-    torques: (J,) [N m]; armature: reflected rotor inertia (J,) [kg m2]; external: force on a link
-    (index as in `states`) in its own frame; gravity: in the base's frame [m/s2].
+    Args:
+        links: Of the robot.
+        base_inertia: In the base's frame.
+        states: Of `kinematics`.
+        rotations: Of `kinematics`.
+        rates: Joint velocities, (J,) [rad/s].
+        torques: At the joints, (J,) [N m].
+        armature: Reflected rotor inertia, (J,) [kg m2].
+        external: Force on a link in its own frame, by the link's index as in `states`.
+        gravity: In the base's frame [m/s2].
+
+    Returns:
+        Accelerations of base and joints.
     """
     inertias = [base_inertia, *(link.inertia for link in links)]
     forces = []

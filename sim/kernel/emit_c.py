@@ -33,6 +33,16 @@ def emit_c(function: Any, name: str) -> str:
 
     Inputs and outputs must not overlap. The sine and cosine of one angle share their range
     reduction, and a divisor used more than once is inverted once.
+
+    Args:
+        function: A CasADi function of scalars (`SX`).
+        name: Of the C function.
+
+    Returns:
+        C text that needs `vec.h`.
+
+    Raises:
+        SimulationError: An operation of the function has no rule.
     """
     return _Emitter(function).source(name)
 

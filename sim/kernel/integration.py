@@ -16,8 +16,15 @@ def integrated(
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Velocities first, then positions with the new velocities.
 
-    q (7+J), v (6+J): see `physics_step.PhysicsModel`; rates (6+J): derivative of v; attitude:
-    rotation of the base; timestep [s]. Returns q and v after the step.
+    Args:
+        q: Position, quaternion x y z w, joint angles (7+J).
+        v: Base twist in its own frame, joint rates (6+J).
+        rates: Derivative of v (6+J).
+        attitude: Rotation of the base to the world.
+        timestep: [s].
+
+    Returns:
+        q and v after the step.
     """
     after = [old + timestep * rate for old, rate in zip(v, rates, strict=True)]
     linear = scale(timestep, (after[0], after[1], after[2]))

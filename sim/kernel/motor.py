@@ -11,7 +11,14 @@ from sim.robot.robot import JointActuators
 
 @dataclass(frozen=True, slots=True)
 class Electrical:
-    """supply [V]; voltage, current, torque by joint: (J,) [V], [A], [N m] after friction."""
+    """Motors and battery at one instant.
+
+    Attributes:
+        supply: voltage of the battery under load [V].
+        voltages: of the motors, (J,) [V].
+        currents: of the motors, (J,) [A].
+        torques: at the joints after friction, (J,) [N m].
+    """
 
     supply: Scalar
     voltages: tuple[Scalar, ...]
@@ -29,12 +36,20 @@ def electrical(
 ) -> Electrical:
     """Quasi-static motor currents on one battery of finite resistance.
 
-    duty: motor voltage per supply voltage (J,) [1]; rates: joint velocities (J,) [rad/s];
-    viscous (J,) [N m s/rad]; source [V] and internal resistance [ohm] of the battery.
-
     The bridges conserve power, so the battery's current is sum(duty_j I_j); with
     I_j = (duty_j U_S - k_j omega_j) / R_j, U_S = V - R_i sum(duty_j I_j) is linear in U_S.
     The electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static.
+
+    Args:
+        actuators: Motors and gears by joint.
+        duty: Motor voltage per supply voltage, (J,) [1].
+        rates: Motor velocities at the gearheads' outputs, (J,) [rad/s].
+        viscous: Friction, (J,) [N m s/rad].
+        source: Open-circuit voltage of the battery [V].
+        internal: Resistance of the battery [ohm].
+
+    Returns:
+        Voltages, currents and torques.
     """
     constants = list(zip(actuators.torque.tolist(), actuators.resistance.tolist(), strict=True))
     back, load = 0.0, 0.0

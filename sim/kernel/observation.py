@@ -16,12 +16,20 @@ from sim.robot import Robot
 class WalkLog:
     """What happened at every control tick (500 Hz) of one walk; T ticks, J joints, L legs.
 
-    time (T,) [s]; base_position (T, 3) [m], base_orientation (T, 4) quaternion x y z w,
-    base_velocity (T, 6) linear [m/s] and angular [rad/s] in the body frame;
-    joint_angle, desired_angle (T, J) [rad]; motor_angle (T, J) [rad]: what the encoders see,
-    which differs from the link's with backlash; joint_velocity (T, J) [rad/s];
-    current (T, J) [A]; voltage (T, J) [V]; load_torque (T, J) [N m];
-    foot_force (T, L, 3) [N], world frame; supply (T,) [V].
+    Attributes:
+        time: (T,) [s].
+        base_position: (T, 3) [m].
+        base_orientation: (T, 4) quaternion x y z w.
+        base_velocity: in the body's frame, (T, 6) linear [m/s] and angular [rad/s].
+        joint_angle: of the links, (T, J) [rad].
+        motor_angle: what the encoders see, with backlash not the link's, (T, J) [rad].
+        joint_velocity: (T, J) [rad/s].
+        desired_angle: (T, J) [rad].
+        current: of the motors, (T, J) [A].
+        voltage: of the motors, (T, J) [V].
+        load_torque: that the gearheads pass to the links, (T, J) [N m].
+        foot_force: in the world, (T, L, 3) [N].
+        supply: voltage of the battery, (T,) [V].
     """
 
     time: NDArray[np.float64]
@@ -48,7 +56,7 @@ class WalkLog:
         return WalkLog(**{name: column[:end] for name, column in columns.items()})
 
     def body_acceleration(self) -> NDArray[np.float64]:
-        """(T, 3) acceleration of the body's origin in its own frame, without gravity [m/s2].
+        """Acceleration of the body's origin in its own frame, without gravity, (T, 3) [m/s2].
 
         dv/dt + omega x v of the logged twist, dv/dt by central differences over 4 ms.
         """
@@ -61,7 +69,13 @@ class WalkLog:
 def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> WalkLog:
     """Currents, torques, forces and supply of every tick, from its state and duty.
 
-    states: see `walk.WalkResult`; rows after an early end stay NaN.
+    Args:
+        robot: That walked.
+        setup: Its walk.
+        states: What the kernel kept, as in `WalkResult`.
+
+    Returns:
+        The log; rows after an early end stay NaN.
     """
     # Logs are rare: they alone need CasADi in a process that has a compiled kernel.
     from sim.kernel.physics_step import physics_model  # noqa: PLC0415

@@ -54,14 +54,16 @@ INTEGRANDS: Final = (
 class PhysicsModel:
     """CasADi functions of one robot.
 
-    step: (q, v, internal_state, duty, disturbance, p) -> (q', v', internal_state', current,
-    integrands); observe: the same inputs -> (current (J), voltage (J), load torque (J), foot force
-    (3 L) in the world, supply (1), acceleration (6+J) as `pinocchio.aba` gives it).
-    q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its own frame,
-    joint rates; internal_state: with backlash the motors' angles (J) [rad] and rates (J)
-    [rad/s] at the gearhead's output, with `stick` two elongations [m] a foot; duty (J): motor
-    voltage per supply voltage; disturbance (J): torque on each link [N m]; p: see
-    `parameters.Layout`.
+    Their inputs are q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its
+    own frame, joint rates; internal_state (I), as `parameters.internal_state_size` says; duty (J):
+    motor voltage per supply voltage; disturbance (J): torque on each link [N m]; parameters (P), as
+    `parameters.Layout` says.
+
+    Attributes:
+        step: to q, v and internal state after the step, current (J) and integrands (5).
+        observe: to current (J), voltage (J), load torque (J), foot force in the world (3 L), supply
+            (1) and acceleration (6+J) as `pinocchio.aba` gives it.
+        layout: of the parameters.
     """
 
     step: Any
@@ -94,7 +96,17 @@ class _Dynamics:
 
 @lru_cache(maxsize=8)
 def physics_model(robot: Robot) -> PhysicsModel:
-    """Derive the step from the robot's URDF. Imports CasADi and Pinocchio, hence slow to begin."""
+    """Derive the step from a robot's URDF.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Its functions.
+
+    Raises:
+        RobotFileError: The tree is not one that can be simulated.
+    """
     model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     layout = Layout(robot)
     s = _symbols(robot, layout)
@@ -185,9 +197,16 @@ def link_states(
     v: Sequence[Scalar],
     attitude: Matrix,
 ) -> tuple[list[LinkState], list[Matrix]]:
-    """Where every link is and how it moves (the base first), each joint's rotation to its parent.
+    """Where every link is and how it moves.
 
-    q, v: see `PhysicsModel`; attitude: rotation of the base.
+    Args:
+        links: Of the robot.
+        q: Position, quaternion x y z w, joint angles (7+J).
+        v: Base twist in its own frame, joint rates (6+J).
+        attitude: Rotation of the base to the world.
+
+    Returns:
+        State of every link (the base first), and each joint's rotation to its parent.
     """
     base = LinkState(
         velocity=Motion(_triple(v[0:3]), _triple(v[3:6])),
@@ -200,7 +219,14 @@ def link_states(
 
 
 def base_inertia(p: Mapping[str, Sequence[Scalar]]) -> Inertia:
-    """The body's, with its load, from parameters by name; see `parameters.Layout`."""
+    """Inertia of the body with its load.
+
+    Args:
+        p: Parameters by name, as `parameters.Layout` says.
+
+    Returns:
+        In the base's frame.
+    """
     xx, yy, zz, xy, xz, yz = p["base_inertia"]
     tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     return Inertia.of_body(p["base_mass"][0], _triple(p["base_moment"]), tensor)

@@ -26,7 +26,12 @@ Ints = NDArray[np.int64]
 
 
 class ReferenceKernel:
-    """See `walk.Kernel`. Some hundred times slower than the compiled one."""
+    """Walks over CasADi's interpreter, some hundred times slower than the compiled kernel.
+
+    Args:
+        robot: That walks.
+        model: Its physics.
+    """
 
     backend: Final = "reference"
     lanes: Final = 1
@@ -40,7 +45,7 @@ class ReferenceKernel:
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
     ) -> tuple[WalkResult, ...]:
-        """See `walk.Kernel.walk`."""
+        """All walks, one after the other."""
         for setup in setups:
             setup.check(
                 joints=self._model.step.numel_in(3),
@@ -74,7 +79,12 @@ class ReferenceKernel:
 
 
 class Stepper:
-    """CasADi's step on fixed buffers: several times cheaper than calling the function."""
+    """CasADi's step on fixed buffers: several times cheaper than calling the function.
+
+    Args:
+        function: `PhysicsModel.step`.
+        setup: The walk to be stepped, from its start.
+    """
 
     def __init__(self, function: Any, setup: WalkSetup) -> None:
         n_joints = setup.desired.shape[1]
@@ -176,5 +186,12 @@ def _padded(rows: list[Floats], ticks: int) -> Floats:
 
 @lru_cache(maxsize=8)
 def reference_kernel(robot: Robot) -> ReferenceKernel:
-    """The robot's interpreter kernel."""
+    """The robot's interpreter kernel.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        The kernel, made once.
+    """
     return ReferenceKernel(robot, physics_model(robot))

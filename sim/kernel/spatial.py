@@ -19,18 +19,32 @@ Matrix = tuple[Vector, Vector, Vector]
 
 
 def vector(values: Sequence[Scalar] | NDArray[np.float64]) -> Vector:
-    """Three numbers; rounding noise of unit-sized constants becomes a structural zero."""
+    """Three numbers; rounding noise of unit-sized constants becomes a structural zero.
+
+    Args:
+        values: (3,).
+
+    Returns:
+        The vector.
+    """
     x, y, z = (_snap(value) for value in values)
     return x, y, z
 
 
 def matrix(values: NDArray[np.float64]) -> Matrix:
-    """A constant 3x3 array."""
+    """A constant matrix, its noise removed as by `vector`.
+
+    Args:
+        values: (3, 3).
+
+    Returns:
+        The matrix.
+    """
     return vector(values[0]), vector(values[1]), vector(values[2])
 
 
 def add(*terms: Vector) -> Vector:
-    """Sum of vectors, from the left."""
+    """Sum of the terms, from the left."""
     x, y, z = terms[0]
     for a, b, c in terms[1:]:
         x, y, z = x + a, y + b, z + c
@@ -62,7 +76,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def transpose(m: Matrix) -> Matrix:
-    """Rows to columns."""
+    """m^T"""
     return (
         (m[0][0], m[1][0], m[2][0]),
         (m[0][1], m[1][1], m[2][1]),
@@ -97,12 +111,12 @@ def outer(a: Vector, b: Vector) -> Matrix:
 
 
 def skew(a: Vector) -> Matrix:
-    """[a]x, so that apply(skew(a), b) = cross(a, b)."""
+    """[a]x, so that apply(skew(a), b) = cross(a, b)"""
     return (0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0)
 
 
 def mirrored(m: Matrix) -> Matrix:
-    """A symmetric matrix from its upper triangle; the lower one is never computed."""
+    """m, symmetric, from its upper triangle; the lower one is never computed"""
     return (
         m[0],
         (m[0][1], m[1][1], m[1][2]),
@@ -111,7 +125,16 @@ def mirrored(m: Matrix) -> Matrix:
 
 
 def rotation_about(axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
-    """Rodrigues' formula for a constant unit axis."""
+    """Rodrigues' formula.
+
+    Args:
+        axis: Constant unit axis.
+        sine: Of the angle.
+        cosine: Of the angle.
+
+    Returns:
+        Rotation from the turned frame.
+    """
     versine = 1.0 - cosine
     rows = []
     for i in range(3):
@@ -130,7 +153,14 @@ def rotation_about(axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
 
 
 def rotation_of(quaternion: Sequence[Scalar]) -> Matrix:
-    """Rotation matrix of a unit quaternion x, y, z, w (body to world)."""
+    """Rotation matrix of a quaternion.
+
+    Args:
+        quaternion: Unit quaternion x, y, z, w (body to world).
+
+    Returns:
+        Rotation from body to world.
+    """
     x, y, z, w = quaternion
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

@@ -22,7 +22,18 @@ CODE_LIMIT = 65535
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """Integers of sensors and PWM for a batch, and physics steps a control tick."""
+    """Integers of sensors and PWM for a batch, and physics steps a control tick.
+
+    Attributes:
+        angle_counts: code of one radian [counts/rad].
+        current_counts: code of one ampere [counts/A].
+        duty_per_count: motor voltage per supply voltage of one PWM count [1].
+        angle_step: encoder resolution [counts].
+        current_step: resolution of the current's converter [counts].
+        pwm_step: resolution of the PWM [counts].
+        pwm_counts: full scale of the PWM [counts].
+        substeps: physics steps a control tick.
+    """
 
     angle_counts: float
     current_counts: float
@@ -40,7 +51,15 @@ class Coding:
 
     @classmethod
     def of(cls, robot: Robot, substeps: int) -> Coding:
-        """Resolutions of a robot's sensors and bridges."""
+        """Resolutions of a robot's sensors and bridges.
+
+        Args:
+            robot: The robot.
+            substeps: Physics steps a control tick.
+
+        Returns:
+            The coding.
+        """
         d = robot.description
         return cls(
             angle_counts=d.sensors.angle_counts,
@@ -58,10 +77,15 @@ class Coding:
 class WalkSetup:
     """One walk to be computed.
 
-    start (7+J,): initial q, at rest; internal_state: initial, see `physics_step.PhysicsModel`;
-    parameters (P,), see `parameters.Layout`; desired (T, J) int32 coded angles; disturbance (T, J):
-    torques on the links [N m] or None; fall_height [m] and fall_cosine: below either the robot has
-    fallen.
+    Attributes:
+        start: initial q, at rest, (7+J,).
+        internal_state: initial, (I,), as `parameters.internal_state_size` says.
+        parameters: (P,), as `parameters.Layout` says.
+        desired: coded angles, (T, J) int32.
+        control_law: of every joint.
+        fall_height: of the body; below it the robot has fallen [m].
+        fall_cosine: of the tilt; below it the robot has fallen.
+        disturbance: torques on the links, (T, J) [N m], or None.
     """
 
     start: Floats
@@ -75,7 +99,7 @@ class WalkSetup:
 
     @property
     def ticks(self) -> int:
-        """T."""
+        """T, control ticks of the walk."""
         return len(self.desired)
 
     def check(self, *, joints: int, internal_state: int, parameters: int) -> None:
@@ -107,11 +131,15 @@ class WalkSetup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkResult:
-    """sums (5,): `physics_step.INTEGRANDS` summed over physics steps; end (7+J,): final q.
+    """What became of a walk.
 
-    states (T, 7+J + 6+J + I + J): q, v, internal state and duty at every control tick after
-    its control, NaN after an early end; None if not asked for. `observation.walk_log` tells the
-    rest.
+    Attributes:
+        status: how it ended.
+        sums: `physics_step.INTEGRANDS` summed over physics steps, (5,).
+        end: final q, (7+J,).
+        states: q, v, internal state and duty at every control tick after its control,
+            (T, 7+J + 6+J + I + J), NaN after an early end; None if not asked for.
+            `observation.walk_log` tells the rest.
     """
 
     status: Status
@@ -134,4 +162,16 @@ class Kernel(Protocol):
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
     ) -> tuple[WalkResult, ...]:
-        """All walks, in order. Raises SimulationInputError for a setup of other sizes."""
+        """Compute walks.
+
+        Args:
+            setups: Any number of walks of the kernel's robot.
+            coding: For all of them.
+            log: Whether to keep states.
+
+        Returns:
+            Results, in order.
+
+        Raises:
+            SimulationInputError: A setup has arrays of other sizes.
+        """

@@ -54,7 +54,7 @@ class Quantity(StrEnum):
 
     @property
     def optional(self) -> bool:
-        """Supplementary in table 2.2."""
+        """Whether it is supplementary in table 2.2."""
         return self in (Quantity.POTENTIOMETER, Quantity.BODY_ACCELERATION)
 
 
@@ -73,15 +73,21 @@ _FACTS: Final[dict[Quantity, tuple[str, Literal["joint", "leg", "axis"], str]]] 
 class MeasuredLog:
     """A log with the quantities of table 2.2, measured, simulated or synthetic; T rows.
 
-    joints (J), legs (L): names, in the robot's order, three joints a leg;
-    time (T,) [s], from any start, a row each 2 ms;
-    desired_angle, joint_angle (T, J) [rad]; control_voltage (T, J) [V]; current (T, J) [A], >= 0;
-    supply (T, L) [V];
-    potentiometer (T, K) [rad], of the K joints named in potentiometer_joints; none is (T, 0);
-    body_acceleration (T, 3) [g], in the body's frame, without gravity; none is None;
-    metadata: what the file says of itself, by name.
-
     Raises SimulationInputError if shapes do not fit.
+
+    Attributes:
+        joints: J names, in the robot's order, three joints a leg.
+        legs: L names, in the robot's order.
+        time: from any start, a row each 2 ms, (T,) [s].
+        desired_angle: (T, J) [rad].
+        control_voltage: (T, J) [V].
+        joint_angle: (T, J) [rad].
+        current: absolute, (T, J) [A].
+        supply: (T, L) [V].
+        potentiometer_joints: names of the K joints that have a potentiometer.
+        potentiometer: (T, K) [rad]; None if K is 0.
+        body_acceleration: in the body's frame, without gravity, (T, 3) [g]; None if not measured.
+        metadata: what the file says of itself, by name.
     """
 
     joints: tuple[str, ...]
@@ -119,7 +125,14 @@ class MeasuredLog:
         return self.metadata.get(ORIGIN) == SYNTHETIC
 
     def channels(self, quantity: Quantity) -> tuple[str, ...]:
-        """Names of a quantity's columns; none for one that was not measured."""
+        """Names of a quantity's columns.
+
+        Args:
+            quantity: Of table 2.2.
+
+        Returns:
+            Joints, legs or axes; none for a quantity that was not measured.
+        """
         if quantity is Quantity.POTENTIOMETER:
             return self.potentiometer_joints
         if quantity is Quantity.BODY_ACCELERATION and self.body_acceleration is None:
@@ -127,7 +140,14 @@ class MeasuredLog:
         return {"joint": self.joints, "leg": self.legs, "axis": AXES}[quantity.per]
 
     def values(self, quantity: Quantity) -> Floats:
-        """(T, channels), in the quantity's unit."""
+        """A quantity's columns.
+
+        Args:
+            quantity: Of table 2.2.
+
+        Returns:
+            (T, channels), in the quantity's unit.
+        """
         columns = {
             Quantity.DESIRED_ANGLE: self.desired_angle,
             Quantity.CONTROL_VOLTAGE: self.control_voltage,
@@ -140,11 +160,26 @@ class MeasuredLog:
         return np.empty((len(self.time), 0)) if columns is None else columns
 
     def link_of(self, joint: str) -> int:
-        """1, 2 or 3: coxa, femur or tibia."""
+        """Which link of its leg a joint moves.
+
+        Args:
+            joint: One of `joints`.
+
+        Returns:
+            1, 2 or 3: coxa, femur or tibia.
+        """
         return self.joints.index(joint) % JOINTS_PER_LEG + 1
 
     def rows(self, start: int, stop: int) -> MeasuredLog:
-        """A part of the log; arrays are views."""
+        """A part of the log.
+
+        Args:
+            start: First row.
+            stop: Row after the last.
+
+        Returns:
+            The part; its arrays are views.
+        """
         part = slice(start, stop)
         return replace(
             self,
@@ -162,11 +197,20 @@ class MeasuredLog:
 
 
 def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
-    """The quantities of table 2.2 of a walk that did not end early.
+    """A simulated walk as the robot's own instruments would have logged it, without their errors.
 
     Encoders see the motors' angles, potentiometers, which every joint has, the links'; currents are
     absolute values; every leg's board sees the one battery.
-    Raises SimulationInputError for a walk that ended early.
+
+    Args:
+        robot: That walked.
+        walk: Log of a walk that did not end early.
+
+    Returns:
+        The quantities of table 2.2.
+
+    Raises:
+        SimulationInputError: The walk ended early.
     """
     if not np.isfinite(walk.current).all():
         raise SimulationInputError("a walk that ended early cannot be compared")

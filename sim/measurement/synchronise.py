@@ -23,9 +23,13 @@ _TIE: Final = 1e-6
 class Synchronised:
     """The same whole cycles of a walk, measured and simulated; both logs have the same rows.
 
-    lag: rows by which the walk begins later in the measured log than in the simulated one;
-    cycles: whole walking cycles kept, the last of the common part, as a walk starts at rest;
-    cycle_time [s]; correlation: of the desired angles over the common part, 1 for the same gait.
+    Attributes:
+        measured: log.
+        simulated: log.
+        lag: rows by which the walk begins later in the measured log than in the simulated one.
+        cycles: whole walking cycles kept, the last of the common part, as a walk starts at rest.
+        cycle_time: of a walking cycle [s].
+        correlation: of the desired angles over the common part, 1 for the same gait.
     """
 
     measured: MeasuredLog
@@ -44,8 +48,17 @@ class Synchronised:
 def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float) -> Synchronised:
     """Find the lag between two logs and trim both to the whole cycles that they share.
 
-    Raises MeasuredLogError if they are not of the same joints, if the desired angles stand still,
-    or if they share less than one cycle.
+    Args:
+        measured: Log of the walk.
+        simulated: Log of the same walk.
+        cycle_time: Of a walking cycle [s].
+
+    Returns:
+        The two on a common time axis.
+
+    Raises:
+        MeasuredLogError: They are not of the same joints, the desired angles stand still, or they
+            share less than one cycle.
     """
     if measured.joints != simulated.joints:
         raise MeasuredLogError("the two logs are not of the same joints")
@@ -73,14 +86,22 @@ def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float
 
 
 def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, float]:
-    """Lag k [rows] at which measured[t + k] is simulated[t], and their correlation there.
-
-    measured (T1, J), simulated (T2, J): desired angles of the same joints; cycle: rows of a
-    walking cycle, which the two share at least.
+    """Lag at which the desired angles of two logs agree.
 
     The cross-correlation over all that overlaps tells which cycle is which; but it favours long
     overlaps, and so is off by some rows. Within a quarter of a cycle of it the mean square
     difference decides, to the row.
+
+    Args:
+        measured: Desired angles, (T1, J).
+        simulated: Desired angles of the same joints, (T2, J).
+        cycle: Rows of a walking cycle, which the two share at least.
+
+    Returns:
+        Lag k [rows] at which measured[t + k] is simulated[t], and their correlation there.
+
+    Raises:
+        MeasuredLogError: The desired angles stand still.
     """
     mean = simulated.mean(axis=0)
     x, y = measured - mean, simulated - mean

@@ -59,7 +59,14 @@ class Perturbation(BaseModel):
 
     @classmethod
     def of(cls, parameters: Mapping[str, float]) -> Perturbation:
-        """A twin that differs in these parameters alone, and has no backlash."""
+        """A twin that differs in single parameters alone, and has no backlash.
+
+        Args:
+            parameters: Values of some of `identifiable_variables`, by name.
+
+        Returns:
+            The perturbation.
+        """
         return cls(
             supply_voltage=1.0,
             supply_resistance=1.0,
@@ -103,9 +110,22 @@ def synthetic_log(
 ) -> MeasuredLog:
     """A log of the perturbed twin of a robot, marked as synthetic in its metadata.
 
-    design: the controller's variables and any gait variables. The same arguments give the same
-    bits; each quantity has a random stream of its own, by seed.
-    Raises SimulationInputError for a twin that does not walk to the end.
+    The same arguments give the same bits; each quantity has a random stream of its own, by seed.
+
+    Args:
+        robot: As described.
+        scenario: Of the walk.
+        controller: Name of the motor controller.
+        design: The controller's variables and any gait variables, by name.
+        seed: Of the instruments' noise, 64 bits.
+        perturbation: How the twin differs; the default if left out.
+        instruments: Their errors; the default if left out.
+
+    Returns:
+        The log.
+
+    Raises:
+        SimulationInputError: The twin does not walk to the end, or the seed is none.
     """
     if not 0 <= seed < 1 << 64:
         raise SimulationInputError(f"seed: {seed} is not a whole number from 0 of 64 bits")
@@ -135,7 +155,18 @@ def synthetic_log(
 
 
 def perturbed(robot: Robot, change: Perturbation) -> Robot:
-    """The twin: the same robot with other friction, losses, backlash, battery and soles."""
+    """The twin: the same robot with other friction, losses, backlash, battery and soles.
+
+    Args:
+        robot: As described.
+        change: How the twin differs.
+
+    Returns:
+        The twin.
+
+    Raises:
+        SimulationInputError: No robot can have one of the values.
+    """
     d = robot.description
 
     def contact(own: Contact) -> Contact:
@@ -242,5 +273,13 @@ def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) ->
 
 
 def converted(amperes: Floats, step: float) -> Floats:
-    """What a 12-bit converter makes of absolute currents [A]: whole steps from 0 to 4095."""
+    """What a 12-bit converter makes of absolute currents: whole steps from 0 to 4095.
+
+    Args:
+        amperes: Of any shape [A].
+        step: Of the converter [A].
+
+    Returns:
+        Of the same shape [A].
+    """
     return np.clip(np.rint(amperes / step), 0, (1 << ADC_BITS) - 1) * step

@@ -61,9 +61,14 @@ _CONTACT: Final = {
 
 @lru_cache(maxsize=32)
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
-    """All of them, in the order of table 2.7, with bounds around its trial and identified values.
+    """All parameters in the order of table 2.7, bounds around its trial and identified values.
 
-    efficiency_<joint> for every joint; stiffness_, damping_, sole_, friction_<leg> for every leg.
+    Args:
+        robot: Whose joints and legs name them: efficiency_<joint> for every joint; stiffness_,
+            damping_, sole_ and friction_<leg> for every leg.
+
+    Returns:
+        The variables.
     """
     legs = robot.description.legs
     return (
@@ -74,9 +79,17 @@ def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
 
 
 def with_parameters(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """The same robot with some of `identifiable_variables` at other values, by name.
+    """The same robot with some of `identifiable_variables` at other values.
 
-    Raises SimulationInputError that names a value which no robot can have.
+    Args:
+        robot: The robot.
+        values: By name.
+
+    Returns:
+        The changed robot.
+
+    Raises:
+        SimulationInputError: No robot can have a value; names it.
     """
     d = robot.description
     mass = values.get("body_mass", d.body_mass)

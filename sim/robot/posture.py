@@ -11,7 +11,15 @@ Floats = NDArray[np.float64]
 
 
 def feet_below_body(robot: Robot, joints: Floats) -> Floats:
-    """Height of every tibia's end in the body frame, joints (J,) -> (L,) [m], mostly negative."""
+    """Height of every tibia's end in the body's frame.
+
+    Args:
+        robot: The robot.
+        joints: Angles, (J,) [rad].
+
+    Returns:
+        (L,) [m], mostly negative.
+    """
     angles = joints.reshape(-1, 3)
     return np.array(
         [
@@ -22,10 +30,18 @@ def feet_below_body(robot: Robot, joints: Floats) -> Floats:
 
 
 def resting_height(robot: Robot, joints: Floats, weight: float) -> float:
-    """Height [m] of a level body at which the feet's springs carry the weight [N].
+    """Height of a level body at which the feet's springs carry a weight.
 
     The springs' force is piecewise linear in height; feet are loaded from the lowest up until the
     balance leaves the next one in the air.
+
+    Args:
+        robot: The robot.
+        joints: Angles, (J,) [rad].
+        weight: To be carried [N].
+
+    Returns:
+        [m].
     """
     contacts = robot.contacts()
     reach = np.array([c.sole for c in contacts]) - feet_below_body(robot, joints)

@@ -37,7 +37,11 @@ Floats = NDArray[np.float64]
 class Deviation:
     """Objectives of one variant of a walk against its reference, (6,) each, NaN where undefined.
 
-    ratio: variant over reference; `relative` is its distance from one.
+    Attributes:
+        variant: what differs.
+        scenario: name of the walk.
+        reference: objectives of the reference.
+        ratio: variant over reference [1].
     """
 
     variant: str
@@ -47,7 +51,7 @@ class Deviation:
 
     @property
     def relative(self) -> Floats:
-        """(6,) relative difference."""
+        """Distance of the ratio from one, (6,)."""
         return np.abs(self.ratio - 1.0)
 
 
@@ -60,6 +64,14 @@ def tables_against_inference(
     """A Fuzzy-PI's tables of several resolutions against 64-bit inference (section 5.3).
 
     All walk in the reference kernel, so that nothing but the table differs.
+
+    Args:
+        design: Of the Fuzzy-PI of chapter 4, by variable.
+        scenarios: Walks.
+        robot: That walks.
+
+    Returns:
+        By scenario and resolution.
     """
     controller = FuzzyPi()
     deviations = []
@@ -85,7 +97,17 @@ def step_halving(
     *,
     robot: RobotChoice = "szabadka2",
 ) -> tuple[Deviation, ...]:
-    """Physics at 5, 10 and 20 kHz against 40 kHz."""
+    """Physics at 5, 10 and 20 kHz against 40 kHz.
+
+    Args:
+        controller: Name of the motor controller.
+        design: Values by variable.
+        scenarios: Walks.
+        robot: That walks.
+
+    Returns:
+        By scenario and rate.
+    """
     deviations = []
     for scenario in scenarios:
         finest = _walk(scenario, controller, design, robot, physics_rate=2 * RATES[-1])
@@ -106,7 +128,19 @@ def noise_on_links(
     deviation: float = NOISE,
     seed: int = 1,
 ) -> tuple[Deviation, ...]:
-    """Torque noise on link 1, 2 or 3 relative to the noiseless run (table 2.9)."""
+    """Torque noise on link 1, 2 or 3 relative to the noiseless run (table 2.9).
+
+    Args:
+        controller: Name of the motor controller.
+        design: Values by variable.
+        scenarios: Walks.
+        robot: That walks.
+        deviation: Standard deviation of the noise [N m].
+        seed: Of the noise.
+
+    Returns:
+        By scenario and link.
+    """
     deviations = []
     for scenario in scenarios:
         calm = _walk(scenario, controller, design, robot)

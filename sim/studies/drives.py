@@ -21,7 +21,12 @@ from sim.simulate import simulate
 class NamedDrive:
     """A controller with its design, and what it changes of a scenario's trajectory.
 
-    design: by variable, controller and gait alike; trajectory: fields of `Scenario`.
+    Attributes:
+        name: of the drive.
+        description: with its source.
+        controller: name of the motor controller.
+        design: by variable, controller and gait alike.
+        trajectory: fields of `Scenario`.
     """
 
     name: str
@@ -33,9 +38,16 @@ class NamedDrive:
 
 @dataclass(frozen=True, slots=True)
 class WalkFigures:
-    """One drive in one scenario. speed [m/s], power [W], effectivity [m/J]; None if it failed.
+    """One drive in one scenario; figures are None if it failed.
 
-    objectives: f1..f6 by name, None where there is none.
+    Attributes:
+        drive: its name.
+        scenario: its name.
+        status: how the walk ended.
+        speed: [m/s].
+        power: [W].
+        effectivity: [m/J].
+        objectives: f1 to f6 by name.
     """
 
     drive: str
@@ -82,7 +94,17 @@ DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
 
 
 def find_drive(name: str) -> NamedDrive:
-    """Raises SimulationInputError that names those that exist."""
+    """A drive that the thesis compares.
+
+    Args:
+        name: One of `DRIVES`.
+
+    Returns:
+        The drive.
+
+    Raises:
+        SimulationInputError: There is none of that name; names those that there are.
+    """
     if name not in DRIVES:
         raise SimulationInputError(f"drive: unknown {name!r}; known are {', '.join(DRIVES)}")
     return DRIVES[name]
@@ -94,7 +116,16 @@ def compare(
     *,
     robot: RobotChoice = "szabadka2",
 ) -> tuple[WalkFigures, ...]:
-    """Every drive in every scenario, scenario by scenario."""
+    """Every drive in every scenario.
+
+    Args:
+        drives: The drives.
+        scenarios: The walks.
+        robot: That walks.
+
+    Returns:
+        Scenario by scenario.
+    """
     return tuple(
         walk_figures(drive, scenario, robot=robot) for scenario in scenarios for drive in drives
     )
@@ -103,7 +134,16 @@ def compare(
 def walk_figures(
     drive: NamedDrive, scenario: Scenario, *, robot: RobotChoice = "szabadka2"
 ) -> WalkFigures:
-    """Let one drive walk. Power is energy per metre times speed."""
+    """Let one drive walk. Power is energy per metre times speed.
+
+    Args:
+        drive: The drive.
+        scenario: The walk.
+        robot: That walks.
+
+    Returns:
+        Its figures.
+    """
     gait = {k: v for k, v in drive.trajectory.items() if k not in drive.design}
     walked = Scenario.model_validate(scenario.model_dump() | gait)
     names = list(drive.design)
@@ -134,7 +174,19 @@ def walk_figures(
 def drive_of_design(
     name: str, controller: ControllerName, design: Mapping[str, float]
 ) -> NamedDrive:
-    """A drive from a design file or a job's best. Raises SimulationInputError."""
+    """A drive from a design file or a job's best.
+
+    Args:
+        name: For the drive.
+        controller: Name of the motor controller.
+        design: By variable, controller and gait alike.
+
+    Returns:
+        The drive.
+
+    Raises:
+        SimulationInputError: The controller cannot have these values.
+    """
     own = {k: v for k, v in design.items() if k not in GAIT_VARIABLE_NAMES}
     CONTROLLERS[controller].compile(own)
     return NamedDrive(name, f"{controller} as designed", controller, design)

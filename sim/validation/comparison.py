@@ -93,7 +93,17 @@ class Comparison(_Data):
     quantities: tuple[QuantityComparison, ...]
 
     def quantity(self, quantity: Quantity) -> QuantityComparison:
-        """One of them. Raises KeyError for one that was not measured."""
+        """The comparison of one quantity.
+
+        Args:
+            quantity: Of table 2.2.
+
+        Returns:
+            The comparison.
+
+        Raises:
+            KeyError: It was not measured.
+        """
         for known in self.quantities:
             if known.quantity is quantity:
                 return known
@@ -109,8 +119,17 @@ def compare(
 ) -> Comparison:
     """Synchronise two logs and judge all quantities that were measured.
 
-    cycle_time: of a walking cycle [s]; repeats: other measurements of the same walk.
-    Raises MeasuredLogError for logs that cannot be synchronised.
+    Args:
+        measured: Log of a walk.
+        simulated: Log of the same walk.
+        cycle_time: Of a walking cycle [s].
+        repeats: Other measurements of the same walk.
+
+    Returns:
+        All measures.
+
+    Raises:
+        MeasuredLogError: The logs cannot be synchronised.
     """
     pair = synchronise(measured, simulated, cycle_time)
     others = [synchronise(repeat, simulated, cycle_time).measured for repeat in repeats]
@@ -118,7 +137,15 @@ def compare(
 
 
 def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()) -> Comparison:
-    """Judge logs that have been synchronised; `repeats` have been trimmed to whole cycles too."""
+    """Judge logs that have been synchronised.
+
+    Args:
+        pair: The measured and the simulated log.
+        repeats: Other measurements, trimmed to whole cycles too.
+
+    Returns:
+        All measures.
+    """
     return Comparison(
         lag=pair.lag_seconds,
         correlation=pair.correlation,
@@ -136,13 +163,31 @@ def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()
 
 
 def columns_of(log: MeasuredLog, quantity: Quantity, channels: Sequence[str]) -> Floats:
-    """(T, channels) of a log, by name."""
+    """Some columns of a log.
+
+    Args:
+        log: The log.
+        quantity: That the columns hold.
+        channels: Their names.
+
+    Returns:
+        (T, channels).
+    """
     there = log.channels(quantity)
     return log.values(quantity)[:, [there.index(channel) for channel in channels]]
 
 
 def channels_of_link(log: MeasuredLog, quantity: Quantity, link: int) -> tuple[str, ...]:
-    """Joints of link 1, 2 or 3 at which a quantity was measured."""
+    """Joints at which a quantity of one link was measured.
+
+    Args:
+        log: The log.
+        quantity: By joint.
+        link: 1, 2 or 3: coxa, femur or tibia.
+
+    Returns:
+        Their names.
+    """
     return tuple(joint for joint in log.channels(quantity) if log.link_of(joint) == link)
 
 

@@ -23,35 +23,79 @@ Floats = NDArray[np.float64]
 
 
 def root_mean_square_error(measured: Floats, simulated: Floats) -> float:
-    """MSE, eq. 2.15: sqrt(mean (X - Y)^2), in the signal's unit."""
+    """MSE, eq. 2.15: sqrt(mean (X - Y)^2).
+
+    Args:
+        measured: X, (T,) or (T, C).
+        simulated: Y, of the same shape and unit.
+
+    Returns:
+        In the signal's unit.
+    """
     return math.sqrt(float(np.mean(_error(measured, simulated) ** 2)))
 
 
 def mean_absolute_error(measured: Floats, simulated: Floats) -> float:
-    """MAE, eq. 2.16: mean |X - Y|, in the signal's unit."""
+    """MAE, eq. 2.16: mean |X - Y|.
+
+    Args:
+        measured: X, (T,) or (T, C).
+        simulated: Y, of the same shape and unit.
+
+    Returns:
+        In the signal's unit.
+    """
     return mean_absolute(_error(measured, simulated))
 
 
 def relative_mean_absolute_error(measured: Floats, simulated: Floats) -> float:
-    """RMAE, eq. 2.17: MAE / mean |X| [1]. (The thesis prints RAM on its left side.)"""
+    """RMAE, eq. 2.17: MAE / mean |X|. (The thesis prints RAM on its left side.)
+
+    Args:
+        measured: X, (T,) or (T, C).
+        simulated: Y, of the same shape and unit.
+
+    Returns:
+        [1].
+    """
     return _relative(mean_absolute_error(measured, simulated), measured)
 
 
 def difference_of_absolute_means(measured: Floats, simulated: Floats) -> float:
-    """DAM, eq. 2.18: | mean |X| - mean |Y| |, in the signal's unit; blind to time."""
+    """DAM, eq. 2.18: | mean |X| - mean |Y| |; blind to time.
+
+    Args:
+        measured: X, (T,) or (T, C).
+        simulated: Y, of the same shape and unit.
+
+    Returns:
+        In the signal's unit.
+    """
     _error(measured, simulated)
     return abs(mean_absolute(measured) - mean_absolute(simulated))
 
 
 def relative_difference_of_absolute_means(measured: Floats, simulated: Floats) -> float:
-    """RAM, eq. 2.19: DAM / mean |X| [1]."""
+    """RAM, eq. 2.19: DAM / mean |X|.
+
+    Args:
+        measured: X, (T,) or (T, C).
+        simulated: Y, of the same shape and unit.
+
+    Returns:
+        [1].
+    """
     return _relative(difference_of_absolute_means(measured, simulated), measured)
 
 
 def confidence_interval(repeats: Sequence[Floats]) -> tuple[float, float]:
-    """CONF, eq. 2.20: least and largest mean |X| of M measurements, in the signal's unit.
+    """CONF, eq. 2.20: least and largest mean |X| of M measurements.
 
-    The measurements may differ in length.
+    Args:
+        repeats: Measurements of one signal, which may differ in length.
+
+    Returns:
+        In the signal's unit.
     """
     if not repeats:
         raise SimulationInputError("a confidence interval needs at least one measurement")
@@ -62,8 +106,14 @@ def confidence_interval(repeats: Sequence[Floats]) -> tuple[float, float]:
 def intensity(signal: Floats, timestep: float) -> float:
     """Eq. 2.22: sqrt(mean |X| std X (max X - min X) mean |dX/dt|), how lively a signal is.
 
-    In unit^2 / sqrt(s). dX/dt is the difference of neighbouring rows over `timestep` [s]; of
-    several signals (T, C) it is the mean over the C.
+    dX/dt is the difference of neighbouring rows over the timestep.
+
+    Args:
+        signal: X, (T,) or (T, C).
+        timestep: Between rows [s].
+
+    Returns:
+        In unit^2 / sqrt(s); of several signals the mean over the C.
     """
     columns = _samples(signal).reshape(len(signal), -1)
     if len(columns) < 2:
@@ -75,16 +125,29 @@ def intensity(signal: Floats, timestep: float) -> float:
 
 
 def mean_absolute(signal: Floats) -> float:
-    """Mean |X| over all samples, in the signal's unit."""
+    """Mean |X| over all samples.
+
+    Args:
+        signal: X, (T,) or (T, C).
+
+    Returns:
+        In the signal's unit.
+    """
     return float(np.mean(np.abs(_samples(signal))))
 
 
 def amplitude_spectrum(signal: Floats, timestep: float) -> tuple[Floats, Floats]:
-    """Frequencies (F,) [Hz] and one-sided amplitudes (F,) or (F, C), in the signal's unit.
+    """One-sided amplitudes.
 
     A sine of amplitude A that fits the T rows a whole number of times shows as A in its own bin
     and nowhere else, hence signals must span whole walking cycles; bin 0 is the absolute mean.
-    F = T // 2 + 1.
+
+    Args:
+        signal: (T,) or (T, C).
+        timestep: Between rows [s].
+
+    Returns:
+        Frequencies (F,) [Hz] and amplitudes (F,) or (F, C), in the signal's unit; F = T // 2 + 1.
     """
     rows = len(_samples(signal))
     amplitude = np.abs(np.fft.rfft(signal, axis=0)) * (2.0 / rows)
@@ -95,10 +158,18 @@ def amplitude_spectrum(signal: Floats, timestep: float) -> tuple[Floats, Floats]
 
 
 def spectral_error(measured: Floats, simulated: Floats, timestep: float) -> float:
-    """|| A - B || / || A || of the amplitude spectra A, B [1]: blind to phase, 0 for a pure delay.
+    """|| A - B || / || A || of the amplitude spectra A, B: blind to phase, 0 for a pure delay.
 
     Norms run over frequencies and signals, so that strong oscillations weigh more than the many
     bins of noise. The mean value (bin 0) is left out: it is no oscillation, and MAE tells it.
+
+    Args:
+        measured: (T,) or (T, C), whose spectrum is A.
+        simulated: Of the same shape and unit, whose spectrum is B.
+        timestep: Between rows [s].
+
+    Returns:
+        [1].
     """
     _error(measured, simulated)
     of_measured, of_simulated = (
@@ -154,10 +225,16 @@ class Tolerance(StrEnum):
 
     @classmethod
     def of(cls, rmae: float) -> Tolerance:
-        """Class of a relative mean absolute error [1]; NaN is as bad as can be.
+        """Class of a relative mean absolute error.
 
         >>> [Tolerance.of(x).value for x in (0.02, 0.021, 0.31)]
         ['green', 'yellow', 'red']
+
+        Args:
+            rmae: [1]; NaN is as bad as can be.
+
+        Returns:
+            The class.
         """
         return next((known for known in cls if rmae <= known.limit), cls.PURPLE)
 

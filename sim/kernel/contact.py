@@ -12,7 +12,8 @@ from typing import Final
 
 import casadi as ca
 
-from sim.kernel.articulated_body import Force, LinkState
+from sim.kernel.articulated_body import LinkState
+from sim.kernel.inertia import Force
 from sim.kernel.spatial import Scalar, Vector, add, cross, dot, scale
 from sim.robot.description import ContactLaw
 

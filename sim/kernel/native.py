@@ -30,6 +30,7 @@ _GENERATOR: Final = (
     "contact.py",
     "driver.c",
     "emit_c.py",
+    "inertia.py",
     "integration.py",
     "motor.py",
     "native.py",

@@ -12,16 +12,15 @@ import pinocchio as pin
 
 from sim.kernel.articulated_body import (
     Acceleration,
-    Inertia,
     Link,
     LinkState,
-    Motion,
     articulated_body,
     kinematics,
     links_of,
 )
 from sim.kernel.backlash import shaft_torque
 from sim.kernel.contact import FRICTION, Foot, InternalState, foot_on_ground
+from sim.kernel.inertia import Inertia, Motion
 from sim.kernel.integration import integrated
 from sim.kernel.motor import Electrical, electrical
 from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size

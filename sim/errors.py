@@ -5,7 +5,7 @@ SimulationError
 │   ├── UnreachablePose     a foot target outside the leg's reach; names scenario, leg, miss in mm
 │   ├── MeasuredLogError    a log that cannot be read; names line, column and unit
 │   └── RobotFileError      a robot description that cannot be used; names file and field
-└── KernelBuildError        the compiler was found but did not compile the kernel
+└── KernelBuildError        a kernel cannot be compiled, stored or loaded on this machine
 
 What a walk may legitimately end in (divergence, a fall) is a `sim.outcome.Status`, never one of
 these.
@@ -67,4 +67,4 @@ class RobotFileError(SimulationInputError):
 
 
 class KernelBuildError(SimulationError):
-    """The compiler was found, but did not compile the kernel."""
+    """Compiled code cannot be had here: the compiler, the cache or the system refused it."""

@@ -1,7 +1,7 @@
 """C source -> shared library, compiled once and kept in the user's cache directory.
 
-A library is named by a hash of all that went into it, so a stale one is never loaded, and put in
-place by an atomic rename, so concurrent processes never see half of one.
+A library is named by a hash of all that went into it, so a stale one is never loaded; see
+`sim.compiler.cache` on damaged ones.
 """
 
 from __future__ import annotations
@@ -12,19 +12,27 @@ import hashlib
 import importlib.util
 import os
 import platform
+import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Final
 
+from sim.compiler import cache
 from sim.errors import KernelBuildError
+
+TIME_LIMIT: Final = 300.0
+"""Seconds that a compiler may take; a kernel takes one some five."""
+
+_PROBE_LIMIT: Final = 30.0
+"""Seconds that a compiler may take to say its version."""
 
 # No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on
 # compiler or machine.
@@ -47,18 +55,19 @@ class Compiler:
     version: str
 
     def flags(self, level: str) -> tuple[str, ...]:
-        """Flags for a micro-architecture level, which zig spells in its own way."""
+        """Flags for a micro-architecture level, which zig spells in its own way.
+
+        Args:
+            level: Level of the x86-64 ABI as GCC names it, or empty for the machine's plain one.
+
+        Returns:
+            What goes between the command and the source.
+        """
         if not level:
             return _FLAGS
         if "ziglang" in self.command:
             return (*_FLAGS, "-mcpu=" + level.replace("-", "_"))
         return (*_FLAGS, f"-march={level}")
-
-
-def cache_directory() -> Path:
-    """Where compiled kernels are kept: $XDG_CACHE_HOME or ~/.cache, in `gaitswarm`."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "gaitswarm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +92,11 @@ _PLAIN: Final = Target(2, "")
 
 @lru_cache(maxsize=1)
 def target() -> Target:
-    """The widest target that this machine runs."""
+    """The widest target that this machine runs.
+
+    Returns:
+        One of three: 8 lanes (AVX-512), 4 lanes (AVX2), or 2 lanes of plain code.
+    """
     if platform.machine().lower() in ("x86_64", "amd64"):
         try:
             flags = set(Path("/proc/cpuinfo").read_text(encoding="utf-8").split())
@@ -96,13 +109,22 @@ def target() -> Target:
 
 
 def vector_header() -> str:
-    """C text that defines `vec` of LANES doubles and its operations."""
+    """The vector type that kernels are written in.
+
+    Returns:
+        C text that defines `vec` of LANES doubles and its operations.
+    """
     return (resources.files("sim.compiler") / "vec.h").read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)
 def find_compiler() -> Compiler | None:
-    """$CC, cc, gcc, clang, or the `ziglang` wheel's; None if this machine has none."""
+    """Look for a C compiler, once a process.
+
+    Returns:
+        $CC, cc, gcc, clang, or the `ziglang` wheel's, the first that says its version; None if
+        this machine has none.
+    """
     candidates = [shlex.split(os.environ.get("CC", "")), ["cc"], ["gcc"], ["clang"]]
     for command in candidates:
         if command and shutil.which(command[0]):
@@ -117,88 +139,155 @@ def find_compiler() -> Compiler | None:
     return None
 
 
-def load_library(name: str, identity: bytes, source: Callable[[], str]) -> ctypes.CDLL | None:
-    """The library `name`, from the cache or compiled now; None without compiler and cached copy.
+def load_library(
+    name: str,
+    identity: bytes,
+    source: Callable[[], str],
+    *,
+    wanted: Target | None = None,
+    extra_flags: Sequence[str] = (),
+    time_limit: float = TIME_LIMIT,
+) -> ctypes.CDLL | None:
+    """Load a library from the cache, or compile it now.
 
-    identity: all that the source depends on; source is called only if it must be compiled.
-    Raises KernelBuildError with the compiler's message if it refuses the source.
+    Args:
+        name: What people see of it in the cache; any text.
+        identity: All that the source depends on.
+        source: Gives the C text; called only if it must be compiled.
+        wanted: What it is compiled for; this machine's `target` if left out.
+        extra_flags: For the compiler, after its usual ones.
+        time_limit: Seconds that the compiler may take.
+
+    Returns:
+        The library; None on a machine without a compiler whose cache has none.
+
+    Raises:
+        KernelBuildError: As for `build_library`, or the library cannot be loaded.
     """
-    digest = hashlib.sha256(repr((_FLAGS, target(), platform.machine())).encode())
+    library = build_library(
+        name, identity, source, wanted=wanted, extra_flags=extra_flags, time_limit=time_limit
+    )
+    if library is None:
+        return None
+    try:
+        return ctypes.CDLL(str(library))
+    except OSError as error:
+        raise KernelBuildError(
+            f"{library} cannot be loaded: {error}; set XDG_CACHE_HOME to a directory whose files"
+            " may be executed"
+        ) from error
+
+
+def build_library(
+    name: str,
+    identity: bytes,
+    source: Callable[[], str],
+    *,
+    wanted: Target | None = None,
+    extra_flags: Sequence[str] = (),
+    time_limit: float = TIME_LIMIT,
+) -> Path | None:
+    """Find a library in the cache, or compile it now; without loading it.
+
+    Args:
+        name: As for `load_library`, and so all the others.
+        identity: All that the source depends on.
+        source: Gives the C text.
+        wanted: What it is compiled for.
+        extra_flags: For the compiler.
+        time_limit: Seconds that the compiler may take.
+
+    Returns:
+        Where it is; None on a machine without a compiler whose cache has none.
+
+    Raises:
+        KernelBuildError: The compiler refuses the source or takes too long, the library cannot be
+            stored, or it is damaged and there is no compiler to build it again.
+    """
+    aim = wanted or target()
+    digest = hashlib.sha256(repr((_FLAGS, *extra_flags, aim, platform.machine())).encode())
     digest.update(identity)
-    stem = f"{name}-{digest.hexdigest()[:24]}"
+    stem = f"{_safe(name)}-{digest.hexdigest()[:24]}"
     compiler = find_compiler()
     if compiler is None:
-        # An image may ship compiled kernels without the compiler that made them.
-        shipped = sorted(cache_directory().glob(f"{stem}-*.so"))
-        return ctypes.CDLL(str(shipped[0])) if shipped else None
+        return _shipped(stem)
     made_by = hashlib.sha256(compiler.version.encode()).hexdigest()[:8]
     file = f"{stem}-{made_by}.so"
-    # The usual directory may be read-only and still hold what an image shipped in it.
-    for folder in (cache_directory(), _private_cache()):
-        if (folder / file).exists():
-            return ctypes.CDLL(str(folder / file))
-    folder = _writable_cache()
-    with _lock(folder / f"{stem}.lock"):
-        if not (folder / file).exists():
-            _compile(compiler, source(), folder / file)
-    return ctypes.CDLL(str(folder / file))
+    library, _ = cache.find(file)
+    if library is None:
+        flags = (*compiler.flags(aim.level), *extra_flags)
+
+        def make(built: Path) -> None:
+            code = built.with_name("kernel.c")
+            code.write_text(f"#define LANES {aim.lanes}\n{source()}", encoding="utf-8")
+            arguments = [*flags, str(code), "-o", str(built)]
+            _compile(compiler, arguments, built.parent, f"compile {stem}", time_limit)
+
+        library = cache.build(stem, file, make)
+    return library
 
 
-def _compile(compiler: Compiler, source: str, library: Path) -> None:
-    with tempfile.TemporaryDirectory(prefix="gaitswarm-build-") as folder:
-        code = Path(folder) / "kernel.c"
-        code.write_text(f"#define LANES {target().lanes}\n{source}", encoding="utf-8")
-        built = library.with_name(f"{library.name}.{os.getpid()}.tmp")
-        flags = compiler.flags(target().level)
-        command = [*compiler.command, *flags, str(code), "-o", str(built)]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            if done.returncode != 0:
-                raise KernelBuildError(
-                    f"{shlex.join(compiler.command)} did not compile {library.stem}:\n"
-                    + done.stderr[-2000:]
-                )
-            built.replace(library)
-        finally:
-            built.unlink(missing_ok=True)
+def _shipped(stem: str) -> Path | None:
+    """An image may ship compiled kernels without the compiler that made them."""
+    library, damaged = cache.find(f"{stem}-*.so")
+    if library is None and damaged:
+        raise KernelBuildError(
+            f"{damaged[0]} is damaged: it does not match the checksum beside it, and there is no C"
+            " compiler to build it again; install gcc or clang, or `pip install"
+            " gaitswarm[compiler]`, or bring back both files from where they came"
+        )
+    return library
 
 
-def _writable_cache() -> Path:
-    """The cache directory, or where that cannot be written a private one in the temporary files."""
-    for folder in (cache_directory(), _private_cache()):
-        try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-        except OSError:
-            continue
-    raise KernelBuildError(
-        f"neither {cache_directory()} nor {_private_cache()} can be written; set XDG_CACHE_HOME to"
-        " a directory for compiled kernels"
-    )
+def _safe(name: str) -> str:
+    """A part of a file name, whatever a robot is called."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:80]
 
 
-def _private_cache() -> Path:
-    """This user's own directory among the temporary files; never one that others may write to."""
-    folder = Path(tempfile.gettempdir()) / f"gaitswarm-{os.getuid()}"
-    if folder.exists() and (folder.stat().st_uid != os.getuid() or folder.stat().st_mode & 0o022):
-        raise KernelBuildError(f"{folder} belongs to someone else; set XDG_CACHE_HOME")
-    return folder
-
-
-@contextlib.contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """Let one process compile while the others wait; a dead process's lock is released."""
+def _compile(
+    compiler: Compiler, arguments: Sequence[str], scratch: Path, purpose: str, time_limit: float
+) -> None:
+    command = shlex.join(compiler.command)
+    # What the compiler keeps for itself goes with the directory, even if it is killed.
+    environment = {**os.environ, "TMPDIR": str(scratch)}
     try:
-        import fcntl  # noqa: PLC0415  not on every system
-    except ImportError:  # no advisory locks here: the rename alone keeps it safe
-        yield
-        return
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+        done = _run([*compiler.command, *arguments], time_limit, environment)
+    except subprocess.TimeoutExpired as error:
+        raise KernelBuildError(
+            f"{command} did not {purpose} within {time_limit:g} s, and was ended"
+        ) from error
+    except OSError as error:
+        raise KernelBuildError(f"{command} cannot be run: {error}") from error
+    if done.returncode != 0:
+        raise KernelBuildError(f"{command} did not {purpose}:\n{done.stderr[-2000:]}")
+
+
+def _run(
+    command: Sequence[str], time_limit: float, environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """`subprocess.run`, but when time is up, all that the command started ends with it."""
+    with subprocess.Popen(
+        command,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
+        try:
+            out, err = process.communicate(timeout=time_limit)
+        except BaseException:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
 
 
 def _version(command: list[str]) -> str:
-    done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
+    try:
+        done = _run([*command, "--version"], _PROBE_LIMIT)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
     return done.stdout.partition("\n")[0] if done.returncode == 0 else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -13,22 +14,13 @@ import pytest
 from sim.compiler.compilation import load_library, vector_header
 from sim.errors import KernelBuildError
 from sim.kernel.native import native_kernel
-from sim.robot import load_robot
+from sim.robot import RobotFiles, load_robot
+from sim.simulate import prepare
+from tests.sim.processes import ROOT, run_python
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
-
-
-def run_python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-W", "default", "-c", code],
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+QUADRUPED = ROOT / "examples" / "quadruped"
 
 
 def test_a_library_is_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,19 +103,40 @@ def test_sine_and_cosine_are_accurate_to_the_last_bits(tmp_path: Path) -> None:
     assert np.abs(cosine - np.cos(x)).max() < 2.5e-16
 
 
-def test_where_the_cache_cannot_be_written_a_private_one_serves(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "image"))
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    source = "int f(void) { return 1; }"
-    assert load_library("shipped", b"", lambda: source) is not None
-    # Root may write anywhere, so a file in the directory's place stands for a read-only one.
-    shipped = tmp_path / "image" / "gaitswarm"
-    shipped.rename(tmp_path / "kept")
-    shipped.write_text("not a directory")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "image"))
-    assert load_library("shipped", b"", lambda: source) is not None
-    private = tmp_path / f"gaitswarm-{os.getuid()}"
-    assert len(list(private.glob("shipped-*.so"))) == 1
-    assert private.stat().st_mode & 0o077 == 0
+def _compiler_that(folder: Path, does: str) -> str:
+    """A C compiler of this name and version that does so when it is to compile."""
+    script = folder / "cc"
+    script.write_text(
+        "#!/bin/sh\n"
+        'case "$*" in *--version*) echo "scripted compiler 1.0"; exit 0;; esac\n'
+        f"{does}\n"
+    )
+    script.chmod(0o755)
+    return str(script)
+
+
+def test_a_compiler_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
+    alive = tmp_path / "alive"
+    os.mkfifo(alive)
+    slow = _compiler_that(tmp_path, f'sleep 1000 > "{alive}" & wait')
+    cache = tmp_path / "cache"
+    code = (
+        "from sim.compiler.compilation import load_library\n"
+        "load_library('slow', b'', lambda: 'int f(void) { return 7; }', time_limit=3.0)"
+    )
+    with ThreadPoolExecutor(1) as pool:
+        running = pool.submit(run_python, code, CC=slow, XDG_CACHE_HOME=str(cache))
+        # Opens when the compiler's child does, and ends when nobody holds it open any more.
+        assert alive.read_bytes() == b""
+        done = running.result()
+    assert "KernelBuildError" in done.stderr
+    assert "did not compile slow" in done.stderr
+    assert "within 3 s" in done.stderr
+    assert list((cache / "gaitswarm").iterdir()) == []
+
+
+def test_a_robot_may_have_any_name() -> None:
+    toml, urdf = ((QUADRUPED / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
+    named = RobotFiles(toml=toml.replace('name = "quadruped"', 'name = "a/b"', 1), urdf=urdf)
+    assert load_robot(named).description.name == "a/b"
+    assert prepare(named) == "native"

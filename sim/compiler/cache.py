@@ -1,0 +1,254 @@
+"""Compiled libraries on disk: found only if intact, put in place whole, swept when of no use.
+
+Beside every library lies its SHA-256 in the format of `sha256sum`. A file that was truncated or
+changed does not match it and counts as none, so it is built again rather than loaded: to load it
+could kill the process, or give wrong numbers without a word.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+from sim.errors import KernelBuildError
+
+KEPT_UNUSED_DAYS: Final = 90
+"""A library that was not loaded for so long is removed when another one is built."""
+
+_DAY: Final = 86400.0
+_OWN_FILE: Final = re.compile(r"(?P<stem>.+-[0-9a-f]{24})(-.+\.(so|sha256|tmp)|\.lock)")
+
+
+def find(pattern: str) -> tuple[Path | None, tuple[Path, ...]]:
+    """Look for a library in the usual directory, then in this user's private one.
+
+    Args:
+        pattern: File name, or a glob of file names.
+
+    Returns:
+        The first library that is intact, or None; and the damaged ones that were met on the way.
+    """
+    damaged: list[Path] = []
+    for directory in _directories():
+        try:
+            candidates = sorted(directory.glob(pattern))
+        except OSError:  # not a directory, or not to be read
+            continue
+        for library in candidates:
+            if is_intact(library):
+                _mark_used(library)
+                return library, tuple(damaged)
+            damaged.append(library)
+    return None, tuple(damaged)
+
+
+def is_intact(library: Path) -> bool:
+    """Whether the file can be read and matches the checksum beside it."""
+    try:
+        recorded = _checksum_of(library).read_text(encoding="ascii", errors="replace").split()
+        return recorded[:1] == [hashlib.sha256(library.read_bytes()).hexdigest()]
+    except OSError:
+        return False
+
+
+def build(stem: str, file: str, make: Callable[[Path], None]) -> Path:
+    """Put a library into the cache, unless another process has done so meanwhile.
+
+    Processes that want the same library wait for the one that builds it. Whatever happens, and
+    even if the power fails, a file under the library's name is whole or does not match its
+    checksum.
+
+    Args:
+        stem: Begins the names of all files of this library, whatever compiler makes it.
+        file: The library's name; begins with `stem`.
+        make: Writes the library to the path that it is given, in a directory of its own.
+
+    Returns:
+        Where the library is: in the usual directory, or where that cannot be written in the
+        private one.
+
+    Raises:
+        KernelBuildError: Neither directory can be written, or the disk is full; and what `make`
+            raises.
+    """
+    directory = _writable_directory()
+    library = directory / file
+    try:
+        with _locked(directory / f"{stem}.lock"):
+            if not is_intact(library):
+                with tempfile.TemporaryDirectory(
+                    prefix=f"{stem}-", suffix=".tmp", dir=directory, ignore_cleanup_errors=True
+                ) as scratch:
+                    built = Path(scratch) / "library.so"
+                    make(built)
+                    _put(built, library)
+    except OSError as error:
+        raise KernelBuildError(
+            f"{library} cannot be stored: {error}; set XDG_CACHE_HOME to a directory for compiled"
+            " kernels"
+        ) from error
+    _sweep(directory)
+    return library
+
+
+def _put(built: Path, library: Path) -> None:
+    checksum = built.with_name("checksum")
+    digest = hashlib.sha256(built.read_bytes()).hexdigest()
+    checksum.write_text(f"{digest}  {library.name}\n", encoding="ascii")
+    for written in (built, checksum):
+        _flush(written)
+    # A crash between the two leaves a pair that does not match, which counts as none.
+    checksum.replace(_checksum_of(library))
+    built.replace(library)
+    with contextlib.suppress(OSError):  # not every file system can flush a directory
+        _flush(library.parent)
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _checksum_of(library: Path) -> Path:
+    return library.with_name(f"{library.name}.sha256")
+
+
+def _mark_used(library: Path) -> None:
+    """So that `_sweep` keeps it; a time of modification is kept by every file system."""
+    with contextlib.suppress(OSError):  # shipped in an image, perhaps, where nothing is swept
+        if library.stat().st_mtime < time.time() - _DAY:
+            os.utime(library)
+
+
+def _directories() -> Iterator[Path]:
+    """Where libraries may be. Lazy: the private directory is judged only if it is needed."""
+    usual = _usual_directory()
+    if usual is not None:
+        yield usual
+    private = _private_directory()
+    if _is_private(private):
+        yield private
+
+
+def _usual_directory() -> Path | None:
+    """`gaitswarm` in $XDG_CACHE_HOME or ~/.cache; None for a user without a home."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    if base:
+        return Path(base) / "gaitswarm"
+    try:
+        return Path.home() / ".cache" / "gaitswarm"
+    except RuntimeError:
+        return None
+
+
+def _private_directory() -> Path:
+    """This user's own among the temporary files."""
+    return Path(tempfile.gettempdir()) / f"gaitswarm-{os.getuid()}"
+
+
+def _is_private(directory: Path) -> bool:
+    """Whether nobody else can have put anything in it: what is loaded from it is run."""
+    try:
+        found = directory.lstat()
+    except OSError:  # nothing there yet
+        return True
+    mine = found.st_uid == os.getuid() and not found.st_mode & 0o022
+    return mine and stat.S_ISDIR(found.st_mode)
+
+
+def _writable_directory() -> Path:
+    for directory in _directories():
+        try:
+            directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=directory):
+                return directory
+        except OSError:
+            continue
+    private = _private_directory()
+    reason = "can be written" if _is_private(private) else "is a directory of this user's alone"
+    raise KernelBuildError(
+        f"neither {_usual_directory()} can be written nor {private} {reason}; set XDG_CACHE_HOME to"
+        " a directory for compiled kernels"
+    )
+
+
+@contextlib.contextmanager
+def _locked(path: Path, *, wait: bool = True) -> Iterator[bool]:
+    """Hold a lock that dies with its process; yields whether it is held. Leaves no file behind."""
+    while True:
+        with path.open("w") as file:
+            held = _lock(file.fileno(), wait=wait)
+            # Whoever held it before has removed it, and another may have made it anew.
+            if held and not _is_at(file.fileno(), path):
+                continue
+            try:
+                yield held
+            finally:
+                if held:
+                    path.unlink(missing_ok=True)
+            return
+
+
+def _lock(descriptor: int, *, wait: bool) -> bool:
+    """False if another holds it, or where there are no locks; the rename alone is safe, too."""
+    try:
+        import fcntl  # noqa: PLC0415  not on every system
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _sweep(directory: Path) -> None:
+    """Remove what dead processes left behind, and libraries that nobody has used for long.
+
+    Whoever builds a library holds its lock, so what lies beside a lock that is free is of no use.
+    """
+    oldest = time.time() - KEPT_UNUSED_DAYS * _DAY
+    with contextlib.suppress(OSError):
+        for path in sorted(directory.iterdir()):
+            own = _OWN_FILE.fullmatch(path.name)
+            if own and _is_leftover(path, oldest):
+                with (
+                    contextlib.suppress(OSError),
+                    _locked(directory / f"{own['stem']}.lock", wait=False) as held,
+                ):
+                    if held:
+                        _remove(path)
+
+
+def _is_leftover(path: Path, oldest: float) -> bool:
+    if path.suffix == ".so":
+        return path.stat().st_mtime < oldest
+    if path.suffix == ".sha256":
+        return not path.with_suffix("").exists()
+    return True
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+        return
+    path.unlink(missing_ok=True)
+    if path.suffix == ".so":
+        _checksum_of(path).unlink(missing_ok=True)

@@ -14,10 +14,27 @@ from sim.compiler.compilation import load_library, vector_header
 from sim.controllers.mamdani import Mamdani, output_points
 
 
-def infer(system: Mamdani, grid: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Same arguments and same bits as `Mamdani.infer`, for systems of two inputs or more."""
+def infer(
+    system: Mamdani,
+    grid: Mapping[str, NDArray[np.float64]],
+    *,
+    library: ctypes.CDLL | None = None,
+) -> NDArray[np.float64]:
+    """Infer a table, with the bits of `Mamdani.infer`, which serves where nothing is compiled.
+
+    Args:
+        system: An inference system of two inputs or more.
+        grid: By input, in the order of the system's, the values (n_i,), inside the range.
+        library: `inference_source` compiled; the usual one if left out.
+
+    Returns:
+        Crisp output in [-1, 1] over the product of the inputs' values, (n_1, n_2, ...).
+
+    Raises:
+        KernelBuildError: The library cannot be compiled, stored or loaded.
+    """
     *firsts, inner = system.degrees(grid)
-    library = _library()
+    library = library or _library()
     if (
         library is None
         or inner.shape[1] % library.gaitswarm_block()
@@ -53,8 +70,17 @@ def _both_hold(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.flo
     return np.minimum(a[:, :, np.newaxis], b[:, np.newaxis, :]).reshape(len(a), -1)
 
 
+def inference_source() -> str:
+    """The compiled inference's source.
+
+    Returns:
+        C text that lacks the definition of LANES only.
+    """
+    code = (resources.files("sim.controllers") / "inference.c").read_text(encoding="utf-8")
+    return vector_header() + code
+
+
 @lru_cache(maxsize=1)
 def _library() -> ctypes.CDLL | None:
-    code = (resources.files("sim.controllers") / "inference.c").read_text(encoding="utf-8")
-    source = vector_header() + code
+    source = inference_source()
     return load_library("inference", source.encode(), lambda: source)

@@ -4,41 +4,23 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
-import hashlib
 import threading
-from collections.abc import Callable, Sequence
-from functools import lru_cache
-from importlib import metadata, resources
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiler.compilation import load_library, vector_header
+from sim.compiler.compilation import Target, load_library
 from sim.controllers.base import LookupTable, Response
 from sim.errors import SimulationInputError
-from sim.kernel.parameters import Layout, internal_state_size
+from sim.kernel.parameters import Layout
+from sim.kernel.source import kernel_identity, kernel_source
 from sim.kernel.walk import Coding, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
 
 Floats = NDArray[np.float64]
-
-_GENERATOR: Final = (
-    "articulated_body.py",
-    "backlash.py",
-    "contact.py",
-    "driver.c",
-    "emit_c.py",
-    "inertia.py",
-    "integration.py",
-    "motor.py",
-    "native.py",
-    "parameters.py",
-    "physics_step.py",
-    "spatial.py",
-)
-"""Files of this package that determine the source."""
 
 _pointer = ctypes.POINTER
 
@@ -120,7 +102,12 @@ class _Addresses:
 
 
 class NativeKernel:
-    """See `walk.Kernel`. The lock-step loop runs outside the interpreter's lock."""
+    """A robot's physics and control, compiled. Its loop runs outside the interpreter's lock.
+
+    Args:
+        robot: The robot that the library was compiled for.
+        library: What `load_library` gave.
+    """
 
     backend: Final = "native"
 
@@ -143,7 +130,20 @@ class NativeKernel:
     def walk(
         self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
     ) -> tuple[WalkResult, ...]:
-        """See `walk.Kernel.walk`."""
+        """All walks, in order, `lanes` at a time.
+
+        Args:
+            setups: Walks of this kernel's robot.
+            coding: Sensors, PWM and rates of all of them.
+            log: Whether to keep the states at every control tick.
+
+        Returns:
+            As many results, each with the same bits alone and in any company.
+
+        Raises:
+            SimulationInputError: An array of a setup has not the shape that this kernel reads, or
+                a control law asks for an inference rather than a table.
+        """
         for setup in setups:
             setup.check(
                 joints=self._joints,
@@ -184,66 +184,55 @@ class NativeKernel:
 
 
 _loaded: Final[dict[bytes, NativeKernel | None]] = {}
-_loading: Final = threading.Lock()
+_loading: Final[dict[bytes, threading.Lock]] = {}
+_registering: Final = threading.Lock()
 
 
 def native_kernel(robot: Robot) -> NativeKernel | None:
-    """The robot's kernel, compiled at first use; None on a machine without a C compiler.
+    """The robot's kernel, compiled at first use and loaded once a process.
 
-    Robots that differ in run-time parameters only share one.
+    Robots that differ in run-time parameters only share one. While one kernel is compiled, others
+    can be loaded.
+
+    Args:
+        robot: Its URDF, actuators, legs and law of friction choose the kernel.
+
+    Returns:
+        The kernel; None on a machine without a C compiler whose cache has none.
+
+    Raises:
+        KernelBuildError: It cannot be compiled, stored or loaded.
     """
-    identity = _identity(robot)
-    with _loading:
+    identity = kernel_identity(robot)
+    with _registering:
+        loading = _loading.setdefault(identity, threading.Lock())
+    with loading:
         if identity not in _loaded:
-            name = f"kernel-{robot.description.name}"
-            library = load_library(name, identity, _source_of(robot))
-            _loaded[identity] = None if library is None else NativeKernel(robot, library)
+            _loaded[identity] = load_kernel(robot)
         return _loaded[identity]
 
 
-@lru_cache(maxsize=1)
-def _generator() -> bytes:
-    """What the source of every robot's kernel depends on."""
-    digest = hashlib.sha256(vector_header().encode())
-    folder = resources.files("sim.kernel")
-    for name in _GENERATOR:
-        digest.update((folder / name).read_bytes())
-    digest.update(f"{metadata.version('casadi')} {metadata.version('pin')}".encode())
-    return digest.digest()
+def load_kernel(
+    robot: Robot, *, wanted: Target | None = None, extra_flags: Sequence[str] = ()
+) -> NativeKernel | None:
+    """A kernel that `native_kernel` does not keep, to compare ways of compiling.
 
+    Args:
+        robot: As for `native_kernel`.
+        wanted: What it is compiled for; this machine's target if left out.
+        extra_flags: For the compiler, after its usual ones.
 
-def _identity(robot: Robot) -> bytes:
-    """All that the source depends on; run-time parameters are left out, so they share a kernel."""
-    digest = hashlib.sha256(_generator())
-    digest.update(robot.urdf.text.encode())
-    actuators = robot.actuators()
-    for array in (actuators.torque, actuators.resistance, actuators.armature):
-        digest.update(array.tobytes())
-    if robot.has_backlash:
-        digest.update(actuators.shaft_stiffness.tobytes() + actuators.shaft_damping.tobytes())
-    legs = [(*leg.joints, leg.foot) for leg in robot.description.legs]
-    digest.update(repr((legs, robot.description.contact_law, robot.has_backlash)).encode())
-    return digest.digest()
+    Returns:
+        As `native_kernel`.
 
-
-def _source_of(robot: Robot) -> Callable[[], str]:
-    def source() -> str:
-        # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
-        from sim.kernel.emit_c import emit_c  # noqa: PLC0415
-        from sim.kernel.physics_step import physics_model  # noqa: PLC0415
-
-        model = physics_model(robot)
-        folder = resources.files("sim.kernel")
-        return "\n".join(
-            [
-                f"#define NJ {robot.n_joints}",
-                f"#define NP {model.layout.size}",
-                f"#define NI {internal_state_size(robot)}",
-                f"#define ENCODER(q, internal) ({'internal' if robot.has_backlash else '(q) + 7'})",
-                vector_header(),
-                emit_c(model.step, "step"),
-                (folder / "driver.c").read_text(encoding="utf-8"),
-            ]
-        )
-
-    return source
+    Raises:
+        KernelBuildError: It cannot be compiled, stored or loaded.
+    """
+    library = load_library(
+        f"kernel-{robot.description.name}",
+        kernel_identity(robot),
+        lambda: kernel_source(robot),
+        wanted=wanted,
+        extra_flags=extra_flags,
+    )
+    return None if library is None else NativeKernel(robot, library)

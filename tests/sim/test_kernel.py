@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from sim.assembly import PHYSICS_RATE, plan_walk
-from sim.compiler import compilation
 from sim.compiler.compilation import Target, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import LookupTable
-from sim.kernel.native import NativeKernel, _identity, _source_of, native_kernel
+from sim.kernel.native import NativeKernel, load_kernel, native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import ReferenceKernel, reference_kernel
 from sim.kernel.walk import Coding, Kernel, WalkSetup
@@ -259,17 +258,13 @@ def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("narrower", [Target(4, "x86-64-v3"), Target(2, "")], ids=str)
-def test_a_walk_has_the_same_bits_at_every_vector_width(
-    narrower: Target, robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_walk_has_the_same_bits_at_every_vector_width(narrower: Target, robot: Robot) -> None:
     if target().lanes < narrower.lanes:
         narrower = target()
     wide = native_kernel(robot)
     assert wide is not None
-    monkeypatch.setattr(compilation, "target", lambda: narrower)
-    library = compilation.load_library("kernel-szabadka2", _identity(robot), _source_of(robot))
-    assert library is not None
-    narrow = NativeKernel(robot, library)
+    narrow = load_kernel(robot, wanted=narrower)
+    assert narrow is not None
     assert narrow.lanes == narrower.lanes
     setups = [_setup(robot, wide, s.model_copy(update={"cycles": 1.0})) for s in SCENARIOS]
     ours, theirs = (k.walk(setups, Coding.of(robot, 10), log=True) for k in (wide, narrow))

@@ -135,6 +135,57 @@ def test_a_compiler_that_takes_too_long_is_ended_with_all_that_it_started(tmp_pa
     assert list((cache / "gaitswarm").iterdir()) == []
 
 
+LOAD_QUADRUPED = """
+import os
+from pathlib import Path
+from sim.kernel.native import native_kernel
+from sim.robot import RobotFiles, load_robot
+files = Path(os.environ["FILES"])
+toml, urdf = ((files / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
+print(native_kernel(load_robot(RobotFiles(toml=toml, urdf=urdf))).backend)
+"""
+COMPILE_ANOTHER = """
+import os, threading
+from pathlib import Path
+from sim.errors import KernelBuildError
+from sim.kernel.native import native_kernel
+from sim.robot import load_robot
+def compile_another():
+    try:
+        native_kernel(load_robot("szabadka2"))
+    except KernelBuildError:
+        print("and the other one was refused")
+thread = threading.Thread(target=compile_another)
+thread.start()
+Path(os.environ["STARTED"]).read_text()
+"""
+GO_ON = """
+Path(os.environ["GATE"]).write_text("go on\\n")
+thread.join()
+"""
+
+
+def test_a_kernel_loads_while_another_one_is_compiled(tmp_path: Path) -> None:
+    started, gate = tmp_path / "started", tmp_path / "gate"
+    gated = _compiler_that(
+        tmp_path,
+        f'[ -e "{gate}" ] || exec cc "$@"\necho > "{started}"; read line < "{gate}"; exit 1',
+    )
+    environment = {"CC": gated, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    environment |= {"FILES": str(QUADRUPED), "STARTED": str(started), "GATE": str(gate)}
+    ready = run_python(LOAD_QUADRUPED, **environment)
+    assert ready.returncode == 0, ready.stderr
+    os.mkfifo(started)
+    os.mkfifo(gate)
+    held_open = os.open(gate, os.O_RDWR)
+    try:
+        done = run_python(COMPILE_ANOTHER + LOAD_QUADRUPED + GO_ON, timeout=60, **environment)
+    finally:
+        os.write(held_open, b"the compiler may end\n")
+        os.close(held_open)
+    assert done.stdout.split("\n") == ["native", "and the other one was refused", ""], done.stderr
+
+
 def test_a_robot_may_have_any_name() -> None:
     toml, urdf = ((QUADRUPED / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
     named = RobotFiles(toml=toml.replace('name = "quadruped"', 'name = "a/b"', 1), urdf=urdf)

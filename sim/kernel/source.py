@@ -1,0 +1,94 @@
+"""A robot's kernel as C text, and the digest of all that this text depends on."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from functools import lru_cache
+from importlib import metadata, resources
+from typing import Final
+
+from sim.compiler.compilation import vector_header
+from sim.kernel.parameters import internal_state_size
+from sim.robot import Robot
+
+_GENERATOR: Final = (
+    "articulated_body.py",
+    "backlash.py",
+    "contact.py",
+    "driver.c",
+    "emit_c.py",
+    "inertia.py",
+    "integration.py",
+    "motor.py",
+    "parameters.py",
+    "physics_step.py",
+    "source.py",
+    "spatial.py",
+)
+"""Files of this package that determine the source."""
+
+_deriving: Final = threading.Lock()
+"""CasADi's symbols are made by one thread at a time."""
+
+
+def kernel_identity(robot: Robot) -> bytes:
+    """All that a kernel's source depends on, without deriving it.
+
+    Args:
+        robot: As for `native_kernel`; its run-time parameters are left out, so that robots share
+            a kernel.
+
+    Returns:
+        A digest of 32 bytes.
+    """
+    digest = hashlib.sha256(_generator())
+    digest.update(robot.urdf.text.encode())
+    actuators = robot.actuators()
+    for array in (actuators.torque, actuators.resistance, actuators.armature):
+        digest.update(array.tobytes())
+    if robot.has_backlash:
+        digest.update(actuators.shaft_stiffness.tobytes() + actuators.shaft_damping.tobytes())
+    legs = [(*leg.joints, leg.foot) for leg in robot.description.legs]
+    digest.update(repr((legs, robot.description.contact_law, robot.has_backlash)).encode())
+    return digest.digest()
+
+
+def kernel_source(robot: Robot) -> str:
+    """Derive a robot's physics and write it as C, some seconds of work.
+
+    Args:
+        robot: As for `native_kernel`.
+
+    Returns:
+        C text that lacks the definition of LANES only.
+    """
+    # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
+    from sim.kernel.emit_c import emit_c  # noqa: PLC0415
+    from sim.kernel.physics_step import physics_model  # noqa: PLC0415
+
+    with _deriving:
+        model = physics_model(robot)
+        step = emit_c(model.step, "step")
+    return "\n".join(
+        [
+            f"#define NJ {robot.n_joints}",
+            f"#define NP {model.layout.size}",
+            f"#define NI {internal_state_size(robot)}",
+            f"#define ENCODER(q, internal) ({'internal' if robot.has_backlash else '(q) + 7'})",
+            vector_header(),
+            step,
+            (resources.files("sim.kernel") / "driver.c").read_text(encoding="utf-8"),
+        ]
+    )
+
+
+@lru_cache(maxsize=1)
+def _generator() -> bytes:
+    """What the source of every robot's kernel depends on."""
+    digest = hashlib.sha256(vector_header().encode())
+    folder = resources.files("sim.kernel")
+    for name in _GENERATOR:
+        digest.update((folder / name).read_bytes())
+    digest.update(f"{metadata.version('casadi')} {metadata.version('pin')}".encode())
+    return digest.digest()

@@ -35,15 +35,17 @@ _PROBE_LIMIT: Final = 30.0
 """Seconds that a compiler may take to say its version."""
 
 # No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on
-# compiler or machine.
+# compiler or machine. Integers wrap: a lane that has diverged computes on.
 _FLAGS: Final = (
     "-std=gnu11",
     "-O2",
     "-ffp-contract=off",
     "-fno-math-errno",
+    "-fwrapv",
     "-fPIC",
     "-shared",
-    "-w",
+    "-Wall",
+    "-Wextra",
 )
 
 

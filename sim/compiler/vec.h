@@ -10,29 +10,32 @@
 typedef double vec __attribute__((vector_size(8 * LANES)));
 typedef int64_t ivec __attribute__((vector_size(8 * LANES)));
 
+/* Not every source uses all of them. */
+#define OPERATION static inline __attribute__((unused))
+
 #define SPLAT(x) ((vec){0} + (x))
 #define ISPLAT(x) ((ivec){0} + (x))
 
-static inline vec vec_select(ivec mask, vec a, vec b)
+OPERATION vec vec_select(ivec mask, vec a, vec b)
 {
   return (vec)((mask & (ivec)a) | (~mask & (ivec)b));
 }
 
 /* Of a NaN and a number, the second operand: what the instruction does, spelt out elsewhere. */
 #if defined(__AVX512F__) && LANES == 8
-static inline vec vec_max(vec a, vec b) { return (vec)_mm512_max_pd((__m512d)a, (__m512d)b); }
-static inline vec vec_min(vec a, vec b) { return (vec)_mm512_min_pd((__m512d)a, (__m512d)b); }
+OPERATION vec vec_max(vec a, vec b) { return (vec)_mm512_max_pd((__m512d)a, (__m512d)b); }
+OPERATION vec vec_min(vec a, vec b) { return (vec)_mm512_min_pd((__m512d)a, (__m512d)b); }
 #elif defined(__AVX__) && LANES == 4
-static inline vec vec_max(vec a, vec b) { return (vec)_mm256_max_pd((__m256d)a, (__m256d)b); }
-static inline vec vec_min(vec a, vec b) { return (vec)_mm256_min_pd((__m256d)a, (__m256d)b); }
+OPERATION vec vec_max(vec a, vec b) { return (vec)_mm256_max_pd((__m256d)a, (__m256d)b); }
+OPERATION vec vec_min(vec a, vec b) { return (vec)_mm256_min_pd((__m256d)a, (__m256d)b); }
 #else
-static inline vec vec_max(vec a, vec b) { return vec_select(a > b, a, b); }
-static inline vec vec_min(vec a, vec b) { return vec_select(a < b, a, b); }
+OPERATION vec vec_max(vec a, vec b) { return vec_select(a > b, a, b); }
+OPERATION vec vec_min(vec a, vec b) { return vec_select(a < b, a, b); }
 #endif
-static inline vec vec_less(vec a, vec b) { return (vec)((a < b) & (ivec)SPLAT(1.0)); }
-static inline vec vec_abs(vec a) { return (vec)((ivec)a & ISPLAT(INT64_MAX)); }
+OPERATION vec vec_less(vec a, vec b) { return (vec)((a < b) & (ivec)SPLAT(1.0)); }
+OPERATION vec vec_abs(vec a) { return (vec)((ivec)a & ISPLAT(INT64_MAX)); }
 
-static inline vec vec_sqrt(vec a)
+OPERATION vec vec_sqrt(vec a)
 {
 #if defined(__AVX512F__) && LANES == 8
   return (vec)_mm512_sqrt_pd((__m512d)a);
@@ -48,7 +51,7 @@ static inline vec vec_sqrt(vec a)
 /* Adding 1.5 * 2^52 rounds to the nearest integer and leaves it in the low bits. */
 #define ROUNDER 6755399441055744.0
 
-static inline ivec vec_round_int(vec a)
+OPERATION ivec vec_round_int(vec a)
 {
   const ivec bits = (ivec)(a + SPLAT(ROUNDER)) - (ivec)SPLAT(ROUNDER);
   return bits;
@@ -57,7 +60,7 @@ static inline ivec vec_round_int(vec a)
 /* sin and cos: reduction to [-pi/4, pi/4] with pi/2 in three parts (Cody and Waite), then Taylor
    polynomials to x^17 and x^18, whose remainder is below half an ulp there. Joint angles are a
    few radians; beyond 1e5 rad accuracy is lost, and such a walk has long diverged. */
-static inline void vec_sincos(vec x, vec *sine, vec *cosine)
+OPERATION void vec_sincos(vec x, vec *sine, vec *cosine)
 {
   const vec rounded = x * SPLAT(0x1.45f306dc9c883p-1) + SPLAT(ROUNDER);
   const ivec quadrant = (ivec)rounded;

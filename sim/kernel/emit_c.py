@@ -67,7 +67,10 @@ class _Emitter:
         divisors = Counter(self._replay(lambda *_: None))
         self._work.clear()
         self._replay(lambda k, op, operands: self._emit(k, op, operands, divisors))
-        body = "\n".join(f"  {line}" for line in self._lines)
+        names = [*(f"i{k}" for k in range(f.n_in())), *(f"o{k}" for k in range(f.n_out()))]
+        sizes = [*map(f.nnz_in, range(f.n_in())), *map(f.nnz_out, range(f.n_out()))]
+        empty = [f"(void){name};" for name, size in zip(names, sizes, strict=True) if not size]
+        body = "\n".join(f"  {line}" for line in [*empty, *self._lines])
         return f"static void {name}({', '.join(arguments)})\n{{\n{body}\n}}\n"
 
     def _replay(self, visit: Callable[[int, str, list[str]], None]) -> list[str]:

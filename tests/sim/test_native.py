@@ -186,6 +186,14 @@ def test_a_kernel_loads_while_another_one_is_compiled(tmp_path: Path) -> None:
     assert done.stdout.split("\n") == ["native", "and the other one was refused", ""], done.stderr
 
 
+def test_integers_wrap_rather_than_let_the_compiler_assume_that_they_never_do() -> None:
+    source = "int grows(int value) { return value + 1 > value; }"
+    library = load_library("wrapping-check", source.encode(), lambda: source)
+    assert library is not None
+    assert library.grows(1) == 1
+    assert library.grows(2**31 - 1) == 0
+
+
 def test_a_robot_may_have_any_name() -> None:
     toml, urdf = ((QUADRUPED / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
     named = RobotFiles(toml=toml.replace('name = "quadruped"', 'name = "a/b"', 1), urdf=urdf)

@@ -1,0 +1,77 @@
+"""Walks and tables in a process that loads libraries built with sanitizers."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import hashlib
+import os
+
+import numpy as np
+
+from sim.assembly import control_steps, plan_walk
+from sim.controllers import CONTROLLERS
+from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
+from sim.controllers.mamdani import Shape
+from sim.controllers.native_inference import infer
+from sim.kernel.native import NativeKernel
+from sim.kernel.walk import Coding
+from sim.outcome import Status
+from sim.robot import Robot, RobotVariant, load_robot
+from sim.scenario import SCENARIOS
+
+ROBOTS = {
+    "plain": load_robot("szabadka2"),
+    "all internal state": load_robot(RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0))),
+}
+
+
+def digest_of_walks(kernel: NativeKernel, robot: Robot) -> str:
+    """Published optimum A in all scenarios, with a fall and a divergence, an uneven number."""
+    law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    substeps, timestep = control_steps(robot)
+    setups = []
+    for number, scenario in enumerate(SCENARIOS):
+        brief = scenario.model_copy(update={"cycles": 1.0, "cycle_time": 0.3 + 0.05 * number})
+        plan = plan_walk(robot, brief, timestep)
+        assert plan is not None
+        setups.append(plan(law))
+    disturbance = np.random.default_rng(3).normal(size=setups[0].desired.shape)
+    setups.append(dataclasses.replace(setups[0], disturbance=disturbance))
+    for stiffness in (0.0, 1e12):
+        parameters = setups[0].parameters.copy()
+        parameters[kernel.layout.slices["stiffness"]] = stiffness
+        parameters[kernel.layout.slices["damping"]] = 0.0
+        setups.append(dataclasses.replace(setups[0], parameters=parameters))
+    digest = hashlib.sha256()
+    statuses = set()
+    for log in (True, False):
+        for result in kernel.walk(setups, Coding.of(robot, substeps), log=log):
+            statuses.add(result.status)
+            states = np.empty(0) if result.states is None else result.states
+            for array in (result.sums, result.end, states):
+                # What sign a NaN has is the compiler's choice.
+                digest.update(np.where(np.isnan(array), np.nan, array).tobytes())
+    assert statuses == {Status.OK, Status.FELL, Status.DIVERGED}
+    return digest.hexdigest()
+
+
+def sanitized_walks(name: str) -> str:
+    return digest_of_walks(NativeKernel(ROBOTS[name], _sanitized_library()), ROBOTS[name])
+
+
+def digest_of_tables(library: ctypes.CDLL | None) -> str:
+    """Tables of two and of three inputs."""
+    two = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
+    return hashlib.sha256(
+        infer(two, {"error": ERROR.grid(), "current": CURRENT.grid()}, library=library).tobytes()
+    ).hexdigest()
+
+
+def sanitized_tables() -> str:
+    return digest_of_tables(_sanitized_library())
+
+
+def _sanitized_library() -> ctypes.CDLL:
+    assert hasattr(ctypes.CDLL(None), "__asan_init")
+    return ctypes.CDLL(os.environ["LIBRARY"])

@@ -2,44 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
-from fastapi import FastAPI, Request, Response
+from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
-from starlette.responses import RedirectResponse
 
-from api.context import ApiContext
-from api.documentation import ASSETS, add_documentation
-from api.middleware import BodyLimitMiddleware, RequestIdMiddleware
-from api.openapi import DESCRIPTION, TAGS, document_headers, document_problems
-from api.page import add_page
-from api.page_folder import FOLDER
+from api.dependencies import lifespan
+from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
+from api.middleware import (
+    BodyLimitMiddleware,
+    RequestIdMiddleware,
+    SameSiteMiddleware,
+    SecurityHeadersMiddleware,
+)
+from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
 from api.routes import (
     analysis,
     catalogue,
-    estimates,
+    events,
     health,
     history,
+    identification,
     jobs,
-    recordings,
     simulations,
-    walks,
 )
-from api.security import SameSiteMiddleware, SecurityHeadersMiddleware
 from gaitswarm.settings import Settings
-from gaitswarm.views import PREFIX, ParticlesHeaderView
-from gaitswarm.views.replay import ReplayHeaderView
 from services.optimizer.service import JobService
-
-_REDIRECTIONS: Final = {
-    "/healthz": f"{PREFIX}/healthz",
-    "/readyz": f"{PREFIX}/readyz",
-}
 
 # Event streams must not wait for a full block. Numbers in binary hardly become shorter, and
 # downloads are as long as a job's history: compressing either costs more time than it saves.
@@ -54,8 +46,15 @@ _UNCOMPRESSED: Final = (
 def create_app(service: JobService, *, settings: Settings, page_folder: Path = FOLDER) -> FastAPI:
     """The application around a service: routes, problems, limits, documentation, page.
 
-    page_folder: of the built page; there need be none.
     Nothing is opened or started; the service's store stays its owner's to close.
+
+    Args:
+        service: answers the requests.
+        settings: limits and intervals.
+        page_folder: of the built page; there need be none.
+
+    Returns:
+        The application, for `ApiServer` or any other ASGI server with lifespans.
     """
     # The documentation's scripts come with the package: /docs works without the internet.
     app = FastAPIOffline(
@@ -68,27 +67,23 @@ def create_app(service: JobService, *, settings: Settings, page_folder: Path = F
         description=DESCRIPTION,
         openapi_tags=TAGS,
         separate_input_output_schemas=False,
+        lifespan=lifespan(service, settings),
     )
-    app.state.context = ApiContext(service, settings)
     for module in (
         jobs,
         history,
+        events,
         analysis,
-        estimates,
-        recordings,
+        identification,
         simulations,
-        walks,
         catalogue,
         health,
     ):
         app.include_router(module.router)
-    for path, target in _REDIRECTIONS.items():
-        app.add_route(path, _redirection(target), include_in_schema=False)
+    health.add_short_paths(app)
     add_documentation(app)
     add_page(app, page_folder)
     add_problem_handlers(app)
-    document_problems(app)
-    document_headers(app, ReplayHeaderView, ParticlesHeaderView)
     app.add_middleware(BodyLimitMiddleware, max_bytes=settings.api_max_body_bytes)
     app.add_middleware(
         GZipMiddleware, minimum_size=1024, compresslevel=6, exclude_content_types=_UNCOMPRESSED
@@ -98,15 +93,6 @@ def create_app(service: JobService, *, settings: Settings, page_folder: Path = F
     # The outermost: an answer to a bug has the headers too.
     app.add_middleware(SecurityHeadersMiddleware)
     return app
-
-
-def _redirection(target: str) -> Callable[[Request], Response]:
-    """An endpoint that sends a client on to another path."""
-
-    def redirect(request: Request) -> Response:
-        return RedirectResponse(request.scope.get("root_path", "") + target)
-
-    return redirect
 
 
 def _version() -> str:

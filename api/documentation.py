@@ -1,28 +1,115 @@
-"""/docs: the OpenAPI document to read and to try, without any other host."""
+"""What the API says of itself: the OpenAPI document, and /docs to read and to try it."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import re
-from typing import Final
+from typing import Any, Final
 
 from fastapi import FastAPI, Request, Response
 from fastapi.openapi.docs import get_swagger_ui_html
+from pydantic.json_schema import models_json_schema
 
-from api.security import policy
+from api.middleware import security_policy
+from api.problems import MEDIA_TYPE
+from gaitswarm.views import ParticlesHeaderView, ProblemView
+from gaitswarm.views.base import MEDIA_TYPE as BINARY
+from gaitswarm.views.replay import ReplayHeaderView
+
+DESCRIPTION: Final = """
+Finds robust drive controllers for walking robots: a controller is tried in several walking
+scenarios at once, in a fast simulation, and a particle swarm improves it.
+
+1. Look at what can be tuned: **GET /v1/controllers**, **/v1/scenarios**, **/v1/preferences**.
+2. Try one design: **POST /v1/simulations**.
+3. Submit a job: **POST /v1/jobs** answers at once with the job's id.
+4. Follow it: **GET /v1/jobs/{id}/events** is a stream of its committed iterations.
+5. Take the result: **GET /v1/jobs/{id}/best**.
+
+All objectives, utilities and fitnesses are minimized. Units are SI unless a field says otherwise;
+controller variables in `counts` are coded integers of the microcontroller. Numbers that do not
+exist (the objectives of a robot that fell) are null. Errors are problems (RFC 9457): `detail` says
+what to do, `errors` names every offending field. Every answer has an `X-Request-ID`, by which the
+server's log names it; a client may send its own.
+"""
+
+TAGS: Final[list[dict[str, str]]] = [
+    {"name": "jobs", "description": "Optimizations: submit, follow, pause, resume, cancel."},
+    {"name": "history", "description": "What a job has committed: iterations and evaluations."},
+    {"name": "analysis", "description": "Questions about all evaluations of a job at once."},
+    {"name": "recordings", "description": "Measured walks, to which a robot is fitted."},
+    {"name": "simulations", "description": "One design walking on request, outside any job."},
+    {"name": "catalogue", "description": "What there is to choose from."},
+    {"name": "health", "description": "For load balancers and container engines."},
+]
 
 ASSETS: Final = "/docs-assets"
+"""Where the scripts of /docs lie."""
+
+_MEANING: Final = {
+    400: "The body is not JSON.",
+    404: "No such job, or nothing of that kind in it yet.",
+    409: "The job's state does not allow it, or the idempotency key belongs to another request.",
+    413: "The body is too large.",
+    422: "A field is not valid; `errors` names it.",
+    500: "A bug on the server; the log names the cause under the request id.",
+    503: "The database or the simulator cannot answer now; try again later.",
+}
+
+_HEADERS: Final = (ReplayHeaderView, ParticlesHeaderView)
+"""What is JSON inside binary answers, which FastAPI does not see."""
 
 _INLINE_SCRIPT: Final = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 
+Responses = dict[int | str, dict[str, Any]]
+
+
+def problems(*statuses: int) -> Responses:
+    """Document a route's problems.
+
+    Args:
+        statuses: its HTTP statuses of problems; 500 and 503 go without saying.
+
+    Returns:
+        The route's `responses`.
+    """
+    return {
+        status: {"model": ProblemView, "description": _MEANING[status]}
+        for status in (*statuses, 500, 503)
+    }
+
+
+def binary(description: str, *media_types: str) -> Responses:
+    """Document a route that answers bytes.
+
+    Args:
+        description: what the bytes are.
+        media_types: that they may have; by default framed numbers alone.
+
+    Returns:
+        The route's `responses`.
+    """
+    schema = {"type": "string", "format": "binary"}
+    content = {media_type: {"schema": schema} for media_type in media_types or (BINARY,)}
+    return {200: {"description": description, "content": content}}
+
 
 def add_documentation(app: FastAPI) -> None:
-    """Serve /docs.
+    """Complete the OpenAPI document and serve /docs.
 
-    Its scripts lie under ASSETS. The inline one that starts them is allowed by its hash; it writes
-    styles into the page, which has no content of users.
+    Args:
+        app: with all its routes, and the scripts of /docs under `ASSETS`.
     """
+    derive = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        document = derive()
+        _name_problems(document)
+        _add_headers(document)
+        return document
+
+    app.openapi = openapi  # type: ignore[method-assign]
 
     def documentation(request: Request) -> Response:
         root = request.scope.get("root_path", "")
@@ -33,13 +120,40 @@ def add_documentation(app: FastAPI) -> None:
             swagger_css_url=f"{root}{ASSETS}/swagger-ui.css",
             swagger_favicon_url=f"{root}{ASSETS}/favicon.png",
         )
-        hashes = [
-            f"'sha256-{base64.b64encode(hashlib.sha256(script).digest()).decode()}'"
-            for script in _INLINE_SCRIPT.findall(bytes(page.body))
-        ]
-        page.headers["Content-Security-Policy"] = policy(
-            script_src=" ".join(["'self'", *hashes]), style_src="'self' 'unsafe-inline'"
-        )
+        page.headers["Content-Security-Policy"] = _policy(bytes(page.body))
         return page
 
     app.add_route("/docs", documentation, include_in_schema=False)
+
+
+def _name_problems(document: dict[str, Any]) -> None:
+    """Let problem+json be the media type wherever a problem is answered."""
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for status, response in operation["responses"].items():
+                if status >= "400":
+                    (body,) = response["content"].values()
+                    response["content"] = {MEDIA_TYPE: body}
+
+
+def _add_headers(document: dict[str, Any]) -> None:
+    _, schemas = models_json_schema(
+        [(header, "serialization") for header in _HEADERS],
+        ref_template="#/components/schemas/{model}",
+    )
+    components = document["components"]
+    components["schemas"] = schemas["$defs"] | components["schemas"]
+
+
+def _policy(page: bytes) -> str:
+    """Allows the inline script that starts /docs by its hash.
+
+    It writes styles into the page, which has no content of users.
+    """
+    hashes = [
+        f"'sha256-{base64.b64encode(hashlib.sha256(script).digest()).decode()}'"
+        for script in _INLINE_SCRIPT.findall(page)
+    ]
+    return security_policy(
+        script_src=" ".join(["'self'", *hashes]), style_src="'self' 'unsafe-inline'"
+    )

@@ -18,6 +18,9 @@ from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
 from api.problems import problem
 from gaitswarm.views import PREFIX
 
+FOLDER: Final = Path(__file__).parent / "page"
+"""`make page` builds it from web/; a wheel brings it."""
+
 PAGES: Final = ("/jobs", "/walk", "/controller")
 """With everything below them: the page itself tells its views apart by their paths."""
 
@@ -29,10 +32,21 @@ _UNBUILT: Final = "the page is not built; `make page` builds it, and /docs expla
 _MEDIA_TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 
+def is_built(folder: Path = FOLDER) -> bool:
+    """Whether there is a page to serve.
+
+    Args:
+        folder: of the built page.
+    """
+    return (folder / "index.html").is_file()
+
+
 def add_page(app: FastAPI, folder: Path) -> None:
     """Serve a built page; without one, `/` leads to /docs and a job's page to the job as JSON.
 
-    folder: index.html, and files named by a hash of their content in assets/.
+    Args:
+        app: takes on the page's routes.
+        folder: index.html, and files named by a hash of their content in assets/.
     """
 
     def page(request: Request) -> Response:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from api.context import ExistingJob, JobIdText, Service
-from api.openapi import problems
+from api.dependencies import AfterIteration, ExistingJob, Service
+from api.documentation import binary, problems
 from gaitswarm.views import (
     PREFIX,
     DistributionView,
@@ -17,17 +17,8 @@ from gaitswarm.views import (
     encoded_particles,
 )
 from gaitswarm.views.base import MEDIA_TYPE
-from gaitswarm.views.identification import IdentifiabilityView
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
-
-_LARGEST: Final = 2**31 - 1
-
-_NUMBERS: Final[dict[str, Any]] = {
-    "description": "Length of the header (uint32), header (JSON, padded with spaces), then every"
-    " column's numbers (float32), all little-endian.",
-    "content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}},
-}
 
 
 @router.get(
@@ -40,10 +31,7 @@ _NUMBERS: Final[dict[str, Any]] = {
 def get_distribution(
     job: ExistingJob,
     service: Service,
-    after: Annotated[
-        int | None,
-        Query(ge=0, le=_LARGEST, description="Only iterations with a greater index."),
-    ] = None,
+    after: AfterIteration = None,
     limit: Annotated[int, Query(ge=1, le=10_000, description="Most iterations on a page.")] = 1000,
 ) -> Response:
     """Quantiles of the swarm's fitness and the diversity of its designs, iteration by iteration."""
@@ -56,15 +44,16 @@ def get_distribution(
     operation_id="get_particles",
     summary="Take every particle as numbers",
     response_class=Response,
-    responses={200: _NUMBERS, **problems(404, 409, 422)},
+    responses=binary(
+        "Length of the header (uint32), header (JSON, padded with spaces), then every column's"
+        " numbers (float32), all little-endian."
+    )
+    | problems(404, 409, 422),
 )
 def get_particles(
     job: ExistingJob,
     service: Service,
-    after_iteration: Annotated[
-        int | None,
-        Query(ge=0, le=_LARGEST, description="Only iterations with a greater index."),
-    ] = None,
+    after_iteration: AfterIteration = None,
     max_points: Annotated[
         int,
         Query(
@@ -102,28 +91,3 @@ def rank_designs(request: RankingRequest, job: ExistingJob, service: Service) ->
 def _json(view: View) -> Response:
     """Serialized here: thousands of items are not validated once more on their way out."""
     return Response(view.model_dump_json(), media_type="application/json")
-
-
-@router.get(
-    "/parameters",
-    operation_id="get_parameters",
-    summary="See which parameters can be trusted",
-    responses=problems(404, 409, 422),
-)
-def get_parameters(
-    job: ExistingJob,
-    service: Service,
-    also: Annotated[
-        list[JobIdText] | None,
-        Query(max_length=31, description="Further runs of the same problem, of other seeds."),
-    ] = None,
-) -> IdentifiabilityView:
-    """The interval of every variable among designs within twelve thresholds of the best.
-
-    For jobs of kind `identification` above all. A single run always narrows down; only runs of
-    different seeds that narrow down to the same values show that a parameter can be trusted.
-    """
-    jobs = [job, *(service.job(other) for other in also or ())]
-    return IdentifiabilityView.from_identifiability(
-        [j.id for j in jobs], service.identifiability(jobs)
-    )

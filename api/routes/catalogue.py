@@ -1,10 +1,16 @@
-"""What there is to choose from."""
+"""What there is to choose from, and how a fuzzy controller answers."""
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from functools import partial
+from typing import Annotated
 
-from api.openapi import problems
+from fastapi import APIRouter, Path, Response
+
+from api.dependencies import Slots
+from api.documentation import problems
+from api.routes.simulations import NOT_STORED
+from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.views import (
     PREFIX,
     CatalogueView,
@@ -15,6 +21,9 @@ from gaitswarm.views import (
     preference_views,
     scenario_views,
 )
+from gaitswarm.views.surface import SurfaceView
+from services.optimizer.errors import NotFound
+from sim.controllers import CONTROLLERS, ControllerName
 
 router = APIRouter(prefix=PREFIX, tags=["catalogue"])
 
@@ -50,3 +59,38 @@ def list_preferences() -> CatalogueView[PreferenceView]:
 def list_controllers() -> CatalogueView[ControllerView]:
     """Motor controllers, their design variables with bounds and units, and published designs."""
     return CatalogueView(items=controller_views())
+
+
+@router.post(
+    "/controllers/{controller}/surface",
+    operation_id="controller_surface",
+    summary="Get a fuzzy controller's surface",
+    response_model=SurfaceView,
+    responses=problems(400, 404, 413, 422),
+)
+async def controller_surface(
+    controller: Annotated[
+        str,
+        Path(
+            max_length=40,
+            description="Name of a fuzzy controller; see /v1/controllers.",
+            examples=["fuzzy-pi"],
+        ),
+    ],
+    request: SurfaceRequest,
+    slots: Slots,
+) -> Response:
+    """How a design answers to angle error and motor current: by its rules, and by its table.
+
+    Sets and rules are those of the thesis; the table is what the microcontroller looks up in place
+    of the inference.
+    """
+    if controller not in CONTROLLERS:
+        raise NotFound(f"no controller {controller!r}; known are {', '.join(CONTROLLERS)}")
+    body = await slots.run(partial(_surface, controller, request))
+    return Response(body, media_type="application/json", headers=NOT_STORED)
+
+
+def _surface(controller: ControllerName, request: SurfaceRequest) -> str:
+    """Serialized in the worker thread, as it has thousands of numbers."""
+    return run_surface(controller, request).model_dump_json(by_alias=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
-from fastapi import APIRouter
+from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import Field
+from starlette.responses import RedirectResponse
 
-from api.context import Service
-from api.openapi import problems
+from api.dependencies import Service
+from api.documentation import problems
 from gaitswarm.views import PREFIX, View
 
 router = APIRouter(prefix=PREFIX, tags=["health"])
@@ -33,3 +35,20 @@ def readyz(service: Service) -> HealthView:
     """Answers ok if the database does and has this version's schema, else 503."""
     service.store.ping()
     return HealthView()
+
+
+def add_short_paths(app: FastAPI) -> None:
+    """Send those on who ask for /healthz and /readyz, as probes are used to.
+
+    Args:
+        app: takes on the redirections.
+    """
+    for path in ("/healthz", "/readyz"):
+        app.add_route(path, _redirection(f"{PREFIX}{path}"), include_in_schema=False)
+
+
+def _redirection(target: str) -> Callable[[Request], Response]:
+    def redirect(request: Request) -> Response:
+        return RedirectResponse(request.scope.get("root_path", "") + target)
+
+    return redirect

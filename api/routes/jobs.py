@@ -1,19 +1,27 @@
-"""Jobs: submit, list, look at, command."""
+"""Jobs: submit, estimate, list, look at, command."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
-from api.context import JobId, Service
-from api.openapi import problems
-from gaitswarm.views import PREFIX, ExtensionRequest, JobSummaryView, JobView, PageView
+from api.dependencies import JobId, Service, Slots
+from api.documentation import problems
+from gaitswarm.views import (
+    PREFIX,
+    EstimateView,
+    ExtensionRequest,
+    JobSummaryView,
+    JobView,
+    PageView,
+)
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from services.optimizer.service import JobService
 
-router = APIRouter(prefix=f"{PREFIX}/jobs", tags=["jobs"])
+router = APIRouter(prefix=PREFIX, tags=["jobs"])
 
 IdempotencyKey = Annotated[
     str | None,
@@ -35,7 +43,7 @@ async def request_document(request: Request) -> Any:
 
 
 @router.post(
-    "",
+    "/jobs",
     operation_id="submit_job",
     summary="Submit a job",
     status_code=status.HTTP_202_ACCEPTED,
@@ -68,7 +76,22 @@ def submit_job(
     return _in_full(service, job)
 
 
-@router.get("", operation_id="list_jobs", summary="List jobs", responses=problems(422))
+@router.post(
+    "/estimates",
+    operation_id="estimate_job",
+    summary="Estimate a job",
+    responses=problems(400, 413, 422),
+)
+async def estimate_job(spec: AnySpec, service: Service, slots: Slots) -> EstimateView:
+    """Check a job as submitting it would, and say what it would cost. Nothing is stored.
+
+    The time is by the rate of earlier jobs with the same robot and controller; without one, a short
+    walk is measured on the server, for which it may have to compile the robot's kernel first.
+    """
+    return EstimateView.from_estimate(await slots.run(partial(service.estimate, spec)))
+
+
+@router.get("/jobs", operation_id="list_jobs", summary="List jobs", responses=problems(422))
 def list_jobs(
     service: Service,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
@@ -97,7 +120,7 @@ def list_jobs(
 
 
 @router.get(
-    "/{job_id}", operation_id="get_job", summary="Look at a job", responses=problems(404, 422)
+    "/jobs/{job_id}", operation_id="get_job", summary="Look at a job", responses=problems(404, 422)
 )
 def get_job(job_id: JobId, service: Service) -> JobView:
     """State, progress, rates, estimated time left, best design so far, and why it failed if so."""
@@ -105,7 +128,7 @@ def get_job(job_id: JobId, service: Service) -> JobView:
 
 
 @router.post(
-    "/{job_id}/pause",
+    "/jobs/{job_id}/pause",
     operation_id="pause_job",
     summary="Pause a job",
     status_code=status.HTTP_202_ACCEPTED,
@@ -120,7 +143,7 @@ def pause_job(job_id: JobId, service: Service) -> JobView:
 
 
 @router.post(
-    "/{job_id}/resume",
+    "/jobs/{job_id}/resume",
     operation_id="resume_job",
     summary="Resume a job",
     status_code=status.HTTP_202_ACCEPTED,
@@ -135,7 +158,7 @@ def resume_job(job_id: JobId, service: Service) -> JobView:
 
 
 @router.post(
-    "/{job_id}/extend",
+    "/jobs/{job_id}/extend",
     operation_id="extend_job",
     summary="Give a job another budget",
     status_code=status.HTTP_202_ACCEPTED,
@@ -154,7 +177,7 @@ def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> 
 
 
 @router.post(
-    "/{job_id}/cancel",
+    "/jobs/{job_id}/cancel",
     operation_id="cancel_job",
     summary="Cancel a job",
     responses=problems(404, 409, 422),

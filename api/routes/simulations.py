@@ -1,37 +1,73 @@
-"""One design walking on request."""
+"""One design walking on request: what it is worth, and how it looks."""
 
 from __future__ import annotations
 
 from functools import partial
+from typing import Final
 
 from fastapi import APIRouter, Response
 
-from api.context import Context
-from api.limits import check_length, computed
-from api.openapi import problems
-from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from api.dependencies import ServerSettings, Slots, check_length
+from api.documentation import binary, problems
+from gaitswarm.requests.replay import ReplayRequest, run_replay
+from gaitswarm.requests.walk import SimulationRequest, resolved, run_simulation
 from gaitswarm.views import PREFIX, SimulationView
+from gaitswarm.views.base import MEDIA_TYPE
 
-router = APIRouter(prefix=f"{PREFIX}/simulations", tags=["simulations"])
+router = APIRouter(prefix=PREFIX, tags=["simulations"])
+
+NOT_STORED: Final = {"Cache-Control": "no-store"}
+
+
+class BinaryResponse(Response):
+    """Bytes, and documented as such."""
+
+    media_type = MEDIA_TYPE
 
 
 @router.post(
-    "",
+    "/simulations",
     operation_id="simulate",
     summary="Simulate one design",
     response_model=SimulationView,
     responses=problems(400, 413, 422),
 )
-async def simulate_design(request: SimulationRequest, context: Context) -> Response:
+async def simulate_design(
+    request: SimulationRequest, settings: ServerSettings, slots: Slots
+) -> Response:
     """Let one design walk in the chosen scenarios and say what it is worth.
 
     Nothing is stored. The answer waits for the walks, so the time walked is limited; a search
     belongs in a job.
     """
     seconds = request.simulated_seconds(request.resolved_scenarios())
-    check_length(context.settings, seconds, logged=request.log, field="scenarios")
-    body = await computed(context, partial(_simulated, request))
+    check_length(settings, seconds, logged=request.log, field="scenarios")
+    body = await slots.run(partial(_simulated, request))
     return Response(body, media_type="application/json")
+
+
+@router.post(
+    "/replays",
+    operation_id="replay",
+    summary="Replay one walk",
+    response_class=BinaryResponse,
+    responses=binary(
+        "Length of the header in bytes (uint32), the header (JSON, a ReplayHeaderView, padded with"
+        " spaces to a multiple of 4), then frame after frame of float32 numbers as the header's"
+        " channels say; all little-endian."
+    )
+    | problems(400, 413, 422),
+)
+async def replay_walk(request: ReplayRequest, settings: ServerSettings, slots: Slots) -> Response:
+    """Let one design walk in one scenario, and get where every link was, frame by frame.
+
+    A walk that failed is replayed up to its end, with its status in the header. Nothing is stored;
+    the time walked is limited as for simulations with logs.
+    """
+    seconds = request.simulated_seconds([resolved(request.scenario)])
+    check_length(settings, seconds, logged=True, field="scenario")
+    frames = await slots.run(partial(run_replay, request))
+    return BinaryResponse(frames, headers=NOT_STORED)
 
 
 def _simulated(request: SimulationRequest) -> str:

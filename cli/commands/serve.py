@@ -55,7 +55,7 @@ def serve(
 ) -> None:
     """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
     from api.app import create_app
-    from api.page_folder import is_built
+    from api.page import is_built
     from api.server import ApiServer
     from cli.output import log_to_stderr, note
     from gaitswarm.settings import read_settings
@@ -74,11 +74,15 @@ def serve(
     with _runtime(settings, runs_jobs=not no_runner) as opened:
         app = create_app(opened.service, settings=settings)
         try:
-            server = ApiServer(app, host=settings.api_host, port=settings.api_port)
+            server = ApiServer(
+                app,
+                host=settings.api_host,
+                port=settings.api_port,
+                shutdown_seconds=settings.api_shutdown_seconds,
+            )
         except OSError as error:
             raise EvaluatorUnavailable(
-                f"cannot listen on {settings.api_host}, port {settings.api_port}:"
-                f" {error.strerror}; choose another --port, or --port 0"
+                f"cannot listen: {error.strerror}; choose another --port, or --port 0"
             ) from error
         doing = "runs no jobs" if opened.runner is None else "runs queued jobs"
         if not is_built():

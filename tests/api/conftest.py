@@ -13,6 +13,7 @@ import httpx2
 import numpy as np
 import pytest
 
+from api import dependencies
 from api.app import create_app
 from api.server import ApiServer
 from gaitswarm.settings import Settings
@@ -68,7 +69,13 @@ class Server:
     ) -> None:
         values = Settings(**{"api_event_poll_seconds": 0.02, **settings})
         self.app = create_app(cast(JobService, service), settings=values, page_folder=page_folder)
-        self._server = ApiServer(self.app, host="127.0.0.1", port=0, log_level="critical")
+        self._server = ApiServer(
+            self.app,
+            host="127.0.0.1",
+            port=0,
+            shutdown_seconds=values.api_shutdown_seconds,
+            log_level="critical",
+        )
         self._thread = threading.Thread(target=self._server.run)
         self._thread.start()
         self.client = httpx2.Client(base_url=self._server.url, timeout=20.0)
@@ -113,7 +120,7 @@ def lasting_server() -> Iterator[Server]:
 @pytest.fixture
 def client(lasting_server: Server, service: JobService) -> httpx2.Client:
     """A client of a server with the usual settings, on this test's own database."""
-    lasting_server.app.state.context.service = service
+    lasting_server.app.dependency_overrides[dependencies.service] = lambda: service
     return lasting_server.client
 
 

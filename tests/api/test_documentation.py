@@ -8,7 +8,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from api.openapi import TAGS
+from api.documentation import TAGS
 
 Document = dict[str, Any]
 Operation = tuple[str, Document]

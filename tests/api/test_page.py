@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from api.page_folder import is_built
+from api.page import is_built
 from services.optimizer.jobs.job import Job
 from tests.api.conftest import Serve, Server
 

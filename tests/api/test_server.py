@@ -23,15 +23,17 @@ from services.optimizer.service import JobService
 PROGRAM = """
 import sys
 from api.app import create_app
-from api.server import serve
+from api.server import ApiServer
 from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 
 store = open_store(sys.argv[1])
-settings = Settings(api_event_poll_seconds=60.0, api_shutdown_seconds=60)
+settings = Settings(api_event_poll_seconds=60.0)
 app = create_app(JobService(store), settings=settings)
-serve(app, host="127.0.0.1", port=0, announce=lambda url: print(url, flush=True))
+server = ApiServer(app, host="127.0.0.1", port=0, shutdown_seconds=60)
+print(server.url, flush=True)
+server.run()
 store.close()
 print("closed", flush=True)
 """

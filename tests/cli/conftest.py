@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+from fastapi import FastAPI
 
+from api import dependencies
 from api.app import create_app
-from api.context import ApiContext
 from api.server import ApiServer
 from cli.main import run
 from gaitswarm.settings import Settings
@@ -118,27 +119,28 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 
 @pytest.fixture(scope="session")
-def lasting_server() -> Iterator[tuple[str, ApiContext]]:
-    """One server for all tests, its URL and what to change of it; starting one takes longer."""
+def lasting_server() -> Iterator[tuple[str, FastAPI]]:
+    """One server for all tests, its URL and its application; starting one takes longer."""
     app = create_app(cast(JobService, None), settings=Settings(api_event_poll_seconds=0.02))
     server = ApiServer(app, host="127.0.0.1", port=0, log_level="critical")
     thread = threading.Thread(target=server.run)
     thread.start()
-    yield server.url, app.state.context
+    yield server.url, app
     server.stop()
     thread.join(timeout=10.0)
     assert not thread.is_alive()
 
 
 @pytest.fixture
-def serve_database(lasting_server: tuple[str, ApiContext]) -> Iterator[Callable[[Path], str]]:
+def serve_database(lasting_server: tuple[str, FastAPI]) -> Iterator[Callable[[Path], str]]:
     """The server, made to serve a database; its URL."""
-    url, context = lasting_server
+    url, app = lasting_server
     with ExitStack() as stack:
 
         def serve(db: Path) -> str:
             store = stack.enter_context(closing(open_store(str(db))))
-            context.service = JobService(store)
+            service = JobService(store)
+            app.dependency_overrides[dependencies.service] = lambda: service
             return url
 
         yield serve

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
-from api.page_folder import is_built
+from api.page import is_built
 from tests.web.chromium import ARGUMENTS, find_chromium
 from tests.web.server import ServerProcess
 from tests.web.visit import Visit

@@ -1,0 +1,157 @@
+"""What routes ask for: the service, room to compute, the job of a path, and its paging."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from typing import Annotated, Final, TypedDict, TypeVar, cast
+
+import anyio
+from anyio.to_thread import run_sync
+from fastapi import Depends, FastAPI, Path, Query, Request
+from pydantic import Field
+
+from gaitswarm.settings import Settings
+from services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
+from services.optimizer.jobs.job import Job
+from services.optimizer.service import JobService
+
+T = TypeVar("T")
+
+
+class SimulationSlots:
+    """Lets only so many walks on request compute at the same time. Of one event loop."""
+
+    def __init__(self, workers: int, queue: int) -> None:
+        """Start without any at work.
+
+        Args:
+            workers: how many compute at the same time, each in a thread.
+            queue: how many more may wait.
+        """
+        self._limiter = anyio.CapacityLimiter(workers)
+        self._queue = queue
+
+    async def run(self, work: Callable[[], T]) -> T:
+        """Compute in a thread, as soon as there is a slot.
+
+        Args:
+            work: called in the thread, without arguments.
+
+        Returns:
+            What `work` returns.
+
+        Raises:
+            EvaluatorUnavailable: too many are waiting already.
+        """
+        waiting = self._limiter.statistics().tasks_waiting
+        if self._limiter.available_tokens == 0 and waiting >= self._queue:
+            raise EvaluatorUnavailable(
+                "too many simulations are waiting; try again in a few seconds"
+            )
+        return await run_sync(work, limiter=self._limiter)
+
+
+class State(TypedDict):
+    """`request.state` of every request: what the lifespan of the application yields.
+
+    stopping: set by the server when it begins to stop; event streams end then.
+    """
+
+    service: JobService
+    settings: Settings
+    slots: SimulationSlots
+    stopping: asyncio.Event
+
+
+def lifespan(
+    service: JobService, settings: Settings
+) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
+    """The lifespan of an application around a service.
+
+    Args:
+        service: answers the requests; its store stays its owner's to close.
+        settings: of the application.
+
+    Returns:
+        The context manager that FastAPI enters in the server's event loop.
+    """
+
+    @asynccontextmanager
+    async def run(_app: FastAPI) -> AsyncIterator[State]:
+        slots = SimulationSlots(settings.api_simulation_workers, settings.api_simulation_queue)
+        yield State(service=service, settings=settings, slots=slots, stopping=asyncio.Event())
+
+    return run
+
+
+async def service(request: Request) -> JobService:
+    """The application's service; tests may override it."""
+    return cast(JobService, request.state.service)
+
+
+async def settings(request: Request) -> Settings:
+    """The application's settings."""
+    return cast(Settings, request.state.settings)
+
+
+async def slots(request: Request) -> SimulationSlots:
+    """The application's room for walks on request."""
+    return cast(SimulationSlots, request.state.slots)
+
+
+async def stopping(request: Request) -> asyncio.Event:
+    """Set when the server begins to stop."""
+    return cast(asyncio.Event, request.state.stopping)
+
+
+Service = Annotated[JobService, Depends(service)]
+ServerSettings = Annotated[Settings, Depends(settings)]
+Slots = Annotated[SimulationSlots, Depends(slots)]
+Stopping = Annotated[asyncio.Event, Depends(stopping)]
+
+LARGEST_INDEX: Final = 2**31 - 1
+"""Of an iteration, as the database's integers have it."""
+
+AfterIteration = Annotated[
+    int | None,
+    Query(ge=0, le=LARGEST_INDEX, description="Only iterations with a greater index."),
+]
+
+JobIdText = Annotated[
+    str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", examples=["k2q7zr5dm9xw"])
+]
+
+JobId = Annotated[
+    JobIdText, Path(description="Identifier of the job, as POST /v1/jobs answered it.")
+]
+
+
+def existing_job(job_id: JobId, service: Service) -> Job:
+    """The job of the path, or NotFound before any answer has begun."""
+    return service.job(job_id)
+
+
+ExistingJob = Annotated[Job, Depends(existing_job)]
+
+
+def check_length(settings: Settings, seconds: float, *, logged: bool, field: str) -> None:
+    """Refuse walks that last too long together.
+
+    Args:
+        settings: with the limits.
+        seconds: simulated time of all walks of a request [s].
+        logged: whether the request asks for logs, which has a limit of its own.
+        field: the request's field to blame.
+
+    Raises:
+        InvalidRequest: they last longer than the settings allow.
+    """
+    limit = settings.api_max_logged_seconds if logged else settings.api_max_simulated_seconds
+    if seconds > limit:
+        raise InvalidRequest(
+            f"the walks last {seconds:g} s together, more than the {limit:g} s allowed"
+            f"{' with logs' if logged else ''}; choose fewer scenarios or cycles",
+            field=field,
+        )

@@ -1,0 +1,155 @@
+"""The stream of a job's committed iterations and changes of state."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncGenerator, AsyncIterable
+from typing import Annotated, Final
+
+import anyio
+from anyio.to_thread import run_sync
+from fastapi import APIRouter, Header, Query
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from api.dependencies import (
+    LARGEST_INDEX,
+    AfterIteration,
+    ExistingJob,
+    ServerSettings,
+    Service,
+    Stopping,
+)
+from api.documentation import problems
+from gaitswarm.views import PREFIX, IterationView, StateView
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.jobs.job import Iteration, Job, JobState
+from services.optimizer.service import JobService
+
+router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
+
+_STREAM: Final = """\
+event: iteration
+data: {"index":24,"best":21.3,"mean":25.2,"median":23.9,"worst":41.7,"best_so_far":20.9,\
+"failed":2,"evaluate_seconds":1.23,"committed_at":"2026-01-01T12:00:00Z"}
+id: 24
+
+event: state
+data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25}
+
+"""
+
+_PAGE: Final = 200
+"""Iterations read at once."""
+
+
+@router.get(
+    "/events",
+    operation_id="stream_events",
+    summary="Follow a job",
+    response_class=EventSourceResponse,
+    response_description="Server-sent events `iteration` and `state`.",
+    responses={200: {"content": {"text/event-stream": {"example": _STREAM}}}, **problems(404, 422)},
+)
+async def stream_events(
+    job: ExistingJob,
+    service: Service,
+    settings: ServerSettings,
+    stopping: Stopping,
+    last_event_id: Annotated[
+        int | None,
+        Header(
+            alias="Last-Event-ID",
+            ge=0,
+            le=LARGEST_INDEX,
+            description="Id of the last event received; the stream goes on with the next. Browsers"
+            " send it by themselves when they reconnect.",
+        ),
+    ] = None,
+    after: AfterIteration = None,
+    follow: Annotated[
+        bool, Query(description="False: end the stream when all that is committed has been sent.")
+    ] = True,
+    limit: Annotated[
+        int | None,
+        Query(ge=1, le=LARGEST_INDEX, description="End the stream after this many iterations."),
+    ] = None,
+) -> AsyncIterable[ServerSentEvent]:
+    """Committed iterations as they come, as server-sent events.
+
+    An event `iteration` is sent once for each committed iteration, in order; its id is the
+    iteration's index, its data an IterationView. An event `state`, without an id, is sent on
+    connecting and whenever the job's state changes; its data is a StateView. The stream ends after
+    the event of a final state. A broken stream goes on without gap or repeat from `Last-Event-ID`
+    (or `after`). Comments keep idle connections alive.
+    """
+    start = after if last_event_id is None else last_event_id
+    events = _events(
+        service,
+        job.id,
+        after=start,
+        follow=follow,
+        limit=limit,
+        stopping=stopping,
+        poll_seconds=settings.api_event_poll_seconds,
+    )
+    async for event in events:
+        yield event
+
+
+async def _events(
+    service: JobService,
+    job_id: str,
+    *,
+    after: int | None,
+    follow: bool,
+    limit: int | None,
+    stopping: asyncio.Event,
+    poll_seconds: float,
+) -> AsyncGenerator[ServerSentEvent, None]:
+    """Poll the store: what is committed first, then the state if it is another.
+
+    Nothing is held between polls, neither a connection nor a transaction. Ends after a terminal
+    state, after `limit` iterations, with the server, or when caught up unless `follow`.
+    """
+    told: JobState | None = None
+    sent = 0
+    while not stopping.is_set():
+        try:
+            job, iterations = await run_sync(_news, service, job_id, after)
+        except StoreUnavailable:
+            # The database is away: what is committed will still be there when it is back.
+            await _pause(stopping, poll_seconds)
+            continue
+        for iteration in iterations:
+            after = iteration.index
+            view = IterationView.from_iteration(iteration)
+            yield ServerSentEvent(event="iteration", id=str(after), data=view)
+            sent += 1
+            if sent == limit:
+                return
+        if len(iterations) == _PAGE:
+            continue
+        if job.state is not told:
+            told = job.state
+            yield ServerSentEvent(event="state", data=StateView.from_job(job))
+        if job.state.terminal or not follow:
+            return
+        await _pause(stopping, poll_seconds)
+
+
+def _news(service: JobService, job_id: str, after: int | None) -> tuple[Job, tuple[Iteration, ...]]:
+    """The job, and up to a page of its iterations after one.
+
+    The job is read first: whatever it counts as committed is then found among the iterations, so
+    nothing is missing when a terminal state ends the stream.
+    """
+    job = service.job(job_id)
+    if job.progress.iterations <= (-1 if after is None else after) + 1:
+        return job, ()
+    return job, service.iterations(job_id, after=after, limit=_PAGE).items
+
+
+async def _pause(stopping: asyncio.Event, seconds: float) -> None:
+    """Until the next poll, or until the server stops."""
+    with anyio.move_on_after(seconds):
+        await stopping.wait()

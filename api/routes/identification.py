@@ -1,0 +1,78 @@
+"""Recorded walks, and which parameters fitted to them can be trusted."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Response, status
+
+from api.dependencies import ExistingJob, JobIdText, Service
+from api.documentation import problems
+from gaitswarm.views import PREFIX
+from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from sim.identification.recorded_walk import RecordedWalk
+
+router = APIRouter(prefix=PREFIX)
+
+
+@router.post(
+    "/recordings",
+    tags=["recordings"],
+    operation_id="add_recording",
+    summary="Keep a recorded walk",
+    status_code=status.HTTP_201_CREATED,
+    responses=problems(400, 413, 422),
+)
+def add_recording(walk: RecordedWalk, service: Service, response: Response) -> RecordingView:
+    """Motor currents of a measured walk, for jobs of kind `identification`.
+
+    The id is the content's hash: the same walk again is the same recording. `gaitswarm record`
+    makes one of a measured log.
+    """
+    recording_id = service.record(walk)
+    response.headers["Location"] = f"{PREFIX}/recordings/{recording_id}"
+    return RecordingView.from_walk(recording_id, walk)
+
+
+@router.get(
+    "/recordings/{recording_id}",
+    tags=["recordings"],
+    operation_id="get_recording",
+    summary="Look at a recorded walk",
+    responses=problems(404, 422),
+)
+def get_recording(
+    recording_id: Annotated[
+        str,
+        Path(pattern=r"^[0-9a-f]{32}$", description="Id, as POST /v1/recordings answered it."),
+    ],
+    service: Service,
+) -> RecordedWalk:
+    """The whole recording, as it was given."""
+    return service.recording(recording_id)
+
+
+@router.get(
+    "/jobs/{job_id}/parameters",
+    tags=["analysis"],
+    operation_id="get_parameters",
+    summary="See which parameters can be trusted",
+    responses=problems(404, 409, 422),
+)
+def get_parameters(
+    job: ExistingJob,
+    service: Service,
+    also: Annotated[
+        list[JobIdText] | None,
+        Query(max_length=31, description="Further runs of the same problem, of other seeds."),
+    ] = None,
+) -> IdentifiabilityView:
+    """The interval of every variable among designs within twelve thresholds of the best.
+
+    For jobs of kind `identification` above all. A single run always narrows down; only runs of
+    different seeds that narrow down to the same values show that a parameter can be trusted.
+    """
+    jobs = [job, *(service.job(other) for other in also or ())]
+    return IdentifiabilityView.from_identifiability(
+        [j.id for j in jobs], service.identifiability(jobs)
+    )

@@ -45,70 +45,75 @@ class Ranking:
 
 
 def rank(columns: EvaluationColumns, preference: Preference, *, top: int) -> Ranking:
-    """Judge all rows by a preference. top: how many designs to name."""
-    fitness = fitness_of(log_utilities(columns, preference))
-    now, before = _Order.of(fitness), _Order.of(columns.fitness)
+    """Judge all rows by another preference.
+
+    Args:
+        columns: evaluations of a job that tunes a drive, with fitness by the job's own preference.
+        preference: to judge by.
+        top: how many designs to name; fewer if fewer walk in every scenario.
+
+    Returns:
+        The ranking; the designs' order by the new preference beside that by the old.
+    """
+    fitness, before = fitness_of(log_utilities(columns, preference)), columns.fitness
+    present, ordered = _best_first(before, 1), np.sort(before)
     return Ranking(
-        top=_top(now, before, top),
-        present_best=float(fitness[before.best[0]]) if len(before.best) else None,
+        top=tuple(
+            RankedDesign(
+                row=row,
+                rank=place,
+                rank_before=_place(row, before, ordered),
+                fitness=float(fitness[row]),
+            )
+            for place, row in enumerate(_best_first(fitness, top).tolist(), start=1)
+        ),
+        present_best=float(fitness[present[0]]) if len(present) else None,
         best_so_far=best_so_far(columns.iteration, fitness),
-        correlation=_correlation(now, before),
+        correlation=_correlation(fitness, before),
     )
 
 
 def best_so_far(iteration: NDArray[np.int64], fitness: Floats) -> Floats:
-    """(r,) iterations in order and fitness -> (iterations,): least fitness until each."""
+    """The least fitness up to each iteration.
+
+    Args:
+        iteration: (r,) iteration of each row, ascending.
+        fitness: (r,) of each row, +inf for a design that failed.
+
+    Returns:
+        (iterations,), one for each different iteration; it never rises.
+    """
     if not len(iteration):
         return np.empty(0)
     starts = np.flatnonzero(np.diff(iteration, prepend=-1))
     return np.minimum.accumulate(np.minimum.reduceat(fitness, starts))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Order:
-    """Values (r,) and the rows of the finite ones, `best` first, the earliest of equals first."""
-
-    values: Floats
-    best: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, values: Floats) -> _Order:
-        ordered = np.argsort(values, kind="stable")
-        return cls(values, ordered[: int(np.isfinite(values).sum())])
-
-    def ranks(self) -> NDArray[np.int64]:
-        """(r,) from 1; 0 for a row without a rank."""
-        ranks = np.zeros(len(self.values), dtype=np.int64)
-        ranks[self.best] = np.arange(1, len(self.best) + 1)
-        return ranks
-
-    def shared_ranks(self, among: NDArray[np.bool_]) -> Floats:
-        """(r,) from 1 among some of the finite rows; equals share the mean of theirs."""
-        rows = self.best[among[self.best]]
-        values = self.values[rows]
-        starts = np.flatnonzero(np.diff(values, prepend=-np.inf))
-        counts = np.diff(starts, append=len(rows))
-        ranks = np.zeros(len(self.values))
-        ranks[rows] = np.repeat(starts + 0.5 * (counts + 1), counts)
-        return ranks
+def _best_first(fitness: Floats, most: int) -> NDArray[np.intp]:
+    """Rows of the least finite fitness (r,), the best first and the earliest of equals first."""
+    rows = np.flatnonzero(np.isfinite(fitness))
+    if len(rows) > most:
+        # To sort all of them would take longer than to judge them.
+        worst = np.partition(fitness[rows], most - 1)[most - 1]
+        rows = rows[fitness[rows] <= worst]
+    return rows[np.argsort(fitness[rows], kind="stable")][:most]
 
 
-def _top(now: _Order, before: _Order, count: int) -> tuple[RankedDesign, ...]:
-    old_ranks = before.ranks()
-    return tuple(
-        RankedDesign(
-            row=row,
-            rank=place,
-            rank_before=int(old_ranks[row]) or None,
-            fitness=float(now.values[row]),
-        )
-        for place, row in enumerate(now.best[:count].tolist(), start=1)
-    )
+def _place(row: int, fitness: Floats, ordered: Floats) -> int | None:
+    """Of a row among all of finite fitness (r,), from 1, the earliest of equals first."""
+    own = fitness[row]
+    if not np.isfinite(own):
+        return None
+    return int(np.searchsorted(ordered, own) + np.count_nonzero(fitness[:row] == own)) + 1
 
 
-def _correlation(now: _Order, before: _Order) -> float | None:
-    both = np.isfinite(now.values) & np.isfinite(before.values)
-    ranks = [order.shared_ranks(both)[both] for order in (now, before)]
-    a, b = (rank - 0.5 * (len(rank) + 1) for rank in ranks)
-    scale = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / scale if scale > 0.0 else None
+def _correlation(now: Floats, before: Floats) -> float | None:
+    """Spearman's, over the rows that are finite in both; None where it is undefined."""
+    # It takes most of a second to import, and few questions need it.
+    from scipy.stats import spearmanr  # noqa: PLC0415
+
+    both = np.isfinite(now) & np.isfinite(before)
+    pair = now[both], before[both]
+    if not len(pair[0]) or any(np.ptp(values) == 0.0 for values in pair):
+        return None
+    return float(spearmanr(*pair).statistic)

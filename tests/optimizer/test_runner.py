@@ -6,12 +6,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partialmethod
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from services.optimizer.errors import Conflict, EvaluatorUnavailable
+from services.optimizer.errors import Conflict, EvaluatorUnavailable, StoreUnavailable
 from services.optimizer.jobs.job import Command, CompletedIteration, Job, JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.coordinator import Backoff
@@ -171,6 +172,65 @@ def test_a_pause_need_not_wait_for_workers_out_of_reach(store: Store) -> None:
         target=lambda: (evaluator.entered.wait(), store.command(job_id, Command.PAUSE))
     ).start()
     assert run(store, evaluator, backoff=Backoff(first=60.0)).state is JobState.PAUSED
+
+
+class AbsentStore:
+    """`Store` whose writes are refused while `away` says so; counts the refusals."""
+
+    def __init__(self, store: Store, away: Callable[[], bool]) -> None:
+        self.store = store
+        self.away = away
+        self.refused: list[str] = []
+        self.refusal = threading.Event()
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.store, name)
+
+    def _ask(self, name: str, *given: object, **options: object) -> object:
+        if self.away():
+            self.refused.append(name)
+            self.refusal.set()
+            raise StoreUnavailable("the server is being restarted")
+        return getattr(self.store, name)(*given, **options)
+
+    begin = partialmethod(_ask, "begin")
+    commit = partialmethod(_ask, "commit")
+    renew = partialmethod(_ask, "renew")
+    release = partialmethod(_ask, "release")
+
+
+def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(store: Store) -> None:
+    whole = queue(store)
+    run(store, FormulaEvaluator())
+    job_id = queue(store)
+    evaluator = FormulaEvaluator()
+    absent = AbsentStore(store, lambda: evaluator.calls == 3 and absent.refused.count("commit") < 3)
+    job = run(absent, evaluator, lease_seconds=60.0)
+    assert job.state is JobState.SUCCEEDED
+    assert absent.refused.count("commit") == 3
+    assert evaluator.calls == SPEC.iterations
+    assert history(store, job_id) == history(store, whole)
+
+
+def test_a_store_that_stays_away_is_waited_for_no_longer_than_the_lease(store: Store) -> None:
+    queue(store)
+    evaluator = FormulaEvaluator()
+    absent = AbsentStore(store, lambda: evaluator.calls > 0)
+    job = run(absent, evaluator, lease_seconds=0.3)
+    assert evaluator.calls == 1
+    assert (job.state, job.progress.iterations) == (JobState.RUNNING, 0)
+    assert store.claim("another", lease_seconds=60.0) is not None
+
+
+def test_a_process_that_is_to_end_does_not_wait_for_a_store_that_is_away(store: Store) -> None:
+    queue(store)
+    evaluator = FormulaEvaluator()
+    absent = AbsentStore(store, lambda: evaluator.calls > 0)
+    stop = threading.Event()
+    threading.Thread(target=lambda: (absent.refusal.wait(), stop.set())).start()
+    begun = time.monotonic()
+    assert run(absent, evaluator, stop, lease_seconds=600.0).progress.iterations == 0
+    assert time.monotonic() - begun < 2.0
 
 
 def test_a_simulation_error_fails_the_job_with_its_reason(store: Store) -> None:

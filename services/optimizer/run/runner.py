@@ -12,10 +12,10 @@ import socket
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, TypeVar
 
 from services.optimizer.errors import (
     BudgetChanged,
@@ -58,6 +58,14 @@ OnRetry = Callable[[float, str], None]
 _GLANCE: Final = 0.1
 """Seconds between looks at what has changed, while waiting."""
 
+_STORE_PAUSE: Final = 5.0
+"""Seconds until a store that did not answer is asked again."""
+
+_FIRST_STORE_PAUSE: Final = 0.1
+"""The first of several pauses, each twice as long, while an iteration waits to be stored."""
+
+T = TypeVar("T")
+
 _log = logging.getLogger(__name__)
 
 
@@ -85,8 +93,10 @@ def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None =
 
     stop: when set, work under way is dropped and the job is given back to the queue. So it is
         when `on_commit` raises, which is passed on.
-    Raises StoreUnavailable if nothing can be stored; the job then stays as last committed, and
-    is taken up again when its lease has run out.
+    A store that does not answer is tried again as long as the lease can be held.
+
+    Raises StoreUnavailable if it still does not; the job then stays as last committed, and is taken
+    up again when its lease has run out.
     """
     heartbeat = Heartbeat(
         around.store, claim, lease_seconds=around.lease_seconds, clock=around.clock
@@ -134,7 +144,8 @@ class _Run:
         except LeaseLost:
             return LeaseWasLost()
         except BudgetChanged:
-            self.claim = replace(self.claim, job=self.around.store.job(self.claim.job.id))
+            job = self._stored(lambda: self.around.store.job(self.claim.job.id))
+            self.claim = replace(self.claim, job=job)
             return Extended(self.claim.job)
         except EvaluationStopped:
             return LeaseWasLost() if self.heartbeat.lost else StopRequested()
@@ -145,19 +156,19 @@ class _Run:
     def _do(self, action: Action) -> Event | None:
         match action:
             case Begin(ask=ask):
-                self.around.store.begin(self.claim, ask)
+                self._stored(lambda: self.around.store.begin(self.claim, ask))
                 return None
             case Evaluate(request=request):
                 return self._evaluate(request)
             case Commit(done=done, following=following):
-                state = self.around.store.commit(self.claim, done, following)
+                state = self._stored(lambda: self.around.store.commit(self.claim, done, following))
                 if self.around.on_commit is not None:
                     self.around.on_commit(done, state)
                 return Committed(state)
             case Wait(seconds=seconds, reason=reason):
                 return self._wait(seconds, reason)
             case Release(state=state, error=error):
-                self.around.store.release(self.claim, state, error=error)
+                self._stored(lambda: self.around.store.release(self.claim, state, error=error))
                 return LeaseWasLost()
 
     def _evaluate(self, request: EvaluationRequest) -> Event:
@@ -181,23 +192,40 @@ class _Run:
         )
         if self.around.on_retry is not None:
             self.around.on_retry(seconds, reason)
+        for _ in self._glances(seconds):
+            if self.heartbeat.state is JobState.PAUSING:
+                return PauseSeen()
+        return Waited()
+
+    def _stored(self, access: Callable[[], T]) -> T:
+        """What the store answers, however long it takes: an evaluated iteration is expensive.
+
+        Raises EvaluationStopped when the process is to end, or the lease cannot be held any longer.
+        """
+        seconds = _FIRST_STORE_PAUSE
+        while True:
+            try:
+                return access()
+            except StoreUnavailable as error:
+                _log.warning("job %s: again in %.1f s: %s", self.claim.job.id, seconds, error)
+            for _ in self._glances(seconds):
+                pass
+            seconds = min(2.0 * seconds, _STORE_PAUSE)
+
+    def _glances(self, seconds: float) -> Iterator[None]:
+        """Moments at which to look at what has changed, while so many seconds pass.
+
+        Raises EvaluationStopped if what has changed is that nothing more is to be done.
+        """
         until = self.around.clock() + seconds
         while (left := until - self.around.clock()) > 0.0:
             if self._should_stop():
                 raise EvaluationStopped
-            if self.heartbeat.state is JobState.PAUSING:
-                return PauseSeen()
+            yield
             self.around.sleep(min(left, _GLANCE))
-        return Waited()
 
     def _should_stop(self) -> bool:
         return self.stop.is_set() or self.heartbeat.lost
-
-
-_STORE_PAUSE: Final = 5.0
-"""Seconds until a store that did not answer is asked again."""
-
-_log = logging.getLogger(__name__)
 
 
 class Runner:

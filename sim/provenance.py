@@ -1,0 +1,158 @@
+"""Provenance: what the outcome of a case depends on, beside the case itself and its designs.
+
+A job keeps the provenance of its numbers, and every task answers with that of the process that ran
+it, so that a robot file, code or a compiler that changed meanwhile is noticed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from sim.compiler.compilation import find_compiler
+from sim.kernel.native import native_kernel
+from sim.robot import RobotSource, load_robot
+
+_ROOT: Final = Path(__file__).parent
+
+_SUFFIXES: Final = (".py", ".c", ".h")
+
+_NOT_IN_A_CASE: Final = (
+    "benchmark.py",
+    "provenance.py",
+    "replay.py",
+    "robot/shapes.py",
+    "studies",
+    "validation",
+)
+"""Modules and packages of `sim` that no case runs through."""
+
+_LIBRARIES: Final = ("casadi", "numpy", "pin")
+"""Distributions that compute: of the kernel's source, of trajectories and of controllers."""
+
+_DIGITS: Final = 32
+
+
+class Provenance(BaseModel):
+    """What the outcome of a robot's cases depends on. Equal ones may be mixed, others not."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    robot: str = Field(description="Name that the robot's file gives it.", examples=["szabadka2"])
+    robot_digest: str = Field(
+        description="Digest of the robot's parameters, as they were resolved, and of its URDF.",
+        examples=["6a09e667f3bcc908b2fb1366ea957d3e"],
+    )
+    code_digest: str = Field(
+        description="Digest of the simulator's source files, comments included.",
+        examples=["bb67ae8584caa73b5be0cd19137e2179"],
+    )
+    libraries: dict[str, str] = Field(
+        description="Versions of the libraries that it computes with.",
+        examples=[{"casadi": "3.8.2", "numpy": "2.4.6", "pin": "4.1.0"}],
+    )
+    backend: Literal["native", "reference"] = Field(
+        description="The compiled kernel (native), or the interpreter without a C compiler.",
+        examples=["native"],
+    )
+    precision: str = Field(
+        default="double", description="Of the physics' numbers.", examples=["double"]
+    )
+
+    def changes(self, now: Provenance) -> tuple[str, ...]:
+        """What is different now, in words for people.
+
+        Args:
+            now: the provenance that is compared with this earlier one.
+
+        Returns:
+            One phrase for every field that differs; none if the two are equal.
+        """
+        found: list[str] = []
+        if now.robot != self.robot:
+            found.append(f"the robot {now.robot} instead of {self.robot}")
+        elif now.robot_digest != self.robot_digest:
+            found.append(f"the robot {self.robot} has other contents")
+        if now.code_digest != self.code_digest:
+            found.append("other simulation code")
+        for name in sorted(self.libraries.keys() | now.libraries.keys()):
+            before, after = self.libraries.get(name, "none"), now.libraries.get(name, "none")
+            if before != after:
+                found.append(f"{name} {after} instead of {before}")
+        if now.backend != self.backend:
+            cause = "no C compiler: " if now.backend == "reference" else ""
+            found.append(f"{cause}backend {now.backend} instead of {self.backend}")
+        if now.precision != self.precision:
+            found.append(f"precision {now.precision} instead of {self.precision}")
+        return tuple(found)
+
+
+@lru_cache(maxsize=32)
+def provenance_of(robot: RobotSource) -> Provenance:
+    """The provenance of what this process computes of a robot; nothing is compiled for it.
+
+    Args:
+        robot: the robot as cases name it. It is looked at once: later calls give the same answer.
+
+    Returns:
+        The provenance of its cases in this process.
+
+    Raises:
+        SimulationInputError: the robot's description cannot be used.
+    """
+    machine = load_robot(robot)
+    content = machine.description.model_dump_json() + machine.urdf
+    # With a compiler, a kernel is compiled or an error is raised: never replaced by the reference.
+    native = find_compiler() is not None or native_kernel(machine) is not None
+    return Provenance(
+        robot=machine.description.name,
+        robot_digest=hashlib.sha256(content.encode()).hexdigest()[:_DIGITS],
+        code_digest=simulator_digest(),
+        libraries={name: metadata.version(name) for name in _LIBRARIES},
+        backend="native" if native else "reference",
+    )
+
+
+def simulator_files() -> tuple[Path, ...]:
+    """The source files of `sim` that a case may run through, in order."""
+    left_out = [_ROOT / name for name in _NOT_IN_A_CASE]
+    return tuple(
+        sorted(
+            file
+            for file in _ROOT.rglob("*")
+            if file.suffix in _SUFFIXES and not {file, *file.parents} & set(left_out)
+        )
+    )
+
+
+def source_digest(root: Path, files: Iterable[Path]) -> str:
+    """Digest of source files.
+
+    Args:
+        root: folder that the files lie under; only their places below it count.
+        files: the files, in the order in which they enter.
+
+    Returns:
+        Hexadecimal digits that change with any name or byte of them.
+    """
+    digest = hashlib.sha256()
+    for file in files:
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(root).as_posix()}\0{len(content)}\0".encode())
+        digest.update(content)
+    return digest.hexdigest()[:_DIGITS]
+
+
+@lru_cache(maxsize=1)
+def simulator_digest() -> str:
+    """Digest of the source files of `sim`, as they are when it is called first.
+
+    A process that lives long calls it early, while they are still those that it has imported.
+    """
+    return source_digest(_ROOT, simulator_files())

@@ -1,0 +1,112 @@
+"""What the results of a case depend on, as its digests tell it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from sim.provenance import Provenance, provenance_of, simulator_files, source_digest
+from sim.robot import RobotFiles, RobotVariant
+
+ROOT = Path(__file__).resolve().parents[2]
+
+PROGRAM = """
+import json, sys
+import numpy as np
+from sim.case import Walk
+from sim.identification.current_fit import CurrentFit
+from sim.provenance import provenance_of
+from sim.scenario import Scenario
+from sim.simulate import prepare
+
+short = Scenario(name="short", cycle_time=0.6, radius=0.16, hip_height=0.15, cycles=1)
+Walk("szabadka2", "pi", short, ("P", "I")).run(np.array([[0.3, 0.1]]))
+prepare(backend="reference")
+from sim.kernel import emit_c
+files = [m.__file__ for name, m in sys.modules.items() if name.startswith("sim.")]
+print(json.dumps([provenance_of("szabadka2").model_dump(), files]))
+"""
+
+
+def robot_file(name: str) -> str:
+    return (resources.files("sim.robot") / "szabadka2" / name).read_text(encoding="utf-8")
+
+
+SHIPPED = RobotFiles(toml=robot_file("robot.toml"), urdf=robot_file("robot.urdf"))
+
+
+@pytest.mark.slow
+def test_all_modules_that_a_case_runs_through_are_in_the_digest_which_any_process_finds() -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", PROGRAM],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found, loaded = json.loads(done.stdout)
+    assert Provenance(**found) == provenance_of("szabadka2")
+    covered = set(simulator_files())
+    assert {Path(file) for file in loaded} - covered == {ROOT / "sim" / "provenance.py"}
+    for source in ("kernel/driver.c", "controllers/inference.c", "compiler/vec.h"):
+        assert ROOT / "sim" / source in covered
+
+
+def test_a_robot_is_known_by_its_content_and_not_by_how_it_is_named() -> None:
+    shipped = provenance_of("szabadka2")
+    assert provenance_of(RobotVariant()) == provenance_of(SHIPPED) == shipped
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        RobotVariant(contact_law="stick"),
+        RobotVariant(backlash=(2.5, 1.0, 1.0)),
+        RobotFiles(
+            toml=SHIPPED.toml.replace("\nfriction = 1.0", "\nfriction = 0.9"), urdf=SHIPPED.urdf
+        ),
+        RobotFiles(
+            toml=SHIPPED.toml, urdf=SHIPPED.urdf.replace('<mass value="3', '<mass value="4', 1)
+        ),
+    ],
+    ids=["contact law", "backlash", "a parameter", "a mass of the URDF"],
+)
+def test_another_content_is_another_robot(robot: RobotVariant | RobotFiles) -> None:
+    changes = provenance_of("szabadka2").changes(provenance_of(robot))
+    assert changes == ("the robot szabadka2 has other contents",)
+
+
+def test_any_byte_and_any_name_of_a_source_file_counts(tmp_path: Path) -> None:
+    def digest(**files: str) -> str:
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        return source_digest(folder, sorted(folder.iterdir()))
+
+    seen = [
+        digest(a="x = 1", b="y"),
+        digest(a="x = 2", b="y"),
+        digest(a="x = 1  # why", b="y"),
+        digest(a="x = 1", c="y"),
+        digest(a="x = 1y", b=""),
+        digest(a="x = 1"),
+    ]
+    assert len(set(seen)) == len(seen)
+    assert digest(a="x = 1", b="y") == seen[0]
+
+
+def test_source_files_are_read_once_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = provenance_of("szabadka2").code_digest
+
+    def read(self: Path) -> bytes:
+        raise AssertionError(f"{self} was read again")
+
+    monkeypatch.setattr(Path, "read_bytes", read)
+    robot = RobotVariant(contact_law="karnopp", backlash=(1.0, 1.0, 1.0))
+    assert provenance_of(robot).code_digest == known

@@ -25,17 +25,22 @@ _TAKEN_UP = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 """States in which going on with a job needs the command to."""
 
 
-def resumed_job(service: JobService, job_id: str, asked: Spec | None) -> Job:
+def resumed_job(
+    service: JobService, job_id: str, asked: Spec | None, *, accept_changes: bool
+) -> Job:
     """An earlier job, ready to be run on.
 
     asked: the spec that the user gave once more, if any. Raises NotFound, and Conflict if the job
-    was cancelled or is another than asked.
+    was cancelled, is another than asked, or would go on with something else than it was begun with
+    and that is not accepted.
     """
     job = service.job(job_id)
     if asked is not None:
         _check_same(job, asked)
     if job.state is JobState.CANCELLED:
         raise Conflict(f"job {job_id} was cancelled, which is for good; start a new one")
+    if job.state is not JobState.SUCCEEDED and not accept_changes:
+        service.check_unchanged(job)
     return service.command(job_id, Command.RESUME) if job.state in _TAKEN_UP else job
 
 
@@ -51,11 +56,15 @@ def _check_same(job: Job, asked: Spec) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Embedded:
-    """Workers that a process runs its own job on."""
+    """Workers that a process runs its own job on.
+
+    accepts_changes: whether a job goes on although what its numbers depend on has changed.
+    """
 
     kind: EvaluatorKind
     ray_address: str | None = None
     cpus: int | None = None
+    accepts_changes: bool = False
 
     def run(self, store: Store, job: Job) -> bool:
         """Until the job ends, or a signal comes: true if one did."""
@@ -93,6 +102,7 @@ class Embedded:
                     ),
                     on_wait=lambda why: progress.remark(f"{why}; waiting for it"),
                     stop=stop,
+                    accepts_changes=self.accepts_changes,
                 )
             finally:
                 evaluator.close()

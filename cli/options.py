@@ -63,6 +63,14 @@ Db = Annotated[
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
+AcceptChanges = Annotated[
+    bool,
+    typer.Option(
+        "--accept-changes",
+        help="Go on although code, robot or compiler have changed; the job records it.",
+    ),
+]
+
 EvaluatorOption = Annotated[
     str | None,
     typer.Option(

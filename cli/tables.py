@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         RankingView,
         ScenarioResultView,
     )
+    from services.optimizer.jobs.provenance import JobProvenance
     from services.optimizer.jobs.spec import Spec
     from sim.outcome import Objective
 
@@ -162,6 +163,9 @@ def print_job(job: JobView) -> None:
         "time left": None if job.eta_seconds is None else duration(job.eta_seconds),
         "best fitness": number(job.best_fitness),
     }
+    for record in job.provenance:
+        since = f" from iteration {record.from_iteration}" if record.from_iteration else ""
+        rows[f"computed by{since}"] = provenance_line(record.provenance)
     table = Table(box=None, show_header=False)
     for name, value in rows.items():
         if value is not None:
@@ -170,6 +174,16 @@ def print_job(job: JobView) -> None:
     if job.best is not None:
         console.print(design_table(job.spec, {"best": job.best.design}))
         console.print(results_table({"best": job.best.scenarios}, job.objectives))
+
+
+def provenance_line(provenance: JobProvenance) -> str:
+    """What numbers depend on, digests shortened to what tells them apart."""
+    simulation = provenance.simulation
+    return (
+        f"gaitswarm {provenance.gaitswarm}, {simulation.backend} backend, code"
+        f" {simulation.code_digest[:8]} and {provenance.optimizer_digest[:8]}, robot"
+        f" {simulation.robot} {simulation.robot_digest[:8]}"
+    )
 
 
 def number(value: float | None) -> str:

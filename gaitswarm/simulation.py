@@ -28,6 +28,7 @@ from sim.case import Walk
 from sim.controllers import ControllerName
 from sim.kernel.observation import WalkLog
 from sim.outcome import Outcome, Status
+from sim.provenance import provenance_of
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate as simulate_walk
 
@@ -234,7 +235,8 @@ def _in_parallel(
     """One outcome for every scenario, computed by threads of this process."""
     cases = tuple(Walk(request.robot, request.controller, s, variables) for s in scenarios)
     with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
-        return evaluator.evaluate(EvaluationRequest("", cases, designs), lambda: False)
+        asked = EvaluationRequest("", cases, designs, provenance_of(request.robot))
+        return evaluator.evaluate(asked, lambda: False)
 
 
 def _finite(values: Floats) -> Floats:

@@ -116,12 +116,14 @@ def run_embedded(
     on_wait: Callable[[str], None] | None = None,
     stop: threading.Event | None = None,
     backoff: Backoff | None = None,
+    accepts_changes: bool = False,
 ) -> Job:
     """Run one job here and now, until it ends or is paused; the job as it is then.
 
     A job that a killed process held is taken over when its lease has run out. on_wait: called
     once, with the reason, if that must be waited for. stop: when set, the job goes back to the
-    queue and the function returns; see `stop_on_signals`.
+    queue and the function returns; see `stop_on_signals`. accepts_changes: go on although what its
+    numbers depend on has changed, and record it; the job fails otherwise.
     Raises NotFound, and Conflict if the job cannot be run or another process is running it.
     """
     stop = stop or threading.Event()
@@ -135,6 +137,7 @@ def run_embedded(
         backoff=backoff or Backoff(),
         on_commit=on_commit,
         on_retry=on_retry,
+        accepts_changes=accepts_changes,
     )
     return run_claim(claim, around, stop)
 

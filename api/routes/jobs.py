@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
+from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
 from api.dependencies import JobId, Service, Slots
 from api.documentation import problems
@@ -16,6 +16,7 @@ from gaitswarm.views import (
     JobSummaryView,
     JobView,
     PageView,
+    ResumeRequest,
 )
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
@@ -147,14 +148,20 @@ def pause_job(job_id: JobId, service: Service) -> JobView:
     operation_id="resume_job",
     summary="Resume a job",
     status_code=status.HTTP_202_ACCEPTED,
-    responses=problems(404, 409, 422),
+    responses=problems(400, 404, 409, 413, 422),
 )
-def resume_job(job_id: JobId, service: Service) -> JobView:
+def resume_job(
+    job_id: JobId, service: Service, resumption: Annotated[ResumeRequest | None, Body()] = None
+) -> JobView:
     """Queue a paused or failed job again; it goes on bit for bit as if it had never stopped.
 
-    409 if it is queued or running already, or has ended.
+    Whoever takes it up compares what its numbers depend on with what is there now: other code,
+    another robot file or another backend fail the job, which then says what has changed. A body
+    `{"accept_changes": true}` lets it go on all the same. 409 if it is queued or running already,
+    or has ended.
     """
-    return _in_full(service, service.command(job_id, Command.RESUME))
+    accept = resumption is not None and resumption.accept_changes
+    return _in_full(service, service.command(job_id, Command.RESUME, accept_changes=accept))
 
 
 @router.post(

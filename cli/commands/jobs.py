@@ -8,6 +8,7 @@ from typing import Annotated, TypeVar
 import typer
 
 from cli.options import (
+    AcceptChanges,
     ControllerOption,
     Db,
     Iterations,
@@ -140,9 +141,15 @@ def pause(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = F
     _command("pause", job_id, server, db, as_json=as_json)
 
 
-def resume(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+def resume(
+    job_id: JobId,
+    accept_changes: AcceptChanges = False,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
     """Queue a paused or failed job again; a running server goes on with it."""
-    _command("resume", job_id, server, db, as_json=as_json)
+    _command("resume", job_id, server, db, as_json=as_json, accept_changes=accept_changes)
 
 
 def extend(
@@ -185,14 +192,20 @@ def _one_of(kind: type[S], text: str, option: str) -> S:
 
 
 def _command(
-    command: str, job_id: str, server: str | None, db: str | None, *, as_json: bool
+    command: str,
+    job_id: str,
+    server: str | None,
+    db: str | None,
+    *,
+    as_json: bool,
+    accept_changes: bool = False,
 ) -> None:
     from cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.jobs.job import Command
 
     with open_jobs(server, db) as jobs:
-        job = jobs.command(job_id, Command(command))
+        job = jobs.command(job_id, Command(command), accept_changes=accept_changes)
     if as_json:
         print_json(job)
     else:

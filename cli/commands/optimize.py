@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from cli.options import (
+    AcceptChanges,
     ControllerOption,
     Cpus,
     Db,
@@ -46,6 +47,7 @@ def optimize(
             help="Go on with this job, to the same bits as if it had never stopped.",
         ),
     ] = None,
+    accept_changes: AcceptChanges = False,
     compare_published: Annotated[
         bool,
         typer.Option(
@@ -73,8 +75,10 @@ def optimize(
 
     if as_json and compare_published:
         raise InvalidRequest("is for people; leave it out with --json", field="compare-published")
+    if accept_changes and resume is None:
+        raise InvalidRequest("a new job has nothing to go on from", field="accept-changes")
     settings = read_settings(db=db, evaluator=evaluator, ray_address=ray_address, cpus=cpus)
-    workers = Embedded(settings.evaluator, settings.ray_address, settings.cpus)
+    workers = Embedded(settings.evaluator, settings.ray_address, settings.cpus, accept_changes)
     overrides = Overrides(
         iterations, particles, seed, preference, scenarios, controller, name, robot
     )
@@ -88,7 +92,7 @@ def optimize(
         if asked is not None and resume is None:
             job, _ = service.submit(asked)
         else:
-            job = resumed_job(service, resume or "", asked)
+            job = resumed_job(service, resume or "", asked, accept_changes=accept_changes)
         note(f"job {job.id} in database {url}")
         interrupted = workers.run(store, job)
         finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published)

@@ -56,9 +56,9 @@ class LocalJobs:
         """See `Jobs.job`."""
         return self._in_full(self._service.job(job_id))
 
-    def command(self, job_id: str, command: Command) -> JobView:
+    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> JobView:
         """See `Jobs.command`."""
-        return self._in_full(self._service.command(job_id, command))
+        return self._in_full(self._service.command(job_id, command, accept_changes=accept_changes))
 
     def extend(self, job_id: str, iterations: int) -> JobView:
         """See `Jobs.extend`."""

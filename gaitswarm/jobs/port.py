@@ -52,8 +52,18 @@ class Jobs(Protocol):
     def job(self, job_id: str) -> JobView:
         """One job in full."""
 
-    def command(self, job_id: str, command: Command) -> JobView:
-        """Pause, resume or cancel. Raises Conflict."""
+    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> JobView:
+        """Pause, resume or cancel. Raises Conflict.
+
+        Args:
+            job_id: id of the job.
+            command: what to do with it.
+            accept_changes: for a job that is resumed, whether it goes on although what its numbers
+                depend on (code, robot, compiler) has changed; that is then recorded with it.
+
+        Returns:
+            The job as it is then.
+        """
 
     def extend(self, job_id: str, iterations: int) -> JobView:
         """Give a job a budget of `iterations` in all. Raises Conflict, InvalidRequest."""

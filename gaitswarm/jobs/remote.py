@@ -90,9 +90,11 @@ class RemoteJobs:
         """See `Jobs.job`."""
         return self._ask(JobView, "GET", f"/jobs/{_path(job_id)}")
 
-    def command(self, job_id: str, command: Command) -> JobView:
+    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> JobView:
         """See `Jobs.command`."""
-        return self._ask(JobView, "POST", f"/jobs/{_path(job_id)}/{command.value}")
+        path = f"/jobs/{_path(job_id)}/{command.value}"
+        body = {"json": {"accept_changes": True}} if accept_changes else {}
+        return self._ask(JobView, "POST", path, **body)
 
     def extend(self, job_id: str, iterations: int) -> JobView:
         """See `Jobs.extend`."""

@@ -38,6 +38,7 @@ from gaitswarm.views.job import (
     JobSummaryView,
     JobView,
     PageView,
+    ResumeRequest,
     StateView,
 )
 from gaitswarm.views.particles import ParticlesHeaderView, encoded_particles
@@ -67,6 +68,7 @@ __all__ = [
     "RankedDesignView",
     "RankingRequest",
     "RankingView",
+    "ResumeRequest",
     "ScenarioResultView",
     "ScenarioView",
     "SimulatedScenarioView",

@@ -20,6 +20,7 @@ from services.optimizer.jobs.job import (
     JobState,
     time_left,
 )
+from services.optimizer.jobs.provenance import ProvenanceRecord
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
 
@@ -137,6 +138,12 @@ class JobView(JobSummaryView):
     spec: AnySpec = Field(
         description="What was asked, with every preset written out as it was on submission."
     )
+    provenance: list[ProvenanceRecord] = Field(
+        description="What its numbers depend on beside the spec: code, libraries, content of the"
+        " robot, backend. One entry since submission, and one for every change that was accepted,"
+        " the last of an iteration counting; empty for a job that was stored before this was"
+        " recorded."
+    )
 
     @classmethod
     def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
@@ -144,7 +151,13 @@ class JobView(JobSummaryView):
         view = None if best is None else BestView.from_evaluation(best, job.spec)
         objectives = [ObjectiveView.from_objective(o) for o in job.spec.objectives]
         return cls.model_validate(
-            {**_summary(job), "best": view, "objectives": objectives, "spec": job.spec}
+            {
+                **_summary(job),
+                "best": view,
+                "objectives": objectives,
+                "spec": job.spec,
+                "provenance": job.provenance,
+            }
         )
 
 
@@ -158,6 +171,19 @@ class ExtensionRequest(BaseModel):
         le=LARGEST_BUDGET,
         description="Iterations in all, more than the job has committed [1].",
         examples=[50],
+    )
+
+
+class ResumeRequest(BaseModel):
+    """How a job goes on."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    accept_changes: bool = Field(
+        default=False,
+        description="Whether it goes on although what its numbers depend on has changed, which is"
+        " then recorded in its `provenance`. Otherwise such a job fails and says what has changed.",
+        examples=[True],
     )
 
 

@@ -5,6 +5,7 @@ GaitswarmError
 ├── NotFound                no job or iteration of that id (HTTP 404)
 ├── Conflict                not possible in the job's present state (HTTP 409)
 │   ├── BudgetChanged       the job was extended since it was claimed
+│   ├── ProvenanceChanged   its numbers would depend on something else than those it has
 │   └── IdempotencyConflict the key was used before with another body
 ├── LeaseLost               another runner, or a cancellation, has taken the job
 └── Unavailable             not possible now, whatever was asked; try again later (HTTP 503)
@@ -40,6 +41,10 @@ class Conflict(GaitswarmError):
 
 class BudgetChanged(Conflict):
     """The job was extended since it was claimed: what follows is to be asked anew."""
+
+
+class ProvenanceChanged(Conflict):
+    """The job's next numbers would depend on something else than those that it has."""
 
 
 class IdempotencyConflict(Conflict):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any, Final
@@ -11,12 +11,21 @@ from services.optimizer.analysis.distribution import Distribution, distribution
 from services.optimizer.analysis.history_cache import HistoryCache
 from services.optimizer.analysis.identifiability import Identifiability, identifiability
 from services.optimizer.analysis.ranking import Ranking, rank
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
-from services.optimizer.jobs.job import Command, Evaluation, Iteration, Job, JobOrder, JobState
+from services.optimizer.jobs.job import (
+    Command,
+    Evaluation,
+    Iteration,
+    Job,
+    JobOrder,
+    JobState,
+    refusal,
+)
 from services.optimizer.jobs.preference import Preference
+from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
@@ -49,9 +58,13 @@ class RankedJob:
 
 @dataclass(frozen=True, slots=True)
 class JobService:
-    """Jobs as their users see them. Thread-safe, as the store is."""
+    """Jobs as their users see them. Thread-safe, as the store is.
+
+    provenance: of what is computed from here for a spec.
+    """
 
     store: Store
+    provenance: Callable[[Spec], JobProvenance] = job_provenance
     _histories: HistoryCache = field(init=False, repr=False, compare=False)
     _rates: MeasuredRates = field(init=False, repr=False, compare=False)
 
@@ -63,6 +76,8 @@ class JobService:
         self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
     ) -> tuple[Job, bool]:
         """Check that the job can be simulated and queue it.
+
+        Its numbers are to depend on what they would depend on if they were computed here.
 
         Args:
             spec: What the job is to do.
@@ -78,7 +93,12 @@ class JobService:
             IdempotencyConflict: The key was used before, for another job.
         """
         self._check(spec)
-        return self.store.create_job(spec, idempotency_key=idempotency_key, request=request)
+        return self.store.create_job(
+            spec,
+            provenance=self.provenance(spec),
+            idempotency_key=idempotency_key,
+            request=request,
+        )
 
     def record(self, walk: RecordedWalk) -> str:
         """Keep a recorded walk, to which jobs can fit; its id."""
@@ -113,9 +133,27 @@ class JobService:
         """See `Store.jobs`."""
         return self.store.jobs(state=state, search=search, order=order, after=after, limit=limit)
 
-    def command(self, job_id: str, command: Command) -> Job:
-        """Pause, resume or cancel. Raises NotFound, Conflict."""
-        return self.store.command(job_id, command)
+    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
+        """Pause, resume or cancel. Raises NotFound, Conflict.
+
+        Args:
+            job_id: id of the job.
+            command: what to do with it.
+            accept_changes: for a job that is resumed, whether whoever takes it up may go on
+                although what its numbers depend on has changed.
+
+        Returns:
+            The job as it is then.
+        """
+        return self.store.command(job_id, command, accept_changes=accept_changes)
+
+    def check_unchanged(self, job: Job) -> None:
+        """Raise ProvenanceChanged for a job whose next numbers, computed here, would not depend on
+        what those that it has depend on.
+        """
+        refused = refusal(job, self.provenance(job.spec))
+        if refused is not None:
+            raise ProvenanceChanged(f"job {job.id} cannot go on: {refused}")
 
     def extend(self, job_id: str, iterations: int) -> Job:
         """Give a job another budget, of `iterations` in all. Raises NotFound, Conflict,

@@ -9,11 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from services.worker.fair_queue import FairQueue
-from services.worker.tasks import Chunk, Task, cut
+from services.worker.tasks import Answer, Chunk, Task, cut
 from sim.outcome import Outcome
+from sim.provenance import Provenance
 
 _GLANCE: Final = 0.1
 """Seconds between looks at `should_stop`."""
@@ -60,6 +61,7 @@ class Work:
         return Task(
             case=request.cases[chunk.case],
             designs=np.ascontiguousarray(request.designs[chunk.start : chunk.stop]),
+            provenance=request.provenance,
         )
 
 
@@ -106,11 +108,23 @@ class Dispatcher:
             self._changed.wait_for(lambda: bool(self._queue) or self.closed, timeout)
             return None if self.closed else self._queue.pop()
 
-    def complete(self, work: Work, outcome: Outcome) -> None:
-        """The chunk has its result; a second one of the same chunk is the same and ignored."""
+    def complete(self, work: Work, answer: Answer | Outcome) -> None:
+        """The chunk has its result; a second one of the same chunk is the same and ignored.
+
+        answer: as the worker gave it. The whole request fails with ProvenanceChanged if it is not
+            of the provenance that the request expects.
+        """
         chunk, batch = work.chunk, work.batch
+        expected = batch.request.provenance
+        # A worker of an earlier version answers with the bare outcome.
+        outcome = (
+            answer.outcome if isinstance(answer, Answer) and answer.provenance == expected else None
+        )
         with self._changed:
             if not batch.awaits(chunk):
+                return
+            if outcome is None:
+                self._end(batch, _unlike(expected, answer))
                 return
             into = batch.outcomes[chunk.case]
             wanted = (chunk.stop - chunk.start, into.objectives.shape[1])
@@ -181,4 +195,15 @@ def _misshapen(outcome: Outcome, wanted: tuple[int, int]) -> RuntimeError:
     return RuntimeError(
         f"a worker sent objectives of shape {outcome.objectives.shape} for a chunk of {wanted};"
         " it runs other code than this process"
+    )
+
+
+def _unlike(expected: Provenance, answer: Answer | Outcome) -> ProvenanceChanged:
+    worker, why = "a worker", "its gaitswarm does not say what it computes"
+    if isinstance(answer, Answer):
+        worker += f" on {answer.host}"
+        why = "; ".join(expected.changes(answer.provenance))
+    return ProvenanceChanged(
+        f"{worker} does not compute what this job's numbers depend on: {why}. Its walks were not"
+        " used; give all workers the same gaitswarm and a C compiler, and resume the job"
     )

@@ -55,8 +55,8 @@ class InProcessEvaluator:
             if work is None:
                 continue
             try:
-                outcome = work.task.run()
+                answer = work.task.run()
             except Exception as error:  # noqa: BLE001 - it is the caller's, in another thread
                 self._dispatcher.fail(work, error)
             else:
-                self._dispatcher.complete(work, outcome)
+                self._dispatcher.complete(work, answer)

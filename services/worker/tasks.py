@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import pickle
+import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from sim.case import Case
 from sim.errors import SimulationError
 from sim.outcome import Outcome
+from sim.provenance import Provenance, provenance_of, simulator_digest
 
 _TASKS_PER_SLOT: Final = 3
 """Enough for the last tasks to end at about the same time, few enough to keep each long."""
@@ -65,14 +67,30 @@ def cut(durations: Sequence[float], designs: int, *, slots: int, lanes: int) -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """Some designs in one case. designs: (n, v)."""
+    """Some designs in one case. designs: (n, v). provenance: what the outcome is to have."""
 
     case: Case
     designs: NDArray[np.float64]
+    provenance: Provenance
 
-    def run(self) -> Outcome:
-        """Put them to it."""
-        return self.case.run(self.designs)
+    def run(self) -> Answer:
+        """Put them to it, unless this process computes something else."""
+        here = provenance_of(self.case.robot)
+        outcome = self.case.run(self.designs) if here == self.provenance else None
+        return Answer(here, outcome, platform.node())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What a task came to.
+
+    provenance: that of the process that ran it. outcome: None if it is not what the task asks for,
+    so that nothing was computed. host: name of the machine.
+    """
+
+    provenance: Provenance
+    outcome: Outcome | None
+    host: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +100,7 @@ class Failure:
     error: Exception
 
 
-def run_in_worker(task: Task) -> Outcome | Failure:
+def run_in_worker(task: Task) -> Answer | Failure:
     """The body of a remote task. An error is a result here, not a sign of a broken worker."""
     try:
         return task.run()
@@ -101,4 +119,5 @@ def transportable(error: Exception) -> Exception:
 
 
 def warm_up() -> None:
-    """Does nothing; but a process that was sent it has imported what a walk needs."""
+    """Lets a process import what a walk needs, and take note of the code that it has imported."""
+    simulator_digest()

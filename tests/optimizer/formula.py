@@ -9,9 +9,11 @@ from datetime import UTC, datetime
 import numpy as np
 
 from services.optimizer.jobs.job import Job, JobState
+from services.optimizer.jobs.provenance import JobProvenance, with_record
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from sim.outcome import Outcome, Status
+from sim.provenance import Provenance
 
 SPEC = JobSpec.model_validate(
     {
@@ -25,9 +27,22 @@ SPEC = JobSpec.model_validate(
 ).resolved()
 
 
+HERE = JobProvenance(
+    gaitswarm="1.0",
+    optimizer_digest="search",
+    simulation=Provenance(
+        robot="szabadka2",
+        robot_digest="robot",
+        code_digest="code",
+        libraries={"numpy": "2.0"},
+        backend="native",
+    ),
+)
+
+
 def job(spec: JobSpec = SPEC, state: JobState = JobState.RUNNING) -> Job:
     now = datetime(2026, 1, 1, tzinfo=UTC)
-    return Job("a-job", spec, state, now, now)
+    return Job("a-job", spec, state, now, now, provenance=with_record((), 0, HERE))
 
 
 def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:

@@ -28,11 +28,11 @@ from services.optimizer.run.events import (
     Wait,
     Waited,
 )
-from tests.optimizer.formula import SPEC, job, walk
+from tests.optimizer.formula import HERE, SPEC, job, walk
 
 
 def claimed(ask: Ask | None = None) -> Claimed:
-    return Claimed(Claim(job(), "runner", 1, ask))
+    return Claimed(Claim(job(), "runner", 1, ask), HERE)
 
 
 def begin() -> tuple[Coordination, tuple[Action, ...]]:

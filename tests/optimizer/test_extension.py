@@ -23,7 +23,7 @@ from services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, 
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
-from tests.optimizer.formula import SPEC, FormulaEvaluator, job, walk
+from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
 
 BUDGET = SPEC.iterations
 
@@ -199,7 +199,7 @@ def test_a_job_that_pauses_in_the_iteration_in_which_it_is_extended_is_paused(
 
 
 def test_what_follows_is_asked_anew_when_the_budget_changed_under_a_commit() -> None:
-    state, actions = handle(Coordination(), Claimed(Claim(job(), "runner", 1, None)))
+    state, actions = handle(Coordination(), Claimed(Claim(job(), "runner", 1, None), HERE))
     evaluate = actions[-1]
     assert isinstance(evaluate, Evaluate)
     state, (stale,) = handle(state, Evaluated(walk(evaluate.request), 0.5))

@@ -7,6 +7,7 @@ import numpy as np
 from services.optimizer.run.evaluator import EvaluationRequest
 from sim.case import Walk
 from sim.outcome import Outcome
+from sim.provenance import provenance_of
 from sim.scenario import Scenario
 from sim.simulate import simulate
 
@@ -21,7 +22,7 @@ def request(
 ) -> EvaluationRequest:
     gains = np.random.default_rng(seed).uniform((0.1, 0.0), (0.5, 0.5), (count, 2))
     cases = tuple(Walk("szabadka2", "pi", scenario, ("P", "I")) for scenario in scenarios)
-    return EvaluationRequest(job_id, cases, gains)
+    return EvaluationRequest(job_id, cases, gains, provenance_of("szabadka2"))
 
 
 def walked_at_once(wanted: EvaluationRequest) -> tuple[Outcome, ...]:

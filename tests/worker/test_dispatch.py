@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from services.optimizer.errors import ProvenanceChanged
 from services.worker.dispatch import Dispatcher, Work
+from services.worker.tasks import Answer, Task
 from sim.outcome import N_OBJECTIVES, Outcome, Status
+from sim.provenance import provenance_of
 from tests.worker.requests import request
 
 LANES = 4
@@ -17,6 +21,9 @@ COUNT = 8 * LANES
 PATIENCE = 30.0
 
 Results = tuple[Outcome, ...]
+
+HERE = provenance_of("szabadka2")
+NO_COMPILER = HERE.model_copy(update={"backend": "reference"})
 
 
 @pytest.fixture
@@ -54,14 +61,18 @@ def result_of(work: Work) -> Outcome:
     )
 
 
+def answer_of(work: Work) -> Answer:
+    return Answer(HERE, result_of(work), "node-7")
+
+
 def test_a_chunk_that_comes_twice_counts_once(
     dispatcher: Dispatcher, results: Future[Results]
 ) -> None:
     works = taken(dispatcher)
     for _ in works:
-        dispatcher.complete(works[0], result_of(works[0]))
+        dispatcher.complete(works[0], answer_of(works[0]))
     for work in works[1:]:
-        dispatcher.complete(work, result_of(work))
+        dispatcher.complete(work, answer_of(work))
 
     outcomes = results.result(PATIENCE)
 
@@ -76,7 +87,7 @@ def test_a_chunk_that_was_sent_again_after_its_result_came_is_not_run_again(
     dispatcher: Dispatcher, results: Future[Results]
 ) -> None:
     work, *_ = taken(dispatcher)
-    dispatcher.complete(work, result_of(work))
+    dispatcher.complete(work, answer_of(work))
     dispatcher.again(work)
     assert dispatcher.take(0.0) is None
 
@@ -86,7 +97,7 @@ def test_an_error_of_a_chunk_whose_result_has_come_fails_nothing(
 ) -> None:
     works = taken(dispatcher)
     for work in works:
-        dispatcher.complete(work, result_of(work))
+        dispatcher.complete(work, answer_of(work))
         dispatcher.fail(work, RuntimeError("its other attempt"))
     assert len(results.result(PATIENCE)) == 2
 
@@ -106,6 +117,34 @@ def test_a_result_of_another_shape_fails_the_request_instead_of_filling_it(
     dispatcher: Dispatcher, results: Future[Results], shape: tuple[int, int]
 ) -> None:
     work, *_ = taken(dispatcher)
-    dispatcher.complete(work, Outcome(np.zeros(shape), np.zeros(shape[0], dtype=np.uint8)))
+    outcome = Outcome(np.zeros(shape), np.zeros(shape[0], dtype=np.uint8))
+    dispatcher.complete(work, Answer(HERE, outcome, "node-7"))
     with pytest.raises(RuntimeError, match="other code"):
         results.result(PATIENCE)
+
+
+@pytest.mark.parametrize("declined", [True, False])
+def test_a_worker_without_a_compiler_fails_the_request_and_is_named(
+    dispatcher: Dispatcher, results: Future[Results], declined: bool
+) -> None:
+    work, *_ = taken(dispatcher)
+    outcome = None if declined else result_of(work)
+    dispatcher.complete(work, Answer(NO_COMPILER, outcome, "node-7"))
+    with pytest.raises(ProvenanceChanged, match=r"node-7 .*: no C compiler: backend reference"):
+        results.result(PATIENCE)
+
+
+def test_a_worker_that_does_not_say_what_it_computes_fails_the_request(
+    dispatcher: Dispatcher, results: Future[Results]
+) -> None:
+    work, *_ = taken(dispatcher)
+    dispatcher.complete(work, result_of(work))
+    with pytest.raises(ProvenanceChanged, match="does not say what it computes"):
+        results.result(PATIENCE)
+
+
+def test_a_task_is_not_run_by_a_process_that_computes_something_else() -> None:
+    task = Task(request(2).cases[0], request(2).designs, HERE)
+    assert task.run().outcome is not None
+    declined = replace(task, provenance=NO_COMPILER).run()
+    assert (declined.outcome, declined.provenance) == (None, HERE)

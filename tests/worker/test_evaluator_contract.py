@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
 from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from services.worker.in_process import InProcessEvaluator
 from sim.errors import SimulationInputError
@@ -55,6 +55,17 @@ def test_an_error_of_the_simulation_comes_through_as_itself(evaluator: Evaluator
     with pytest.raises(SimulationInputError, match="P"):
         evaluator.evaluate(wanted, never)
     sound = request(3)
+    assert bits(evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
+
+
+def test_walks_of_another_provenance_are_refused_in_words(evaluator: Evaluator) -> None:
+    sound = request(9)
+    changed = {"code_digest": "other", "libraries": {}, "robot_digest": "other"}
+    wanted = replace(sound, provenance=sound.provenance.model_copy(update=changed))
+    with pytest.raises(
+        ProvenanceChanged, match=r"other simulation code; casadi [0-9.]+ instead of none"
+    ):
+        evaluator.evaluate(wanted, never)
     assert bits(evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, changes_since
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import Outcome
 
@@ -133,6 +134,8 @@ class Job:
     """A job as stored.
 
     spec: resolved, no preset is left to be looked up; its `iterations` are the present budget.
+    provenance: what its numbers depend on, since which iteration. accepts_changes: whether its
+        user has said that it may go on although that has changed; until it is claimed.
     """
 
     id: str
@@ -144,6 +147,30 @@ class Job:
     finished_at: datetime | None = None
     error: str | None = None
     progress: Progress = field(default_factory=Progress)
+    provenance: ProvenanceRecords = ()
+    accepts_changes: bool = False
+
+
+def refusal(job: Job, now: JobProvenance) -> str | None:
+    """Why a job must not go on without its user's consent, and how it does with it.
+
+    Args:
+        job: the job as stored.
+        now: the provenance of the process that is to go on with it.
+
+    Returns:
+        Sentences for people; None if its numbers would be mixed with no others.
+    """
+    iterations = job.progress.iterations
+    changes = changes_since(job.provenance, iterations, now)
+    if not changes:
+        return None
+    return (
+        f"what its numbers depend on is not what it was: {'; '.join(changes)}. Resume it where that"
+        f" is as before, or accept the change: `gaitswarm optimize --resume {job.id}"
+        f" --accept-changes`, `gaitswarm resume {job.id} --accept-changes`, or over HTTP"
+        f' {{"accept_changes": true}} goes on and records it from iteration {iterations} on'
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ No I/O, clock or thread is in here; `services.optimizer.run.runner` executes the
 and answers the last of them with an event. An action that raises voids those after it.
 
 event                  in phase     actions                        phase after
-Claimed                start        [Begin,] Evaluate              evaluating
+Claimed                start        [Record, Begin,] Evaluate      evaluating
+Claimed(changed)       start        Release(failed)                ended
 Extended               evaluating   Begin, Evaluate                evaluating
 Evaluated              evaluating   Commit                         committing
 Committed(running)     committing   Evaluate                       evaluating
@@ -19,6 +20,9 @@ LeaseWasLost           any          -                              ended
 
 A pause that comes while walks are run is the store's to see: the commit then answers `paused`.
 The store likewise pauses a pausing job that is released as queued.
+
+A claim has changed if the numbers would depend on something else than those that the job has, and
+nobody has accepted that.
 """
 
 from __future__ import annotations
@@ -34,11 +38,12 @@ from numpy.typing import NDArray
 from services.optimizer.jobs.job import (
     Answered,
     Ask,
-    Claim,
     CompletedIteration,
     Job,
     JobState,
+    refusal,
 )
+from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.events import (
@@ -55,6 +60,7 @@ from services.optimizer.run.events import (
     Extended,
     LeaseWasLost,
     PauseSeen,
+    Record,
     Release,
     StopRequested,
     Wait,
@@ -106,6 +112,7 @@ class Coordination:
     phase: Phase = Phase.START
     job: Job | None = None
     recordings: Recordings = field(default_factory=dict)
+    provenance: JobProvenance | None = None
     answered: Answered | None = None
     ask: Ask | None = None
     done: CompletedIteration | None = None
@@ -128,8 +135,8 @@ def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Actio
 
 def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
     match state.phase, event:
-        case Phase.START, Claimed(claim=claim):
-            return _start(state, claim)
+        case Phase.START, Claimed():
+            return _start(state, event)
         case Phase.EVALUATING, Extended(job=job):
             return _begin(state, job)
         case Phase.EVALUATING, Evaluated():
@@ -148,18 +155,26 @@ def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Act
             raise ValueError(f"{type(event).__name__} makes no sense while {phase}")
 
 
-def _start(state: Coordination, claim: Claim) -> tuple[Coordination, tuple[Action, ...]]:
+def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Action, ...]]:
+    claim, job = event.claim, event.claim.job
+    refused = refusal(job, event.provenance)
+    if refused is not None and not (event.accepts_changes or job.accepts_changes):
+        return _release(state, JobState.FAILED, refused)
     state = replace(
         state,
         phase=Phase.EVALUATING,
-        job=claim.job,
+        job=job,
         recordings=claim.recordings,
+        provenance=event.provenance,
         answered=claim.answered,
         ask=claim.ask,
     )
+    is_known = job.provenance and refused is None and not job.accepts_changes
+    record = () if is_known else (Record(event.provenance),)
     if claim.ask is not None:
-        return state, (_evaluate(state),)
-    return _begin(state, claim.job)
+        return state, (*record, _evaluate(state))
+    state, actions = _begin(state, job)
+    return state, (*record, *actions)
 
 
 def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
@@ -225,11 +240,14 @@ def _release(
 
 def _evaluate(state: Coordination) -> Evaluate:
     job, ask = _current(state)
+    if state.provenance is None:
+        raise ValueError(f"no job was claimed, while {state.phase}")
     return Evaluate(
         EvaluationRequest(
             job_id=job.id,
             cases=job.spec.cases(state.recordings),
             designs=job.spec.design_space().designs(ask.positions),
+            provenance=state.provenance.simulation,
         )
     )
 

@@ -11,15 +11,20 @@ from numpy.typing import NDArray
 
 from sim.case import Case
 from sim.outcome import Outcome
+from sim.provenance import Provenance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationRequest:
-    """One iteration of one job: every design in every case. designs: (n, v) float64."""
+    """One iteration of one job: every design in every case.
+
+    designs: (n, v) float64. provenance: that of the process that asks; the outcomes are to have it.
+    """
 
     job_id: str
     cases: tuple[Case, ...]
     designs: NDArray[np.float64]
+    provenance: Provenance
 
 
 class Evaluator(Protocol):
@@ -40,8 +45,9 @@ class Evaluator(Protocol):
 
         should_stop: polled at least once a second; when true, work under way is dropped and
             `EvaluationStopped` raised.
-        Raises EvaluatorUnavailable if the workers cannot be reached after retries, and lets
-        errors of the simulation itself (bugs, bad input) through.
+        Raises EvaluatorUnavailable if the workers cannot be reached after retries,
+        ProvenanceChanged if one of them does not compute what the request expects, and lets errors
+        of the simulation itself (bugs, bad input) through.
         """
 
     def close(self) -> None:

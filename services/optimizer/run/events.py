@@ -5,15 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.run.evaluator import EvaluationRequest
 from sim.outcome import Outcome
 
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """The job is ours."""
+    """The job is ours.
+
+    provenance: what numbers that are computed from here depend on. accepts_changes: whether whoever
+        runs the job goes on although that has changed.
+    """
 
     claim: Claim
+    provenance: JobProvenance
+    accepts_changes: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +94,13 @@ Event = (
 
 
 @dataclass(frozen=True, slots=True)
+class Record:
+    """Store what the next iterations depend on."""
+
+    provenance: JobProvenance
+
+
+@dataclass(frozen=True, slots=True)
 class Begin:
     """Store the first ask."""
 
@@ -124,4 +138,4 @@ class Release:
     error: str | None = None
 
 
-Action = Begin | Evaluate | Commit | Wait | Release
+Action = Record | Begin | Evaluate | Commit | Wait | Release

@@ -22,9 +22,16 @@ from services.optimizer.errors import (
     EvaluatorUnavailable,
     GaitswarmError,
     LeaseLost,
+    ProvenanceChanged,
     StoreUnavailable,
 )
 from services.optimizer.jobs.job import Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.provenance import (
+    JobProvenance,
+    job_provenance,
+    optimizer_digest,
+)
+from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.coordinator import Backoff, Coordination, Phase, handle
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
 from services.optimizer.run.events import (
@@ -41,6 +48,7 @@ from services.optimizer.run.events import (
     Extended,
     LeaseWasLost,
     PauseSeen,
+    Record,
     Release,
     StopRequested,
     Wait,
@@ -48,6 +56,7 @@ from services.optimizer.run.events import (
 )
 from services.optimizer.run.heartbeat import Heartbeat
 from services.optimizer.store.base import Store
+from sim.provenance import simulator_digest
 
 OnCommit = Callable[[CompletedIteration, JobState], None]
 """Called after an iteration is stored, in the thread that runs the job."""
@@ -76,7 +85,11 @@ def runner_name() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What a run needs beside its job. clock [s] and sleep [s] are replaced in tests."""
+    """What a run needs beside its job. clock [s] and sleep [s] are replaced in tests.
+
+    provenance: of what is computed from here for a spec. accepts_changes: whether a job goes on
+        although that has changed.
+    """
 
     store: Store
     evaluator: Evaluator
@@ -84,6 +97,8 @@ class Surroundings:
     backoff: Backoff = field(default_factory=Backoff)
     on_commit: OnCommit | None = None
     on_retry: OnRetry | None = None
+    provenance: Callable[[Spec], JobProvenance] = job_provenance
+    accepts_changes: bool = False
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
 
@@ -104,7 +119,7 @@ def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None =
     run = _Run(claim, around, heartbeat, stop or threading.Event())
     with heartbeat:
         try:
-            state, actions = _decide(Coordination(backoff=around.backoff), Claimed(claim))
+            state, actions = _begin(claim, around)
             while actions:
                 state, actions = _decide(state, run.execute(actions))
         except StoreUnavailable:
@@ -116,14 +131,30 @@ def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None =
     return around.store.job(claim.job.id)
 
 
+def _begin(claim: Claim, around: Surroundings) -> tuple[Coordination, tuple[Action, ...]]:
+    """What to do first; a job whose robot cannot be read fails, as in `_decide`."""
+    state = Coordination(backoff=around.backoff)
+    try:
+        here = around.provenance(claim.job.spec)
+    except Exception as error:  # noqa: BLE001
+        return _fail(state, error, f"job {claim.job.id}: its provenance cannot be told")
+    return _decide(state, Claimed(claim, here, around.accepts_changes))
+
+
 def _decide(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
     """As `handle`; a job that it cannot handle fails, or it would be claimed over and over."""
     try:
         return handle(state, event)
     except Exception as error:  # noqa: BLE001
-        _log.exception("a job cannot go on after %s", type(event).__name__)
-        failed = Release(JobState.FAILED, f"internal error: {type(error).__name__}: {error}")
-        return replace(state, phase=Phase.ENDED), (failed,)
+        return _fail(state, error, f"a job cannot go on after {type(event).__name__}")
+
+
+def _fail(
+    state: Coordination, error: Exception, what: str
+) -> tuple[Coordination, tuple[Action, ...]]:
+    _log.exception(what)
+    failed = Release(JobState.FAILED, f"internal error: {type(error).__name__}: {error}")
+    return replace(state, phase=Phase.ENDED), (failed,)
 
 
 @dataclass(slots=True)
@@ -155,6 +186,9 @@ class _Run:
 
     def _do(self, action: Action) -> Event | None:
         match action:
+            case Record(provenance=provenance):
+                self.around.store.record_provenance(self.claim, provenance)
+                return None
             case Begin(ask=ask):
                 self._stored(lambda: self.around.store.begin(self.claim, ask))
                 return None
@@ -181,6 +215,9 @@ class _Run:
             raise
         except EvaluatorUnavailable as error:
             return EvaluatorLost(str(error))
+        except ProvenanceChanged as error:
+            _log.warning("job %s: %s", request.job_id, error)
+            return EvaluationFailed(str(error))
         except Exception as error:  # noqa: BLE001
             _log.exception("job %s: the evaluation failed", request.job_id)
             return EvaluationFailed(f"the simulation failed: {type(error).__name__}: {error}")
@@ -263,6 +300,9 @@ class Runner:
         """Begin to claim jobs. Returns at once."""
         if self._scheduler is not None:
             raise RuntimeError("a runner is started once")
+        # Now, while the files are those that were imported.
+        simulator_digest()
+        optimizer_digest()
         self._scheduler = threading.Thread(target=self._schedule, name="runner", daemon=True)
         self._scheduler.start()
 

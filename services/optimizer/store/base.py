@@ -18,6 +18,7 @@ from services.optimizer.jobs.job import (
     JobOrder,
     JobState,
 )
+from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -40,12 +41,18 @@ class Store(Protocol):
     """
 
     def create_job(
-        self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
+        self,
+        spec: Spec,
+        *,
+        provenance: JobProvenance | None = None,
+        idempotency_key: str | None = None,
+        request: Any = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job of the resolved spec, or find the one that the same key made before.
 
         Args:
             spec: What the job is to do.
+            provenance: What its numbers are to depend on; None leaves that to its first claim.
             idempotency_key: Of the user; a request that is repeated with it makes no second job,
                 even if presets or defaults have changed in between.
             request: The JSON document that asked for the job, as it was sent. None: the fields
@@ -60,7 +67,14 @@ class Store(Protocol):
                 resolves to the same spec.
         """
 
-    def create_claimed_job(self, spec: Spec, runner: str, *, lease_seconds: float) -> Claim:
+    def create_claimed_job(
+        self,
+        spec: Spec,
+        runner: str,
+        *,
+        lease_seconds: float,
+        provenance: JobProvenance | None = None,
+    ) -> Claim:
         """Insert a job of the resolved spec that is running from the start, held by a runner.
 
         It is never queued, so no other runner can have it before this one's lease runs out.
@@ -69,6 +83,7 @@ class Store(Protocol):
             spec: What the job is to do.
             runner: Who holds it.
             lease_seconds: For how long, unless the claim is renewed [s].
+            provenance: What its numbers are to depend on; None leaves that to whoever runs it.
 
         Returns:
             The claim, as `claim` would have given it for a new job.
@@ -91,8 +106,11 @@ class Store(Protocol):
         Raises InvalidRequest (field `after`) for a cursor that is none of this order.
         """
 
-    def command(self, job_id: str, command: Command) -> Job:
+    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
         """Apply `commanded`; Conflict if the state does not allow it.
+
+        accept_changes: of a job that is queued again, whether it may go on although what its
+            numbers depend on has changed; until it is claimed.
 
         Cancelling clears the lease, so a runner's next write is refused.
         """
@@ -122,6 +140,12 @@ class Store(Protocol):
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
         """Heartbeat: extend the lease; returns the state, so that pausing is seen."""
+
+    def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
+        """Append what the job's next iterations depend on, unless that is as before.
+
+        Changes that its user has accepted are accepted no longer: they are recorded.
+        """
 
     def begin(self, claim: Claim, ask: Ask) -> None:
         """Store the ask that a job begins with, or goes on with after an extension.

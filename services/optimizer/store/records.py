@@ -23,6 +23,7 @@ from services.optimizer.errors import (
     NotFound,
 )
 from services.optimizer.jobs.job import Answered, Ask, Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, with_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.recordings import load_recordings
 from services.optimizer.store.rows import (
@@ -32,6 +33,8 @@ from services.optimizer.store.rows import (
     budget,
     evaluation_rows,
     iteration_summary,
+    provenance_document,
+    provenance_records,
     spec_document,
     submitted_spec,
     to_ask,
@@ -76,11 +79,13 @@ class Submission:
         spec: Resolved.
         key: Idempotency key that came with the request, if any.
         digest: Of the request, as `request_digest` has it; None without a key.
+        provenance: What its numbers are to depend on; empty where its first claim says that.
     """
 
     spec: Spec
     key: str | None = None
     digest: str | None = None
+    provenance: ProvenanceRecords = ()
 
 
 def repeated_job(connection: Connection, asked: Submission) -> Job | None:
@@ -111,6 +116,7 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
         "id": new_job_id(),
         "state": JobState.QUEUED,
         "spec": spec_document(asked.spec),
+        "provenance": provenance_document(asked.provenance),
         "idempotency_key": asked.key,
         "request_digest": asked.digest,
         "created_at": now,
@@ -128,6 +134,12 @@ def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> 
     """Change a locked job's row; the row as it is then."""
     connection.execute(update(jobs).where(jobs.c.id == row["id"]).values(**columns))
     return {**row, **columns}
+
+
+def provenance_columns(job: Row, provenance: JobProvenance) -> dict[str, Any]:
+    """Columns of a job that goes on with a provenance, from its next iteration on."""
+    records = with_record(provenance_records(job), job["iterations"], provenance)
+    return {"provenance": provenance_document(records), "accepts_changes": False}
 
 
 def outstanding_ask(connection: Connection, job: Row) -> Ask | None:

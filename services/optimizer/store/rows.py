@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.documents import SPECS, AnySpec
@@ -27,6 +27,7 @@ from services.optimizer.jobs.job import (
     JobState,
     Progress,
 )
+from services.optimizer.jobs.provenance import ProvenanceRecord, ProvenanceRecords
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.tables import iterations
 from sim.outcome import Status
@@ -34,9 +35,11 @@ from sim.outcome import Status
 Row = Mapping[Any, Any]
 """Columns of one row by name, as selected or as they are about to be."""
 
+_RECORDS: Final = TypeAdapter(tuple[ProvenanceRecord, ...])
+
 
 def to_job(row: Row) -> Job:
-    """A row of `jobs`. Raises as `submitted_spec`."""
+    """A row of `jobs`. Raises as `submitted_spec` and `provenance_records`."""
     spec = submitted_spec(row)
     if row["budget"] is not None:
         spec = spec.model_copy(update={"iterations": row["budget"]})
@@ -57,6 +60,8 @@ def to_job(row: Row) -> Job:
             best_particle=row["best_particle"],
             compute_seconds=row["compute_seconds"],
         ),
+        provenance=provenance_records(row),
+        accepts_changes=bool(row["accepts_changes"]),
     )
 
 
@@ -71,6 +76,24 @@ def submitted_spec(row: Row) -> AnySpec:
         raise StoreUnavailable(
             f"job {row['id']} was stored with a spec that this version cannot read: {error}"
         ) from error
+
+
+def provenance_records(row: Row) -> ProvenanceRecords:
+    """Provenance of the job of a row of `jobs`, empty if none was recorded.
+
+    Raises StoreUnavailable for records that this version cannot read.
+    """
+    try:
+        return _RECORDS.validate_python(row["provenance"] or ())
+    except ValidationError as error:
+        raise StoreUnavailable(
+            f"job {row['id']} was stored with a provenance that this version cannot read: {error}"
+        ) from error
+
+
+def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:
+    """The JSON document of a job's provenance."""
+    return [record.model_dump(mode="json") for record in records]
 
 
 def budget(row: Row) -> int:

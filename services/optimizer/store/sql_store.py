@@ -24,6 +24,7 @@ from services.optimizer.jobs.job import (
     commanded,
     extended,
 )
+from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.base import Page
 from services.optimizer.store.columns import select_columns
@@ -47,6 +48,7 @@ from services.optimizer.store.records import (
     lease_is_live,
     outstanding_ask,
     progress_after,
+    provenance_columns,
     repeated_job,
     require_budget_of,
     state_after_commit,
@@ -98,7 +100,12 @@ class SqlStore:
     # jobs, as their users see them
 
     def create_job(
-        self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
+        self,
+        spec: Spec,
+        *,
+        provenance: JobProvenance | None = None,
+        idempotency_key: str | None = None,
+        request: Any = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job, or find the one that the same key made before."""
         _check_key(idempotency_key)
@@ -106,7 +113,7 @@ class SqlStore:
         if idempotency_key is not None:
             sent = spec.model_dump(mode="json", exclude_unset=True) if request is None else request
             digest = request_digest(sent)
-        asked = Submission(spec.resolved(), idempotency_key, digest)
+        asked = Submission(spec.resolved(), idempotency_key, digest, first_record(provenance))
         try:
             with self._database.transaction(write=True) as connection:
                 earlier = repeated_job(connection, asked)
@@ -120,11 +127,19 @@ class SqlStore:
                 raise
         return earlier, False
 
-    def create_claimed_job(self, spec: Spec, runner: str, *, lease_seconds: float) -> Claim:
+    def create_claimed_job(
+        self,
+        spec: Spec,
+        runner: str,
+        *,
+        lease_seconds: float,
+        provenance: JobProvenance | None = None,
+    ) -> Claim:
         """Insert a job that is running from the start, held by `runner`."""
         with self._database.transaction(write=True) as connection:
             now = self._clock(connection)
-            job = insert_job(connection, Submission(spec.resolved()), now)
+            asked = Submission(spec.resolved(), provenance=first_record(provenance))
+            job = insert_job(connection, asked, now)
             return take_job(connection, job_row(connection, job.id), runner, lease_seconds, now)
 
     def job(self, job_id: str) -> Job:
@@ -168,7 +183,7 @@ class SqlStore:
         more = len(rows) > limit
         return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
 
-    def command(self, job_id: str, command: Command) -> Job:
+    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
         """See `Store.command`."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
@@ -179,7 +194,8 @@ class SqlStore:
                 state = JobState.PAUSED
             changes = entering(state, now)
             if command is Command.RESUME:
-                changes["error"] = None
+                queued = state is JobState.QUEUED
+                changes |= {"error": None, "accepts_changes": queued and accept_changes}
             return to_job(update_job(connection, row, changes))
 
     def extend(self, job_id: str, iterations: int) -> Job:
@@ -234,6 +250,12 @@ class SqlStore:
             expires = self._clock(connection) + timedelta(seconds=lease_seconds)
             update_job(connection, row, {"lease_expires_at": expires})
             return JobState(row["state"])
+
+    def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
+        """See `Store.record_provenance`."""
+        with self._database.transaction(write=True) as connection:
+            row = held(connection, claim)
+            update_job(connection, row, provenance_columns(row, provenance))
 
     def begin(self, claim: Claim, ask: Ask) -> None:
         """See `Store.begin`."""

@@ -13,6 +13,7 @@ from typing import Final
 from sqlalchemy import (
     JSON,
     BigInteger,
+    Boolean,
     Column,
     DateTime,
     Dialect,
@@ -91,6 +92,10 @@ jobs: Final = Table(
     Column("budget", Integer),
     # Of the request that the idempotency key came with; NULL without a key, and for older jobs.
     Column("request_digest", Text),
+    # `ProvenanceRecords`; NULL for a job that was stored before there were any.
+    Column("provenance", JSON(none_as_null=True)),
+    # From a resumption that accepts changes to the next claim; NULL is false.
+    Column("accepts_changes", Boolean),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

@@ -1,0 +1,158 @@
+"""What a job's numbers depend on beside its spec, since which iteration, and when it may go on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.optimizer.jobs.spec import Spec
+from sim.provenance import Provenance, provenance_of, source_digest
+
+_OPTIMIZER: Final = Path(__file__).parents[1]
+
+_SOURCES: Final = (
+    "jobs/design_space.py",
+    "jobs/identification.py",
+    "jobs/preference.py",
+    "jobs/spec.py",
+    "jobs/tuning.py",
+    "search/optimizer.py",
+    "search/pso.py",
+    "search/random_stream.py",
+)
+"""Files that ask for designs and judge them."""
+
+
+class JobProvenance(BaseModel):
+    """What a job's numbers depend on beside its spec, in which every preset is written out."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    gaitswarm: str = Field(
+        description="Version of gaitswarm. For people: the digests tell whether code is the same.",
+        examples=["0.1.0"],
+    )
+    optimizer_digest: str = Field(
+        description="Digest of the source files that ask for designs and judge them.",
+        examples=["3c6ef372fe94f82ba54ff53a5f1d36f1"],
+    )
+    simulation: Provenance = Field(description="What its walks depend on.")
+
+    def changes(self, now: JobProvenance) -> tuple[str, ...]:
+        """What is different now, in words for people.
+
+        Args:
+            now: the provenance that is compared with this earlier one.
+
+        Returns:
+            One phrase for every difference that counts; none if numbers of both may be mixed.
+        """
+        found = list(self.simulation.changes(now.simulation))
+        if now.optimizer_digest != self.optimizer_digest:
+            found.append("other code of search and judgement")
+        if found and now.gaitswarm != self.gaitswarm:
+            found.append(f"gaitswarm {now.gaitswarm} instead of {self.gaitswarm}")
+        return tuple(found)
+
+
+class ProvenanceRecord(BaseModel):
+    """Since which iteration a job's numbers have had which provenance."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    from_iteration: int = Field(
+        ge=0, description="First iteration that was computed so, from 0.", examples=[0]
+    )
+    provenance: JobProvenance = Field(description="What its numbers and those after it depend on.")
+
+
+ProvenanceRecords = tuple[ProvenanceRecord, ...]
+"""Of one job, only ever appended to; empty for one that was stored before there were any."""
+
+
+def job_provenance(spec: Spec) -> JobProvenance:
+    """The provenance of what this process computes for a job.
+
+    Args:
+        spec: what the job was asked to do.
+
+    Returns:
+        The provenance; the spec itself is no part of it.
+
+    Raises:
+        SimulationInputError: the robot's description cannot be used.
+    """
+    return JobProvenance(
+        gaitswarm=_version(),
+        optimizer_digest=optimizer_digest(),
+        simulation=provenance_of(spec.robot),
+    )
+
+
+def changes_since(
+    records: Sequence[ProvenanceRecord], iterations: int, now: JobProvenance
+) -> tuple[str, ...]:
+    """What keeps a job from going on without its user's consent.
+
+    Args:
+        records: the job's.
+        iterations: how many it has committed.
+        now: the provenance of the process that is to go on.
+
+    Returns:
+        One phrase for every change, for people; none if it may go on. A job without records may
+        if it has nothing yet that could be mixed with something else.
+    """
+    if records:
+        return records[-1].provenance.changes(now)
+    if iterations:
+        return ("it was stored before gaitswarm recorded what numbers depend on",)
+    return ()
+
+
+def first_record(provenance: JobProvenance | None) -> ProvenanceRecords:
+    """Records of a job that is submitted; none if its first claim is to make the first."""
+    return () if provenance is None else with_record((), 0, provenance)
+
+
+def with_record(
+    records: ProvenanceRecords, iterations: int, now: JobProvenance
+) -> ProvenanceRecords:
+    """Records of a job that goes on.
+
+    Args:
+        records: those so far.
+        iterations: how many iterations it has committed, which is the index of the next.
+        now: the provenance of the process that goes on.
+
+    Returns:
+        The records with one more, or as they are if nothing has changed.
+    """
+    if records and not records[-1].provenance.changes(now):
+        return records
+    return (*records, ProvenanceRecord(from_iteration=iterations, provenance=now))
+
+
+def optimizer_files() -> tuple[Path, ...]:
+    """The source files that ask for designs and judge them, in order."""
+    return tuple(_OPTIMIZER / name for name in _SOURCES)
+
+
+@lru_cache(maxsize=1)
+def optimizer_digest() -> str:
+    """Digest of `optimizer_files`, as they are when it is called first; see `simulator_digest`."""
+    return source_digest(_OPTIMIZER, optimizer_files())
+
+
+@lru_cache(maxsize=1)
+def _version() -> str:
+    """Of the installed package; a bare checkout has none."""
+    try:
+        return metadata.version("gaitswarm")
+    except metadata.PackageNotFoundError:
+        return "0+unknown"

@@ -1,0 +1,120 @@
+"""A job that is resumed after what its numbers depend on has changed: refused, or on purpose."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.conftest import Finished, Gaitswarm
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def extended(finished: Finished, tmp_path: Path, gaitswarm: Gaitswarm) -> Finished:
+    """A job of two iterations that are committed, and two that are not."""
+    db = tmp_path / "jobs.db"
+    shutil.copy(finished.db, db)
+    assert gaitswarm("extend", finished.id, "--iterations", "4", "--db", db).code == 0
+    return Finished(db, finished.job)
+
+
+def resume(job: Finished, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Go on with the job in a process of its own."""
+    command = ["optimize", "--resume", job.id, "--db", str(job.db), "--evaluator", "in-process"]
+    return subprocess.run(
+        [sys.executable, "-P", "-c", "from cli.main import main; main()", *command, *options],
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+def changed_simulator(folder: Path, file: str, old: str, new: str) -> str:
+    """PYTHONPATH of a gaitswarm whose simulator differs in one place."""
+    shutil.copytree(ROOT / "sim", folder / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    changed = folder / "sim" / file
+    text = changed.read_text(encoding="utf-8")
+    assert old in text
+    changed.write_text(text.replace(old, new), encoding="utf-8")
+    return os.pathsep.join([str(folder), str(ROOT)])
+
+
+def other_kernel_code(folder: Path) -> dict[str, str]:
+    return {
+        "PYTHONPATH": changed_simulator(
+            folder, "kernel/driver.c", "CODE_LIMIT 65535", "CODE_LIMIT 255"
+        )
+    }
+
+
+def another_robot_file(folder: Path) -> dict[str, str]:
+    file = "robot/szabadka2/robot.toml"
+    return {"PYTHONPATH": changed_simulator(folder, file, "\nfriction = 1.0", "\nfriction = 0.9")}
+
+
+def no_compiler(folder: Path) -> dict[str, str]:
+    """Neither a compiler, on the path or as a wheel, nor a kernel that one has left."""
+    (folder / "ziglang.py").write_text("raise SystemExit(1)\n", encoding="utf-8")
+    path = os.pathsep.join([str(folder), str(ROOT)])
+    return {"PYTHONPATH": path, "PATH": str(folder), "CC": "", "XDG_CACHE_HOME": str(folder)}
+
+
+def history(job: Finished, gaitswarm: Gaitswarm) -> Any:
+    return gaitswarm("history", job.id, "--db", job.db, "--json").json
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (other_kernel_code, "other simulation code"),
+        (another_robot_file, "the robot szabadka2 has other contents"),
+        (no_compiler, "no C compiler: backend reference instead of native"),
+    ],
+)
+def test_a_job_does_not_mix_numbers_that_depend_on_something_else(
+    change: Any, said: str, extended: Finished, tmp_path: Path, gaitswarm: Gaitswarm
+) -> None:
+    before = history(extended, gaitswarm)
+    refused = resume(extended, **change(tmp_path))
+    assert refused.returncode == 4, refused.stderr
+    assert said in refused.stderr and "--accept-changes" in refused.stderr
+    assert history(extended, gaitswarm) == before
+    job = gaitswarm("status", extended.id, "--db", extended.db, "--json").json
+    assert (job["state"], job["iterations"]) == ("queued", 2)
+
+
+def test_a_change_that_is_accepted_is_recorded_from_that_iteration_on(
+    extended: Finished, tmp_path: Path, gaitswarm: Gaitswarm
+) -> None:
+    before = history(extended, gaitswarm)
+    resumed = resume(extended, "--accept-changes", **another_robot_file(tmp_path))
+    assert resumed.returncode == 0, resumed.stderr
+    assert history(extended, gaitswarm)["iterations"][:2] == before["iterations"]
+    job = gaitswarm("status", extended.id, "--db", extended.db, "--json").json
+    assert (job["state"], job["iterations"]) == ("succeeded", 4)
+    first, second = job["provenance"]
+    assert [first, *extended.job["provenance"]] == [first, first]
+    assert (first["from_iteration"], second["from_iteration"]) == (0, 2)
+    was, now = (entry["provenance"]["simulation"] for entry in (first, second))
+    assert {field for field in was if was[field] != now[field]} == {"robot_digest"}
+    said = gaitswarm("status", extended.id, "--db", extended.db).out
+    assert "computed by from iteration 2" in said and now["robot_digest"][:8] in said
+
+
+def test_changes_are_accepted_of_a_job_that_is_resumed_and_of_no_new_one(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path
+) -> None:
+    refused = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--accept-changes")
+    assert refused.code == 2 and "accept-changes" in refused.err
+    assert not db.exists()

@@ -1,0 +1,273 @@
+"""Jobs that meet another provenance: they go on with none that nobody has accepted."""
+
+from __future__ import annotations
+
+import inspect
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+
+import pytest
+
+from services.optimizer.errors import ProvenanceChanged
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.identification import IdentificationSpec
+from services.optimizer.jobs.job import Claim, Command, CompletedIteration, Job, JobState
+from services.optimizer.jobs.preference import Preference, judge
+from services.optimizer.jobs.provenance import JobProvenance, job_provenance, optimizer_files
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.run.coordinator import Coordination, handle
+from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
+from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
+from services.optimizer.search.pso import ParticleSwarm
+from services.optimizer.service import JobService
+from services.optimizer.store.base import Store
+from services.optimizer.store.sql_store import open_store
+from sim.errors import RobotFileError
+from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
+
+
+def simulated(**fields: object) -> JobProvenance:
+    return HERE.model_copy(update={"simulation": HERE.simulation.model_copy(update=fields)})
+
+
+OTHER_CODE = simulated(code_digest="other")
+
+CHANGES = [
+    (OTHER_CODE, "other simulation code"),
+    (simulated(robot_digest="other"), "the robot szabadka2 has other contents"),
+    (simulated(robot="hexapod", robot_digest="x"), "the robot hexapod instead of szabadka2"),
+    (simulated(backend="reference"), "no C compiler: backend reference instead of native"),
+    (simulated(precision="single"), "precision single instead of double"),
+    (simulated(libraries={"numpy": "2.1"}), "numpy 2.1 instead of 2.0"),
+    (simulated(libraries={}), "numpy none instead of 2.0"),
+    (
+        HERE.model_copy(update={"optimizer_digest": "other"}),
+        "other code of search and judgement",
+    ),
+]
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    opened = open_store(f"sqlite:///{tmp_path}/jobs.db")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def forget_provenance(store: Store, tmp_path: Path) -> Callable[[], None]:
+    """Leave all jobs as a gaitswarm left them that recorded none."""
+
+    def forget() -> None:
+        with closing(sqlite3.connect(tmp_path / "jobs.db")) as connection, connection:
+            connection.execute("UPDATE jobs SET provenance = NULL, accepts_changes = NULL")
+
+    return forget
+
+
+def run(
+    store: Store, provenance: JobProvenance, on_commit: OnCommit | None = None, **given: bool
+) -> Job:
+    claim = store.claim("runner", lease_seconds=30.0)
+    assert claim is not None
+    around = Surroundings(
+        store, FormulaEvaluator(), on_commit=on_commit, provenance=lambda _: provenance, **given
+    )
+    return run_claim(claim, around)
+
+
+def paused(store: Store, provenance: JobProvenance | None = HERE) -> Job:
+    """A job of two committed iterations."""
+    made, _ = store.create_job(SPEC, provenance=provenance)
+
+    def pause(done: CompletedIteration, state: JobState) -> None:
+        if done.iteration == 0:
+            store.command(made.id, Command.PAUSE)
+
+    found = run(store, HERE, pause)
+    assert (found.state, found.progress.iterations) == (JobState.PAUSED, 2)
+    return found
+
+
+def recorded(store: Store, job_id: str) -> list[tuple[int, JobProvenance]]:
+    return [(r.from_iteration, r.provenance) for r in store.job(job_id).provenance]
+
+
+@pytest.mark.parametrize(("now", "said"), CHANGES)
+def test_a_change_is_told_in_words(now: JobProvenance, said: str) -> None:
+    assert HERE.changes(now) == (said,)
+    assert HERE.changes(HERE) == ()
+
+
+def test_a_job_does_not_go_on_with_something_else_and_says_how_it_would(store: Store) -> None:
+    job_id = paused(store).id
+    store.command(job_id, Command.RESUME)
+    refused = run(store, OTHER_CODE)
+    assert (refused.state, refused.progress.iterations) == (JobState.FAILED, 2)
+    assert refused.error is not None and "other simulation code" in refused.error
+    assert f"gaitswarm resume {job_id} --accept-changes" in refused.error
+    assert recorded(store, job_id) == [(0, HERE)]
+    store.command(job_id, Command.RESUME)
+    assert run(store, HERE).state is JobState.SUCCEEDED
+    assert recorded(store, job_id) == [(0, HERE)]
+
+
+def test_another_version_of_the_same_code_is_no_change(store: Store) -> None:
+    newer = HERE.model_copy(update={"gaitswarm": "2.0"})
+    job_id = paused(store).id
+    store.command(job_id, Command.RESUME)
+    assert run(store, newer).state is JobState.SUCCEEDED
+    assert "gaitswarm 2.0 instead of 1.0" in HERE.changes(
+        newer.model_copy(update={"optimizer_digest": "other"})
+    )
+
+
+def test_changes_that_are_accepted_are_recorded_since_their_iteration_and_accepted_once(
+    store: Store,
+) -> None:
+    job_id = paused(store).id
+    store.command(job_id, Command.RESUME, accept_changes=True)
+
+    def crash(done: CompletedIteration, state: JobState) -> None:
+        raise InterruptedError
+
+    with suppress(InterruptedError):
+        run(store, OTHER_CODE, crash)
+    assert recorded(store, job_id) == [(0, HERE), (2, OTHER_CODE)]
+    assert store.job(job_id).progress.iterations == 3
+    # The consent was to that change: going back is another one.
+    refused = run(store, HERE)
+    assert (refused.state, refused.progress.iterations) == (JobState.FAILED, 3)
+    store.command(job_id, Command.RESUME)
+    assert run(store, OTHER_CODE).state is JobState.SUCCEEDED
+    assert recorded(store, job_id) == [(0, HERE), (2, OTHER_CODE)]
+
+
+def test_consent_that_was_not_needed_is_not_kept(store: Store) -> None:
+    job_id = paused(store).id
+    store.command(job_id, Command.RESUME, accept_changes=True)
+
+    def pause(done: CompletedIteration, state: JobState) -> None:
+        if done.iteration == 2:
+            store.command(job_id, Command.PAUSE)
+
+    assert run(store, HERE, pause).state is JobState.PAUSED
+    store.command(job_id, Command.RESUME)
+    assert run(store, OTHER_CODE).state is JobState.FAILED
+
+
+def test_consent_is_withdrawn_by_resuming_without_it(store: Store) -> None:
+    job_id = paused(store).id
+    store.command(job_id, Command.RESUME, accept_changes=True)
+    store.command(job_id, Command.PAUSE)
+    store.command(job_id, Command.RESUME)
+    assert run(store, OTHER_CODE).state is JobState.FAILED
+
+
+def test_a_job_that_was_never_begun_is_not_begun_with_something_else(store: Store) -> None:
+    made, _ = store.create_job(SPEC, provenance=HERE)
+    assert run(store, OTHER_CODE).state is JobState.FAILED
+    assert store.job(made.id).progress.iterations == 0
+
+
+def test_a_job_that_is_extended_is_not_extended_with_something_else(store: Store) -> None:
+    made, _ = store.create_job(SPEC, provenance=HERE)
+    run(store, HERE)
+    store.extend(made.id, SPEC.iterations + 1)
+    refused = run(store, OTHER_CODE)
+    assert (refused.state, refused.progress.iterations) == (JobState.FAILED, SPEC.iterations)
+
+
+def test_a_job_is_not_taken_over_by_a_runner_that_computes_something_else(store: Store) -> None:
+    made, _ = store.create_job(SPEC, provenance=HERE)
+    assert store.claim("killed", lease_seconds=0.0) is not None
+    assert run(store, OTHER_CODE).state is JobState.FAILED
+    assert store.job(made.id).progress.iterations == 0
+
+
+def test_a_job_that_was_stored_before_provenance_was_goes_on_with_consent_alone(
+    store: Store, forget_provenance: Callable[[], None]
+) -> None:
+    job_id = paused(store).id
+    forget_provenance()
+    assert recorded(store, job_id) == []
+    store.command(job_id, Command.RESUME)
+    refused = run(store, HERE)
+    assert (refused.state, refused.progress.iterations) == (JobState.FAILED, 2)
+    assert refused.error is not None
+    assert "it was stored before gaitswarm recorded what numbers depend on" in refused.error
+    store.command(job_id, Command.RESUME, accept_changes=True)
+    assert run(store, HERE).state is JobState.SUCCEEDED
+    assert recorded(store, job_id) == [(2, HERE)]
+
+
+def test_a_job_that_was_stored_before_provenance_was_and_never_begun_has_nothing_to_mix(
+    store: Store, forget_provenance: Callable[[], None]
+) -> None:
+    made, _ = store.create_job(SPEC, provenance=HERE)
+    forget_provenance()
+    assert run(store, OTHER_CODE).state is JobState.SUCCEEDED
+    assert recorded(store, made.id) == [(0, OTHER_CODE)]
+
+
+def test_a_submitted_job_has_the_provenance_of_the_process_that_submits_it(store: Store) -> None:
+    submitted, _ = JobService(store).submit(SPEC)
+    cloned, _ = JobService(store).submit(store.job(submitted.id).spec)
+    for made in (submitted, cloned):
+        assert recorded(store, made.id) == [(0, job_provenance(SPEC))]
+
+
+def test_whoever_goes_on_with_a_job_can_ask_before_it_is_queued(store: Store) -> None:
+    found = paused(store)
+    JobService(store, provenance=lambda _: HERE).check_unchanged(found)
+    with pytest.raises(ProvenanceChanged, match="other simulation code"):
+        JobService(store, provenance=lambda _: OTHER_CODE).check_unchanged(found)
+    assert store.job(found.id).state is JobState.PAUSED
+
+
+def test_a_job_whose_robot_cannot_be_read_fails_with_the_reason(store: Store) -> None:
+    store.create_job(SPEC, provenance=HERE)
+
+    def unreadable(_: Spec) -> JobProvenance:
+        raise RobotFileError("robot.toml: motors: Field required")
+
+    claim = store.claim("runner", lease_seconds=30.0)
+    assert claim is not None
+    failed = run_claim(claim, Surroundings(store, FormulaEvaluator(), provenance=unreadable))
+    assert failed.state is JobState.FAILED
+    assert failed.error is not None and "robot.toml: motors: Field required" in failed.error
+
+
+def test_a_worker_that_computes_something_else_fails_the_job_with_its_reason(store: Store) -> None:
+    store.create_job(SPEC, provenance=HERE)
+    claim = store.claim("runner", lease_seconds=30.0)
+    assert claim is not None
+    unlike = ProvenanceChanged("a worker on node-7: no C compiler")
+    around = Surroundings(store, FormulaEvaluator([None, unlike]), provenance=lambda _: HERE)
+    failed = run_claim(claim, around)
+    assert (failed.state, failed.error) == (JobState.FAILED, str(unlike))
+    assert failed.progress.iterations == 1
+
+
+def test_walks_are_asked_for_with_the_provenance_of_whoever_claimed_the_job() -> None:
+    going_on = Claimed(Claim(job(), "runner", 1, None), OTHER_CODE, accepts_changes=True)
+    _, actions = handle(Coordination(), going_on)
+    assert [type(action) for action in actions] == [Record, Begin, Evaluate]
+    sent = actions[-1]
+    assert isinstance(sent, Evaluate) and sent.request.provenance == OTHER_CODE.simulation
+
+
+def test_a_refused_claim_sends_nothing() -> None:
+    _, actions = handle(Coordination(), Claimed(Claim(job(), "runner", 1, None), OTHER_CODE))
+    assert [type(action) for action in actions] == [Release]
+
+
+def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
+    used = (ParticleSwarm, JobSpec, IdentificationSpec, Spec, DesignSpace, Preference, judge)
+    files = {Path(inspect.getfile(thing)) for thing in used}
+    search = Path(inspect.getfile(ParticleSwarm)).parent
+    files |= {file for file in search.glob("*.py") if file.name != "__init__.py"}
+    assert files == set(optimizer_files())

@@ -10,6 +10,7 @@ from sqlalchemy import Engine, event
 
 from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 
@@ -209,6 +210,37 @@ def test_a_second_pause_is_a_conflict_that_names_the_way_out(
 
     assert answer.status_code == 409
     assert "resume" in answer.json()["detail"]
+    assert client.get(f"/v1/jobs/{job.id}").json()["state"] == "paused"
+
+
+def test_a_job_shows_what_its_numbers_depend_on_since_which_iteration(
+    client: httpx2.Client,
+) -> None:
+    job = client.post("/v1/jobs", json=SPEC).json()
+
+    (record,) = job["provenance"]
+    assert record["from_iteration"] == 0
+    assert record["provenance"] == job_provenance(JobSpec(**SPEC)).model_dump(mode="json")
+    assert client.get(f"/v1/jobs/{job['id']}").json()["provenance"] == job["provenance"]
+
+
+@pytest.mark.parametrize("body", [None, {}, {"accept_changes": False}, {"accept_changes": True}])
+def test_changes_are_accepted_only_by_a_body_that_says_so(
+    client: httpx2.Client, store: SqlStore, job: Job, body: dict[str, bool] | None
+) -> None:
+    client.post(f"/v1/jobs/{job.id}/pause")
+    resumed = client.post(f"/v1/jobs/{job.id}/resume", json=body)
+
+    assert (resumed.status_code, resumed.json()["state"]) == (202, "queued")
+    assert store.job(job.id).accepts_changes is (body == {"accept_changes": True})
+
+
+def test_an_unknown_field_of_a_resumption_is_named(client: httpx2.Client, job: Job) -> None:
+    client.post(f"/v1/jobs/{job.id}/pause")
+    refused = client.post(f"/v1/jobs/{job.id}/resume", json={"accept": True})
+
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "accept"
     assert client.get(f"/v1/jobs/{job.id}").json()["state"] == "paused"
 
 

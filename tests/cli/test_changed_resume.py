@@ -6,11 +6,14 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from services.runtime import open_store
 from tests.cli.conftest import Finished, Gaitswarm
 
 pytestmark = pytest.mark.slow
@@ -118,3 +121,15 @@ def test_changes_are_accepted_of_a_job_that_is_resumed_and_of_no_new_one(
     refused = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--accept-changes")
     assert refused.code == 2 and "accept-changes" in refused.err
     assert not db.exists()
+
+
+def test_consent_reaches_a_job_in_a_database_and_on_a_server(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, place: Callable[[Path], list[str]]
+) -> None:
+    job_id = gaitswarm("submit", "--spec", small_spec, "--db", db).out.strip()
+    where = place(db)
+    for accepted, options in ((True, ["--accept-changes"]), (False, [])):
+        assert gaitswarm("pause", job_id, *where).code == 0
+        assert gaitswarm("resume", job_id, *options, *where).code == 0
+        with closing(open_store(str(db))) as store:
+            assert store.job(job_id).accepts_changes is accepted

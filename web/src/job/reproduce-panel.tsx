@@ -4,6 +4,7 @@ import type { Job } from '../api/types'
 import { CopyBlock } from '../components/copy-button'
 import { withQuery } from '../router/routes'
 import { curlCommand, submitCommand } from './commands'
+import { ProvenanceCard } from './provenance-card'
 
 export function ReproducePanel({ job }: { job: Job }) {
   return (
@@ -17,7 +18,8 @@ export function ReproducePanel({ job }: { job: Job }) {
         </header>
         <div class="stack">
           <p class="muted small">
-            The same spec with the same seed gives the same designs and the same bits.
+            The same spec with the same seed gives the same designs and the same bits, where its
+            numbers depend on the same.
           </p>
           <div class="stack-tight">
             <h3>With the command line</h3>
@@ -29,6 +31,7 @@ export function ReproducePanel({ job }: { job: Job }) {
           </div>
         </div>
       </section>
+      <ProvenanceCard job={job} />
       <section class="card" aria-labelledby="spec">
         <h2 id="spec">The spec as JSON</h2>
         <CopyBlock label="the spec" text={JSON.stringify(job.spec, null, 2)} />

@@ -69,6 +69,7 @@ def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> 
         "id": job.id,
         "state": job.state.value,
         "variables": job.spec.design_space().names,
+        "provenance": [record.model_dump(mode="json") for record in job.provenance],
     }
     opening = json.dumps(head, indent=2).removesuffix("\n}")
     sys.stdout.write(f'{opening},\n  "iterations": ')

@@ -103,9 +103,11 @@ def test_a_change_that_is_accepted_is_recorded_from_that_iteration_on(
     before = history(extended, gaitswarm)
     resumed = resume(extended, "--accept-changes", **another_robot_file(tmp_path))
     assert resumed.returncode == 0, resumed.stderr
-    assert history(extended, gaitswarm)["iterations"][:2] == before["iterations"]
+    after = history(extended, gaitswarm)
+    assert after["iterations"][:2] == before["iterations"]
     job = gaitswarm("status", extended.id, "--db", extended.db, "--json").json
     assert (job["state"], job["iterations"]) == ("succeeded", 4)
+    assert after["provenance"] == job["provenance"]
     first, second = job["provenance"]
     assert [first, *extended.job["provenance"]] == [first, first]
     assert (first["from_iteration"], second["from_iteration"]) == (0, 2)

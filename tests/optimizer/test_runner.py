@@ -11,16 +11,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from services.optimizer.errors import Conflict, EvaluatorUnavailable, StoreUnavailable
 from services.optimizer.jobs.job import Command, CompletedIteration, Job, JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.coordinator import Backoff
+from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.runner import Runner, Surroundings, run_claim
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
 from services.runtime import run_embedded
 from sim.errors import SimulationInputError
+from sim.outcome import Outcome
 from tests.optimizer.formula import SPEC, FormulaEvaluator
 
 
@@ -320,10 +323,23 @@ def test_an_embedded_run_that_is_told_to_stop_leaves_the_job_queued(store: Store
     assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
 
 
+class NotingEvaluator(FormulaEvaluator):
+    """Keeps the designs that it was given."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.designs: list[NDArray[np.float64]] = []
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        self.designs.append(request.designs.copy())
+        return super().evaluate(request, should_stop)
+
+
 def test_recorded_designs_are_what_was_evaluated(store: Store) -> None:
-    job_id = queue(store)
-    run(store, FormulaEvaluator())
-    space = SPEC.design_space()
-    for evaluation in store.evaluations(job_id, SPEC.iterations - 1):
-        searched = evaluation.design[: len(space.variables)]
-        assert np.all((searched >= space.low) & (searched <= space.high))
+    job_id = queue(store, SPEC.model_copy(update={"variables": ("P",), "fixed": {"I": 0.1}}))
+    evaluator = NotingEvaluator()
+    run(store, evaluator)
+    recorded = [e.design for e in store.evaluations_between(job_id, 0, SPEC.iterations)]
+    np.testing.assert_array_equal(recorded, np.concatenate(evaluator.designs))

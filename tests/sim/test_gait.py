@@ -13,7 +13,7 @@ from sim.gait.inverse_kinematics import leg_angles
 from sim.gait.trajectory import desired_angles, low_pass, n_ticks
 from sim.robot import Robot, load_robot
 from sim.robot.posture import feet_below_body, resting_height
-from sim.scenario import SCENARIOS, Scenario
+from sim.scenario import SCENARIOS
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +125,6 @@ def test_at_rest_the_springs_carry_the_weight(robot: Robot) -> None:
 
 def test_a_robot_rests_on_the_feet_that_reach_the_ground(robot: Robot) -> None:
     swinging = SCENARIOS[0].model_copy(update={"duty_factor": 0.45})
-    assert isinstance(swinging, Scenario)
     joints = desired_angles(robot, swinging).angles[0]
     height = resting_height(robot, joints, 66.3)
     compression = 0.010 - (height + feet_below_body(robot, joints))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -106,8 +106,7 @@ def test_bad_designs_are_statuses_beside_good_ones() -> None:
     assert outcome.statuses.tolist() == [Status.OK, Status.UNREACHABLE]
     assert np.isnan(outcome.objectives[1]).all()
     limp = simulate(SCENARIOS[0], "pi", ["P", "I"], np.array([[0.0, 0.0], [0.3, 0.1]])).outcome
-    assert limp.statuses[0] in (Status.STALLED, Status.FELL)
-    assert limp.statuses[1] == Status.OK
+    assert limp.statuses.tolist() == [Status.STALLED, Status.OK]
     assert not np.isfinite(limp.objectives[0, 3:5]).any()
 
 
@@ -119,7 +118,8 @@ def test_an_overloaded_robot_falls() -> None:
 def test_every_status_has_a_phrase_and_a_label() -> None:
     for status in Status:
         assert Status.from_label(status.label) is status
-        assert len(status.phrase) > 10
+        assert status.phrase.strip()
+    assert len({status.phrase for status in Status}) == len(Status)
 
 
 def test_an_unreachable_pose_names_scenario_leg_and_miss() -> None:
@@ -162,6 +162,6 @@ def test_scenarios_are_found_by_name_and_number() -> None:
 
 def test_an_unreachable_pose_comes_back_from_another_process_as_itself() -> None:
     error = UnreachablePose("steep", "left_rear", 0.0123)
-    again = copy.copy(error)  # by the same route as pickle, __reduce__
+    again = pickle.loads(pickle.dumps(error))  # noqa: S301 - of our own making
     assert type(again) is UnreachablePose
     assert (again.leg, again.miss, str(again)) == (error.leg, error.miss, str(error))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import combinations
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -104,6 +105,7 @@ def test_every_task_leaves_once_and_no_job_with_work_falls_behind(
     queue = FairQueue[tuple[str, int]]()
     pushed: list[tuple[str, int]] = []
     popped: list[tuple[str, int]] = []
+    costs: dict[int, float] = {}
     for number, step in enumerate(steps):
         if step is None:
             task = queue.pop()
@@ -112,10 +114,23 @@ def test_every_task_leaves_once_and_no_job_with_work_falls_behind(
         else:
             flow, cost = step
             pushed.append((flow, number))
+            costs[number] = cost
             queue.push(flow, cost, (flow, number))
         assert len(queue) == len(pushed) - len(popped)
+    left = Counter(flow for flow, _ in pushed) - Counter(flow for flow, _ in popped)
+    largest = {
+        flow: max((costs[k] for name, k in pushed if name == flow), default=0.0) for flow in "abc"
+    }
+    served = dict.fromkeys("abc", 0.0)
     while (task := queue.pop()) is not None:
         popped.append(task)
+        flow, number = task
+        left[flow] -= 1
+        served[flow] += costs[number]
+        # The bound of start-time fair queuing, while two jobs have work: a task of each.
+        for one, other in combinations([name for name in "abc" if left[name] > 0], 2):
+            ahead = abs(served[one] - served[other])
+            assert ahead <= largest[one] + largest[other] + 1e-9
     assert sorted(popped) == sorted(pushed)
     for flow in "abc":
         numbers = [number for name, number in popped if name == flow]

@@ -20,7 +20,7 @@ DURATIONS = [scenario.duration for scenario in SCENARIOS]
     slots=st.integers(1, 64),
     lanes=st.sampled_from([1, 2, 4, 8, 16]),
 )
-def test_every_design_of_every_trial_is_in_one_chunk_and_lanes_are_filled(
+def test_every_design_of_every_case_is_in_one_chunk_and_lanes_are_filled(
     durations: list[float], designs: int, slots: int, lanes: int
 ) -> None:
     chunks = cut(durations, designs, slots=slots, lanes=lanes)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from services.optimizer.analysis.identifiability import Trust
 from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import JobState
@@ -109,8 +110,9 @@ def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: SqlStore, twi
     found = service.identifiability(jobs)
     assert [p.variable.name for p in found.parameters] == list(VARIABLES)
     assert found.fitness == tuple(job.progress.best_fitness for job in jobs)
-    assert all(p.trust is not None and len(p.intervals) == 12 for p in found.parameters)
-    assert service.identifiability(jobs[:1]).parameters[0].trust is None
+    # Two short runs find much the same battery and mass, and two efficiencies far apart.
+    assert [p.trust for p in found.parameters] == [Trust.ROUGH, Trust.ROUGH, Trust.UNKNOWN]
+    assert [p.trust for p in service.identifiability(jobs[:1]).parameters] == [None] * 3
 
 
 def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin) -> None:

@@ -120,9 +120,11 @@ def test_two_walks_are_shown_together(
     assert not np.array_equal(pixels(player(page).locator("canvas")), ghost)
 
 
-def test_a_walk_that_ends_in_a_fall_says_so(
+def test_a_walk_that_is_worth_nothing_says_why(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go('/walk?controller=p&design={"P":0}')
 
-    expect(page.locator("[data-status]")).not_to_have_attribute("data-status", "ok")
+    status = page.locator("[data-status]")
+    expect(status).to_have_attribute("data-status", "stalled")
+    expect(status).to_contain_text("robot did not move forward")

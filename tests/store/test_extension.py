@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -96,7 +97,7 @@ def test_the_same_key_still_means_the_job_as_it_was_submitted(store: SqlStore) -
 def test_a_job_of_an_older_schema_has_the_budget_of_its_spec(fresh_url: str) -> None:
     database = connect(parse_url(fresh_url), for_migration=True)
     config = Config()
-    config.set_main_option("script_location", str(migrate._MIGRATIONS))
+    config.set_main_option("script_location", str(Path(migrate.__file__).with_name("migrations")))
     with database.transaction(write=True) as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, "0002")

@@ -107,7 +107,7 @@ def provenance_of(robot: RobotSource) -> Provenance:
         SimulationInputError: the robot's description cannot be used.
     """
     machine = load_robot(robot)
-    content = machine.description.model_dump_json() + machine.urdf
+    content = machine.description.model_dump_json() + machine.urdf.text
     # With a compiler, a kernel is compiled or an error is raised: never replaced by the reference.
     native = find_compiler() is not None or native_kernel(machine) is not None
     return Provenance(

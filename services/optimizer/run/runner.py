@@ -187,7 +187,7 @@ class _Run:
     def _do(self, action: Action) -> Event | None:
         match action:
             case Record(provenance=provenance):
-                self.around.store.record_provenance(self.claim, provenance)
+                self._stored(lambda: self.around.store.record_provenance(self.claim, provenance))
                 return None
             case Begin(ask=ask):
                 self._stored(lambda: self.around.store.begin(self.claim, ask))

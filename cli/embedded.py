@@ -14,7 +14,7 @@ from services.optimizer.jobs.job import Command, Job, JobState
 from services.runtime import EvaluatorKind, open_evaluator, run_embedded, stop_on_signals
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.local import LocalJobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.views import JobView
     from services.optimizer.jobs.job import CompletedIteration
     from services.optimizer.jobs.spec import Spec
@@ -110,7 +110,7 @@ class Embedded:
 
 
 def finish(
-    jobs: LocalJobs, job_id: str, interrupted: bool, *, as_json: bool, compare: bool
+    jobs: DatabaseJobs, job_id: str, interrupted: bool, *, as_json: bool, compare: bool
 ) -> None:
     """Print the result. Raises KeyboardInterrupt if interrupted, JobEnded unless it succeeded."""
     job = jobs.job(job_id)

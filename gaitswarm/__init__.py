@@ -28,17 +28,42 @@ if TYPE_CHECKING:
         JobEnded,
         LeaseLost,
         NotFound,
+        ProvenanceChanged,
         StoreUnavailable,
         Unavailable,
     )
+    from gaitswarm.jobs.async_database import AsyncDatabaseJobs
+    from gaitswarm.jobs.async_port import AsyncJobs
+    from gaitswarm.jobs.async_server import AsyncServerJobs
+    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
+    from gaitswarm.jobs.port import JobEvent, Jobs
+    from gaitswarm.jobs.server import ServerJobs
+    from gaitswarm.optimization import OptimizationResult, optimize
     from gaitswarm.simulation import simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
+    from gaitswarm.specs import SpecOptions
     from gaitswarm.tables import EvaluationTable, Table
+    from gaitswarm.views import (
+        BestView,
+        EvaluationView,
+        HistoryIterationView,
+        IterationView,
+        JobSummaryView,
+        JobView,
+        RankingView,
+        StateView,
+    )
+    from gaitswarm.views.identification import IdentifiabilityView
+    from gaitswarm.views.replay import WalkReplay
+    from gaitswarm.views.surface import SurfaceView
     from services.optimizer.jobs.identification import IdentificationSpec
     from services.optimizer.jobs.preference import PREFERENCES, Preference
     from services.optimizer.jobs.tuning import JobSpec
+    from services.optimizer.run.coordinator import Backoff
     from services.optimizer.search.pso import PsoSettings
     from sim.controllers import CONTROLLERS
+    from sim.identification.recorded_walk import RecordedWalk
     from sim.kernel.observation import WalkLog
     from sim.outcome import OBJECTIVES, Status
     from sim.robot import RobotFiles, RobotVariant
@@ -52,48 +77,95 @@ __all__ = [
     "OBJECTIVES",
     "PREFERENCES",
     "SCENARIOS",
+    "AsyncDatabaseJobs",
+    "AsyncJobs",
+    "AsyncServerJobs",
+    "Backoff",
+    "BestView",
     "Conflict",
+    "DatabaseJobs",
     "EvaluationTable",
+    "EvaluationView",
     "EvaluatorUnavailable",
     "GaitswarmError",
+    "HistoryIterationView",
     "IdempotencyConflict",
+    "IdentifiabilityView",
     "IdentificationSpec",
     "Interrupted",
     "InvalidRequest",
+    "IterationView",
     "JobEnded",
+    "JobEvent",
     "JobSpec",
+    "JobSummaryView",
+    "JobView",
+    "Jobs",
     "LeaseLost",
     "NotFound",
+    "OptimizationResult",
     "Preference",
+    "ProvenanceChanged",
     "PsoSettings",
+    "RankingView",
+    "RecordedWalk",
     "RobotFiles",
     "RobotVariant",
     "Scenario",
     "ScenarioResult",
+    "ServerJobs",
     "SimulationResult",
+    "SpecOptions",
+    "StateView",
     "Status",
     "StoreUnavailable",
+    "SurfaceView",
     "Table",
     "Unavailable",
     "Variable",
     "WalkLog",
+    "WalkReplay",
     "__version__",
+    "connect",
+    "connect_async",
+    "open",
+    "open_async",
+    "optimize",
     "simulate",
 ]
 
 _MODULES: Final = {
     "gaitswarm.errors": (
         "Conflict", "EvaluatorUnavailable", "GaitswarmError", "IdempotencyConflict", "Interrupted",
-        "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "StoreUnavailable", "Unavailable",
+        "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged", "StoreUnavailable",
+        "Unavailable",
     ),
+    "gaitswarm.jobs.async_database": ("AsyncDatabaseJobs",),
+    "gaitswarm.jobs.async_port": ("AsyncJobs",),
+    "gaitswarm.jobs.async_server": ("AsyncServerJobs",),
+    "gaitswarm.jobs.database": ("DatabaseJobs",),
+    "gaitswarm.jobs.open": ("connect", "connect_async", "open", "open_async"),
+    "gaitswarm.jobs.port": ("JobEvent", "Jobs"),
+    "gaitswarm.jobs.server": ("ServerJobs",),
+    "gaitswarm.optimization": ("OptimizationResult", "optimize"),
     "gaitswarm.simulation": ("simulate",),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
+    "gaitswarm.specs": ("SpecOptions",),
     "gaitswarm.tables": ("EvaluationTable", "Table"),
+    "gaitswarm.views": (
+        "BestView", "EvaluationView", "HistoryIterationView", "IterationView", "JobSummaryView",
+        "JobView", "RankingView", "StateView",
+    ),
+    "gaitswarm.views.identification": ("IdentifiabilityView",),
+    "gaitswarm.views.replay": ("WalkReplay",),
+    "gaitswarm.views.surface": ("SurfaceView",),
     "services.optimizer.jobs.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.tuning": ("JobSpec",),
     "services.optimizer.search.pso": ("PsoSettings",),
+    "services.optimizer.run.coordinator": ("Backoff",),
     "sim.controllers": ("CONTROLLERS",),
+    "sim.identification.recorded_walk": ("RecordedWalk",),
     "sim.kernel.observation": ("WalkLog",),
     "sim.outcome": ("OBJECTIVES", "Status"),
     "sim.robot": ("RobotFiles", "RobotVariant"),

@@ -4,6 +4,7 @@ GaitswarmError              everything that gaitswarm raises on purpose
 ├── InvalidRequest          what was asked makes no sense; `field` names the argument or field
 ├── NotFound                no job, iteration, recording or result of that id
 ├── Conflict                not possible in the job's present state
+│   ├── ProvenanceChanged   its numbers would depend on something else than those it has
 │   └── IdempotencyConflict the key was used before for another job
 ├── JobEnded                the job that was waited for did not succeed; `job` says why
 ├── LeaseLost               another process, or a cancellation, has taken the job
@@ -29,6 +30,7 @@ from services.optimizer.errors import (
     InvalidRequest,
     LeaseLost,
     NotFound,
+    ProvenanceChanged,
     StoreUnavailable,
     Unavailable,
 )
@@ -113,6 +115,7 @@ __all__ = [
     "JobEnded",
     "LeaseLost",
     "NotFound",
+    "ProvenanceChanged",
     "StoreUnavailable",
     "Unavailable",
     "invalid_request",

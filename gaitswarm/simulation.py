@@ -8,17 +8,15 @@ from typing import Final, Protocol, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ValidationError
 
-from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
+from gaitswarm.errors import InvalidRequest, simulation_errors
+from gaitswarm.requests import arguments
 from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
     PreferenceInput,
     RobotInput,
     ScenarioInput,
-    robot_source,
-    scenario_entries,
 )
 from services.optimizer.jobs.preference import judge
 from services.optimizer.run.evaluator import EvaluationRequest
@@ -92,7 +90,7 @@ def simulate(
     columns = _columns(designs)
     variables = tuple(columns)
     rows = np.stack(list(columns.values()), axis=1)
-    request = simulation_request(
+    request = arguments.simulation(
         dict(zip(variables, rows[0].tolist(), strict=True)),
         scenarios=scenarios,
         controller=controller,
@@ -113,30 +111,6 @@ def simulate(
         raise InvalidRequest("must be at least 1", field="cpus")
     with simulation_errors("designs"):
         return _simulated(request, variables, rows, backend, cpus)
-
-
-def simulation_request(
-    design: Mapping[str, float],
-    *,
-    scenarios: ScenarioInput | Iterable[ScenarioInput],
-    controller: ControllerName,
-    robot: RobotInput,
-    preference: PreferenceInput,
-    log: bool,
-) -> SimulationRequest:
-    """The request that keywords mean, as `simulate` takes them. Raises InvalidRequest."""
-    document = {
-        "robot": robot_source(robot),
-        "controller": controller,
-        "design": dict(design),
-        "scenarios": scenario_entries(scenarios),
-        "preference": preference,
-        "log": log,
-    }
-    try:
-        return SimulationRequest.model_validate(document)
-    except ValidationError as error:
-        raise invalid_request(error, document) from error
 
 
 def simulate_request(request: SimulationRequest) -> SimulationResult:

@@ -106,7 +106,7 @@ def identify(
     from cli.parameters_table import read_truth, show_parameters
     from cli.robots import chosen_robot
     from cli.spec_file import parse_spec
-    from gaitswarm.jobs.local import LocalJobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
     from services.optimizer.jobs.job import JobState
@@ -140,7 +140,7 @@ def identify(
             ended = store.job(job.id)
             if ended.state is not JobState.SUCCEEDED:
                 note(f"job {job.id} is {ended.state}: {ended.error or 'no reason was given'}")
-        jobs = LocalJobs(service, url)
+        jobs = DatabaseJobs(service, url)
         show_parameters(jobs.parameters([job.id for job in submitted]), known, as_json=as_json)
 
 

@@ -66,7 +66,7 @@ def optimize(
     from cli.embedded import Embedded, finish, resumed_job
     from cli.output import note
     from cli.spec_file import Overrides, build_spec
-    from gaitswarm.jobs.local import LocalJobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
     from services.optimizer.errors import InvalidRequest
@@ -88,7 +88,7 @@ def optimize(
     url = database_to_write(settings)
     with closing(open_store(url)) as store:
         service = JobService(store)
-        jobs = LocalJobs(service, url)
+        jobs = DatabaseJobs(service, url)
         if asked is not None and resume is None:
             job, _ = service.submit(asked)
         else:

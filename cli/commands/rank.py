@@ -37,7 +37,7 @@ def rank(
 
     request = _request(preference, top)
     with open_jobs(server, db) as jobs:
-        ranking = jobs.ranking(job_id, request)
+        ranking = jobs.ranking(job_id, request.preference, top=request.top)
     if as_json:
         print_json(ranking)
     else:

@@ -1,15 +1,133 @@
-"""Which jobs a command means, and the way to them."""
+"""The way to jobs: in a database, behind a server, or wherever options and environment say."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from services.optimizer.errors import InvalidRequest, NotFound, StoreUnavailable
+from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
+from services.optimizer.run.coordinator import Backoff
 
 if TYPE_CHECKING:
+    from gaitswarm.jobs.async_database import AsyncDatabaseJobs
+    from gaitswarm.jobs.async_server import AsyncServerJobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.port import Jobs
+    from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.settings import Settings
+
+
+def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
+    db: str | os.PathLike[str] | None = None, *, create: bool = True
+) -> DatabaseJobs:
+    """Open a database of jobs in this process.
+
+    Args:
+        db: A file name, sqlite:///FILE, or postgresql://USER:PASSWORD@HOST/DATABASE. None: that of
+            the environment (GAITSWARM_DB), else the user's own, which `gaitswarm` uses as well.
+        create: Whether an SQLite file that is not there is made.
+
+    Returns:
+        The jobs in it, as a context manager; `run` runs them here.
+
+    Raises:
+        NotFound: There is no such file, and none is to be made.
+        StoreUnavailable: The database cannot be opened, or is of a later version.
+    """
+    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.settings import read_settings
+    from services.optimizer.service import JobService
+    from services.runtime import open_store
+
+    settings = read_settings(db=None if db is None else os.fspath(db))
+    url = database_to_write(settings) if create else settings.database
+    file = _sqlite_file(url)
+    if file is not None and not create and not file.exists():
+        raise NotFound(
+            f"there is no database {file} yet; `gaitswarm optimize` makes it with its first job,"
+            " and --db or --server names another place"
+        )
+    return DatabaseJobs(JobService(open_store(url)), url)
+
+
+def open_async(
+    db: str | os.PathLike[str] | None = None, *, create: bool = True
+) -> AsyncDatabaseJobs:
+    """Open a database of jobs, for a program with an event loop.
+
+    Args:
+        db: As for `open`.
+        create: Whether an SQLite file that is not there is made.
+
+    Returns:
+        The jobs in it, as an asynchronous context manager, which opens the database and raises
+        what `open` raises.
+    """
+    from gaitswarm.jobs.async_database import AsyncDatabaseJobs
+    from gaitswarm.settings import read_settings
+
+    url = read_settings(db=None if db is None else os.fspath(db)).database
+    return AsyncDatabaseJobs(url, lambda: open(db, create=create))
+
+
+def connect(
+    url: str,
+    *,
+    timeout: float | None = None,
+    backoff: Backoff | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> ServerJobs:
+    """Reach the jobs of a server, such as `gaitswarm serve`.
+
+    Args:
+        url: Of the server, such as http://127.0.0.1:8000. Nothing is sent yet.
+        timeout: Longest silence of the server [s]; default 30.
+        backoff: How long to wait before which of the further attempts, where a connection breaks
+            or the server is busy, and the request may safely be repeated.
+        headers: Sent with every request, such as what a proxy asks for.
+
+    Returns:
+        The server's jobs, as a context manager.
+
+    Raises:
+        InvalidRequest: It is not a URL.
+    """
+    from gaitswarm.jobs.attempts import BACKOFF
+    from gaitswarm.jobs.server import TIMEOUT, ServerJobs
+
+    return ServerJobs(url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=headers)
+
+
+def connect_async(
+    url: str,
+    *,
+    timeout: float | None = None,
+    backoff: Backoff | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> AsyncServerJobs:
+    """Reach the jobs of a server, for a program with an event loop.
+
+    Args:
+        url: Of the server, such as http://127.0.0.1:8000. Nothing is sent yet.
+        timeout: Longest silence of the server [s]; default 30.
+        backoff: As for `connect`.
+        headers: Sent with every request.
+
+    Returns:
+        The server's jobs, as an asynchronous context manager.
+
+    Raises:
+        InvalidRequest: It is not a URL.
+    """
+    from gaitswarm.jobs.async_server import AsyncServerJobs
+    from gaitswarm.jobs.attempts import BACKOFF
+    from gaitswarm.jobs.server import TIMEOUT
+
+    return AsyncServerJobs(
+        url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=headers
+    )
 
 
 def database_to_write(settings: Settings) -> str:
@@ -59,22 +177,9 @@ def open_jobs(server: str | None, db: str | None, *, create: bool = False) -> Jo
         raise InvalidRequest("jobs are either on a server or in a database", field="--server, --db")
     settings = read_settings(server=server or None, db=db or None)
     if settings.server and not db:
-        from gaitswarm.jobs.remote import RemoteJobs
-
-        return RemoteJobs(settings.server)
-
-    from gaitswarm.jobs.local import LocalJobs
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
-
-    url = database_to_write(settings) if create else settings.database
-    file = _sqlite_file(url)
-    if file is not None and not create and not file.exists():
-        raise NotFound(
-            f"there is no database {file} yet; `gaitswarm optimize` makes it with its first job,"
-            " and --db or --server names another place"
-        )
-    return LocalJobs(JobService(open_store(url)), url)
+        # Somebody waits in front of a terminal.
+        return connect(settings.server, backoff=Backoff(first=0.25, longest=5.0, attempts=2))
+    return open(db or None, create=create)
 
 
 def _sqlite_file(url: str) -> Path | None:

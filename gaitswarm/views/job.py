@@ -120,6 +120,11 @@ class JobSummaryView(View):
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
+    @property
+    def last_iteration(self) -> int | None:
+        """Index of the last committed iteration; None before the first."""
+        return self.iterations - 1 if self.iterations else None
+
     @classmethod
     def from_job(cls, job: Job) -> JobSummaryView:
         """From the job alone: no further query."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.views.base import View, finite, framed
+from gaitswarm.views.base import View, finite, framed, unframed
 from gaitswarm.views.evaluation import StatusName
 from sim.kernel.parameters import gravity_on
 from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
@@ -194,6 +196,45 @@ def encoded_replay(
         channels=channels,
     )
     return framed(header, frames)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkReplay:
+    """A walk to look at: what is known of it, and where everything was in each of F frames.
+
+    Attributes:
+        header: Scenario, status, objectives, and the robot with its links and shapes.
+        channels: Arrays (F, ...) by name, such as "link_pose" (F, links, 7) and "joint_angle"
+            (F, joints); `header.channels` has their units and labels.
+    """
+
+    header: ReplayHeaderView
+    channels: Mapping[str, NDArray[np.float32]]
+
+
+def decoded_replay(content: bytes) -> WalkReplay:
+    """The walk in the bytes of `encoded_replay`.
+
+    Args:
+        content: All of them.
+
+    Returns:
+        Its header, and its frames by channel.
+
+    Raises:
+        ValueError: They are not those of a replay, or are cut off.
+    """
+    text, numbers = unframed(content)
+    header = ReplayHeaderView.model_validate_json(text)
+    frames = numbers.reshape(header.frames, -1)
+    channels = {
+        channel.name: frames[:, channel.offset : channel.offset + math.prod(channel.shape)]
+        for channel in header.channels
+    }
+    return WalkReplay(
+        header,
+        {c.name: channels[c.name].reshape(header.frames, *c.shape) for c in header.channels},
+    )
 
 
 def _channels(walk: Replay, joints: Sequence[str], legs: Sequence[str]) -> list[ChannelView]:

@@ -67,14 +67,27 @@ def test_names_can_be_listed_before_they_are_used_and_others_do_not_exist() -> N
         _ = gaitswarm.optimise
 
 
+def test_jobs_have_the_same_methods_for_programs_with_an_event_loop() -> None:
+    def methods(kind: type) -> dict[str, inspect.Signature]:
+        found = {n: f for n, f in inspect.getmembers(kind) if inspect.isfunction(f)}
+        return {n: inspect.signature(f) for n, f in found.items() if not n.startswith("_")}
+
+    blocking, others = methods(gaitswarm.Jobs), methods(gaitswarm.AsyncJobs)
+    assert blocking.keys() == others.keys()
+    for name, signature in blocking.items():
+        assert signature.parameters == others[name].parameters
+
+
 def documented() -> Iterator[tuple[str, Any]]:
-    """Public functions, and classes with their public methods; models document their fields."""
+    """Public functions, and classes with their public methods; models document their fields, and
+    the methods of `AsyncJobs` are documented at `Jobs`.
+    """
     for name in gaitswarm.__all__:
         value = getattr(gaitswarm, name)
         if inspect.isfunction(value):
             yield name, value
         elif inspect.isclass(value) and value.__module__.startswith("gaitswarm."):
-            if hasattr(value, "model_fields"):
+            if hasattr(value, "model_fields") or value is gaitswarm.AsyncJobs:
                 continue
             inherited = {member for base in value.__mro__[1:] for member in vars(base)}
             for member, attribute in vars(value).items():

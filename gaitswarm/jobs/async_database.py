@@ -1,0 +1,341 @@
+"""Jobs in a database, for programs with an event loop: the work is done in threads."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Self, TypeVar, Unpack
+
+import anyio
+from anyio import from_thread, to_thread
+from anyio.lowlevel import checkpoint
+
+from gaitswarm.jobs.async_port import AsyncJobs
+from gaitswarm.jobs.database import DatabaseJobs
+from gaitswarm.jobs.port import JobEvent
+from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.specs import (
+    PreferenceInput,
+    RobotInput,
+    ScenarioInput,
+    SpecInput,
+    SpecOptions,
+)
+from gaitswarm.tables import EvaluationTable, TableFormat
+from gaitswarm.views import (
+    BestView,
+    EstimateView,
+    HistoryIterationView,
+    IterationView,
+    JobSummaryView,
+    JobView,
+    RankingView,
+)
+from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.replay import WalkReplay
+from gaitswarm.views.surface import SurfaceView
+from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.run.evaluator import Evaluator
+from services.runtime import EvaluatorKind
+from sim.controllers import ControllerName
+from sim.identification.recorded_walk import RecordedWalk
+
+T = TypeVar("T")
+
+
+class AsyncDatabaseJobs(AsyncJobs):
+    """Jobs in a database, which is opened with the context, or when it is first used."""
+
+    def __init__(self, url: str, connect: Callable[[], DatabaseJobs]) -> None:
+        """Name the database.
+
+        Args:
+            url: Of the database.
+            connect: Opens it; called once, in a thread.
+        """
+        self._url = url
+        self._connect = connect
+        self._opened: DatabaseJobs | None = None
+        self._opening = anyio.Lock()
+
+    @property
+    def url(self) -> str:
+        """The database's file name or URL."""
+        return self._url
+
+    async def submit(
+        self,
+        spec: SpecInput | None = None,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[SpecOptions],
+    ) -> JobView:
+        """Queue a job in the database, for `run` or a runner of another process."""
+        jobs = await self._jobs()
+        call = partial(jobs.submit, spec, idempotency_key=idempotency_key, **options)
+        return await to_thread.run_sync(call)
+
+    async def estimate(
+        self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
+    ) -> EstimateView:
+        """Say what a job would cost on this machine."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.estimate, spec, **options))
+
+    async def run(
+        self,
+        job_id: str,
+        *,
+        evaluator: EvaluatorKind | Evaluator = "in-process",
+        cpus: int | None = None,
+        ray_address: str | None = None,
+        accept_changes: bool = False,
+        on_iteration: Callable[[IterationView], None] | None = None,
+    ) -> JobView:
+        """Run a job here and now; where this is cancelled, the job is given back to the queue.
+
+        Args:
+            job_id: Identifier of the job.
+            evaluator: As for `DatabaseJobs.run`.
+            cpus: Walks to compute at once on this machine; default all processors.
+            ray_address: A Ray cluster that runs already; without, one is started and ended.
+            accept_changes: Whether the job goes on although what its numbers depend on (code,
+                robot, compiler) has changed, which is then recorded with it.
+            on_iteration: Called in the event loop after each iteration is committed.
+
+        Returns:
+            The job as it is then: ended or paused.
+
+        Raises:
+            Conflict: The job was cancelled, or another process runs it.
+            ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
+            EvaluatorUnavailable: Ray cannot be started or reached.
+        """
+        jobs = await self._jobs()
+        stop = threading.Event()
+
+        def told(iteration: IterationView) -> None:
+            if on_iteration is not None and not stop.is_set():
+                from_thread.run_sync(on_iteration, iteration)
+
+        work = partial(
+            jobs.run,
+            job_id,
+            evaluator=evaluator,
+            cpus=cpus,
+            ray_address=ray_address,
+            accept_changes=accept_changes,
+            on_iteration=told,
+            stop=stop,
+        )
+
+        async def stop_with_the_task() -> None:
+            try:
+                await anyio.sleep_forever()
+            finally:
+                stop.set()
+
+        ended: JobView | Exception
+        async with anyio.create_task_group() as group:
+            group.start_soon(stop_with_the_task)
+            try:
+                # The thread is waited for even where the task is cancelled.
+                ended = await to_thread.run_sync(work)
+            except Exception as error:  # noqa: BLE001 - raised again, outside the group
+                ended = error
+            group.cancel_scope.cancel()
+        # Where the task was cancelled meanwhile, it ends here.
+        await checkpoint()
+        if isinstance(ended, Exception):
+            raise ended
+        return ended
+
+    async def jobs(
+        self,
+        *,
+        state: JobState | str | None = None,
+        search: str = "",
+        order: JobOrder | str = JobOrder.CREATED,
+        limit: int | None = None,
+    ) -> AsyncIterator[JobSummaryView]:
+        """List the database's jobs, read by pages."""
+        jobs = await self._jobs()
+        found = partial(jobs.jobs, state=state, search=search, order=order, limit=limit)
+        async for job in _iterated(found):
+            yield job
+
+    async def job(self, job_id: str) -> JobView:
+        """Read one job."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.job, job_id)
+
+    async def command(
+        self, job_id: str, command: Command | str, *, accept_changes: bool = False
+    ) -> JobView:
+        """Change a job's state; a process that runs it sees that."""
+        jobs = await self._jobs()
+        call = partial(jobs.command, job_id, command, accept_changes=accept_changes)
+        return await to_thread.run_sync(call)
+
+    async def extend(self, job_id: str, iterations: int) -> JobView:
+        """Write another budget for a job."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.extend, job_id, iterations)
+
+    async def best(self, job_id: str) -> BestView:
+        """Read the best design of a job."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.best, job_id)
+
+    async def iterations(
+        self, job_id: str, *, after: int | None = None
+    ) -> AsyncIterator[IterationView]:
+        """Read committed iterations by pages."""
+        jobs = await self._jobs()
+        async for iteration in _iterated(partial(jobs.iterations, job_id, after=after)):
+            yield iteration
+
+    async def history(self, job_id: str) -> AsyncIterator[HistoryIterationView]:
+        """Read committed iterations with their particles, by pieces."""
+        jobs = await self._jobs()
+        async for iteration in _iterated(partial(jobs.history, job_id)):
+            yield iteration
+
+    async def evaluations(self, job_id: str) -> EvaluationTable:
+        """Read every evaluation."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.evaluations, job_id)
+
+    async def follow(self, job_id: str, *, after: int | None = None) -> AsyncIterator[JobEvent]:
+        """Look at the job from time to time, and tell what is new."""
+        jobs = await self._jobs()
+        news = jobs.news(job_id, after=after)
+        while True:
+            async for event in _iterated(news.poll):
+                yield event
+            if news.ended:
+                return
+            await anyio.sleep(jobs.poll_seconds)
+
+    async def ranking(
+        self, job_id: str, preference: PreferenceInput, *, top: int = 20
+    ) -> RankingView:
+        """Rank a job's designs from what is stored."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.ranking, job_id, preference, top=top))
+
+    async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
+        """Compare runs from what is stored."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.parameters, job_ids)
+
+    async def export(
+        self, job_id: str, file_format: TableFormat = "parquet"
+    ) -> AsyncIterator[bytes]:
+        """Write every evaluation as a file, in parts as they are read."""
+        jobs = await self._jobs()
+        async for part in _iterated(partial(jobs.export, job_id, file_format)):
+            yield part
+
+    async def record(self, walk: RecordedWalk) -> RecordingView:
+        """Write a recorded walk into the database."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.record, walk)
+
+    async def recording(self, recording_id: str) -> RecordedWalk:
+        """Read a recorded walk."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.recording, recording_id)
+
+    async def simulate(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        preference: PreferenceInput = "A",
+        log: bool = False,
+    ) -> SimulationResult:
+        """Let a design walk in a thread of this process."""
+        jobs = await self._jobs()
+        call = partial(
+            jobs.simulate,
+            design,
+            scenarios=scenarios,
+            controller=controller,
+            robot=robot,
+            preference=preference,
+            log=log,
+        )
+        return await to_thread.run_sync(call)
+
+    async def replay(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenario: ScenarioInput = "normal-fast",
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        rate: float = 50.0,
+    ) -> WalkReplay:
+        """Let a design walk in a thread of this process, to look at it."""
+        jobs = await self._jobs()
+        call = partial(
+            jobs.replay, design, scenario=scenario, controller=controller, robot=robot, rate=rate
+        )
+        return await to_thread.run_sync(call)
+
+    async def surface(
+        self,
+        design: Mapping[str, float],
+        *,
+        controller: ControllerName = "fuzzy-pi",
+        error_points: int = 65,
+        current_points: int = 33,
+        velocity_error: float = 0.0,
+    ) -> SurfaceView:
+        """Compute a fuzzy controller's surfaces in a thread."""
+        jobs = await self._jobs()
+        call = partial(
+            jobs.surface,
+            design,
+            controller=controller,
+            error_points=error_points,
+            current_points=current_points,
+            velocity_error=velocity_error,
+        )
+        return await to_thread.run_sync(call)
+
+    async def close(self) -> None:
+        """Close the database, if it was opened."""
+        if self._opened is not None:
+            await to_thread.run_sync(self._opened.close)
+
+    async def __aenter__(self) -> Self:
+        await self._jobs()
+        return self
+
+    async def _jobs(self) -> DatabaseJobs:
+        async with self._opening:
+            if self._opened is None:
+                self._opened = await to_thread.run_sync(self._connect)
+            return self._opened
+
+
+async def _iterated(items: Callable[[], Iterator[T]]) -> AsyncIterator[T]:
+    """Items of an iterator, each taken in a thread."""
+    iterator = await to_thread.run_sync(items)
+    while True:
+        taken = await to_thread.run_sync(_next, iterator)
+        if not taken:
+            return
+        yield taken[0]
+
+
+def _next(iterator: Iterator[T]) -> tuple[T, ...]:
+    """The next item, or none: StopIteration cannot leave a thread."""
+    for item in iterator:
+        return (item,)
+    return ()

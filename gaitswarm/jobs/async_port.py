@@ -1,0 +1,206 @@
+"""The port for programs with an event loop."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Self, Unpack
+
+from gaitswarm.jobs.port import JobEvent
+from services.optimizer.jobs.job import Command, JobOrder, JobState
+from sim.controllers import ControllerName
+
+if TYPE_CHECKING:
+    from gaitswarm.simulation_result import SimulationResult
+    from gaitswarm.specs import (
+        PreferenceInput,
+        RobotInput,
+        ScenarioInput,
+        SpecInput,
+        SpecOptions,
+    )
+    from gaitswarm.tables import EvaluationTable, TableFormat
+    from gaitswarm.views import (
+        BestView,
+        EstimateView,
+        HistoryIterationView,
+        IterationView,
+        JobSummaryView,
+        JobView,
+        RankingView,
+    )
+    from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+    from gaitswarm.views.replay import WalkReplay
+    from gaitswarm.views.surface import SurfaceView
+    from sim.identification.recorded_walk import RecordedWalk
+
+
+class AsyncJobs(ABC):
+    """`Jobs` for asyncio (`gaitswarm.open_async`, `gaitswarm.connect_async`).
+
+    Methods have the names, arguments, results and errors of `Jobs`, where they are documented; they
+    are awaited, or iterated with `async for`.
+    """
+
+    @property
+    @abstractmethod
+    def url(self) -> str:
+        """Where the jobs are: the database's file or URL, or the server's URL."""
+
+    @abstractmethod
+    async def submit(
+        self,
+        spec: SpecInput | None = None,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[SpecOptions],
+    ) -> JobView:
+        """Check that a job can be simulated, and queue it."""
+
+    @abstractmethod
+    async def estimate(
+        self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
+    ) -> EstimateView:
+        """Say what a job would cost; nothing is stored."""
+
+    @abstractmethod
+    def jobs(
+        self,
+        *,
+        state: JobState | str | None = None,
+        search: str = "",
+        order: JobOrder | str = JobOrder.CREATED,
+        limit: int | None = None,
+    ) -> AsyncIterator[JobSummaryView]:
+        """List jobs."""
+
+    @abstractmethod
+    async def job(self, job_id: str) -> JobView:
+        """Look at one job."""
+
+    @abstractmethod
+    async def command(
+        self, job_id: str, command: Command | str, *, accept_changes: bool = False
+    ) -> JobView:
+        """Pause, resume or cancel a job."""
+
+    async def pause(self, job_id: str) -> JobView:
+        """Pause a job when its present iteration is committed."""
+        return await self.command(job_id, Command.PAUSE)
+
+    async def resume(self, job_id: str, *, accept_changes: bool = False) -> JobView:
+        """Queue a paused or failed job again."""
+        return await self.command(job_id, Command.RESUME, accept_changes=accept_changes)
+
+    async def cancel(self, job_id: str) -> JobView:
+        """End a job for good; what it has committed stays."""
+        return await self.command(job_id, Command.CANCEL)
+
+    @abstractmethod
+    async def extend(self, job_id: str, iterations: int) -> JobView:
+        """Give a job another budget; one that has succeeded is queued again."""
+
+    @abstractmethod
+    async def best(self, job_id: str) -> BestView:
+        """Take the best design that a job has found so far."""
+
+    @abstractmethod
+    def iterations(self, job_id: str, *, after: int | None = None) -> AsyncIterator[IterationView]:
+        """List the committed iterations of a job."""
+
+    @abstractmethod
+    def history(self, job_id: str) -> AsyncIterator[HistoryIterationView]:
+        """List the committed iterations of a job with every particle."""
+
+    @abstractmethod
+    async def evaluations(self, job_id: str) -> EvaluationTable:
+        """Take every evaluation of a job at once, as arrays."""
+
+    @abstractmethod
+    def follow(self, job_id: str, *, after: int | None = None) -> AsyncIterator[JobEvent]:
+        """Follow a job until it has ended; a paused one is waited for.
+
+        A loop that is left early should close it, as `contextlib.aclosing` does.
+        """
+
+    async def wait(self, job_id: str) -> JobView:
+        """Wait until a job has ended; a paused one is waited for."""
+        job = await self.job(job_id)
+        async for _ in self.follow(job_id, after=job.last_iteration):
+            pass
+        return await self.job(job_id)
+
+    @abstractmethod
+    async def ranking(
+        self, job_id: str, preference: PreferenceInput, *, top: int = 20
+    ) -> RankingView:
+        """Judge all designs of a job by another preference; no walk is run."""
+
+    @abstractmethod
+    async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
+        """See which parameters runs of one problem agree on, so that they can be trusted."""
+
+    @abstractmethod
+    def export(self, job_id: str, file_format: TableFormat = "parquet") -> AsyncIterator[bytes]:
+        """Write every evaluation of a job as a file."""
+
+    @abstractmethod
+    async def record(self, walk: RecordedWalk) -> RecordingView:
+        """Keep a recorded walk, to which jobs can fit parameters of the robot."""
+
+    @abstractmethod
+    async def recording(self, recording_id: str) -> RecordedWalk:
+        """Take a recorded walk."""
+
+    @abstractmethod
+    async def simulate(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        preference: PreferenceInput = "A",
+        log: bool = False,
+    ) -> SimulationResult:
+        """Let one design walk where the jobs are."""
+
+    @abstractmethod
+    async def replay(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenario: ScenarioInput = "normal-fast",
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        rate: float = 50.0,
+    ) -> WalkReplay:
+        """Let one design walk, to look at it: where every link is, frame by frame."""
+
+    @abstractmethod
+    async def surface(
+        self,
+        design: Mapping[str, float],
+        *,
+        controller: ControllerName = "fuzzy-pi",
+        error_points: int = 65,
+        current_points: int = 33,
+        velocity_error: float = 0.0,
+    ) -> SurfaceView:
+        """Take the surfaces of a fuzzy controller, by its rules and by its table."""
+
+    @abstractmethod
+    async def close(self) -> None:
+        """Release connections. Closing twice does no harm."""
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self.close()

@@ -1,0 +1,194 @@
+"""When a call is sent again, and what its failure means. No I/O here; both clients lean on it.
+
+Sent again are calls that do no harm twice, GET and those with an idempotency key: when the
+connection could not be made or broke, and on 503, after the time that the server asks for.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from email.utils import parsedate_to_datetime
+from http import HTTPStatus
+from typing import Final, TypeVar
+
+import httpx2
+from pydantic import ValidationError
+
+from gaitswarm.errors import (
+    Conflict,
+    GaitswarmError,
+    IdempotencyConflict,
+    InvalidRequest,
+    NotFound,
+    StoreUnavailable,
+)
+from gaitswarm.jobs.calls import Call
+from gaitswarm.jobs.port import JobEvent
+from gaitswarm.views import IterationView, ProblemView, StateView
+from services.optimizer.jobs.job import JobState
+from services.optimizer.run.coordinator import Backoff
+
+T = TypeVar("T")
+
+BACKOFF: Final = Backoff(first=0.25, longest=10.0, attempts=4)
+"""How a call is repeated unless told otherwise."""
+
+RECONNECT: Final = Backoff(first=1.0, longest=1.0, attempts=30)
+"""How a broken stream of events is taken up again: a server that restarts is back by then."""
+
+_TRANSIENT: Final = (httpx2.NetworkError, httpx2.ConnectTimeout, httpx2.RemoteProtocolError)
+"""The connection was not made, or broke."""
+
+_ERRORS: Final[Mapping[int, type[GaitswarmError]]] = {
+    HTTPStatus.NOT_FOUND: NotFound,
+    HTTPStatus.CONFLICT: Conflict,
+}
+
+
+class Attempts:
+    """The attempts at one call: counts failures, and says when to try again or what went wrong."""
+
+    def __init__(self, call: Call[T], url: str, backoff: Backoff) -> None:
+        self._repeatable = call.repeatable
+        self._url = url
+        self._backoff = backoff
+        self._failures = 0
+
+    def after_failure(self, error: httpx2.HTTPError) -> float:
+        """Seconds to wait before the next attempt.
+
+        Args:
+            error: Why there is no answer.
+
+        Raises:
+            StoreUnavailable: There is to be no further attempt.
+        """
+        seconds = self._next(0.0) if isinstance(error, _TRANSIENT) else None
+        if seconds is None:
+            raise unreachable(self._url, error) from error
+        return seconds
+
+    def after_refusal(self, response: httpx2.Response) -> float:
+        """Seconds to wait before the next attempt.
+
+        Args:
+            response: An error of the server, with its body.
+
+        Raises:
+            GaitswarmError: There is to be no further attempt: the error that the server had.
+        """
+        seconds = None
+        if response.status_code == HTTPStatus.SERVICE_UNAVAILABLE:
+            seconds = self._next(_retry_after(response))
+        if seconds is None:
+            raise error_of(response)
+        return seconds
+
+    def _next(self, at_least: float) -> float | None:
+        self._failures += 1
+        delay = self._backoff.delay(self._failures) if self._repeatable else None
+        # A server that asks for more patience than there is gets no further attempt.
+        if delay is None or at_least > self._backoff.longest:
+            return None
+        return max(delay, at_least)
+
+
+class Following:
+    """What has been seen of a job's events, over all connections that it took."""
+
+    def __init__(self, url: str, after: int | None, backoff: Backoff) -> None:
+        self.last = after
+        self.ended = False
+        self._url = url
+        self._backoff = backoff
+        self._state: JobState | None = None
+        self._failures = 0
+
+    def event(self, sent: httpx2.ServerSentEvent) -> JobEvent | None:
+        """The event that was sent; None if it is no news."""
+        self._failures = 0
+        if sent.event == "iteration":
+            iteration = IterationView.model_validate_json(sent.data)
+            self.last = iteration.index
+            return iteration
+        if sent.event != "state":
+            return None
+        state = StateView.model_validate_json(sent.data)
+        self.ended = state.state.terminal
+        # A new connection begins with the state that the one before has told.
+        told, self._state = self._state, state.state
+        return None if state.state is told else state
+
+    def after_break(self, error: httpx2.HTTPError | StoreUnavailable | None) -> float:
+        """Seconds to wait before connecting again.
+
+        Args:
+            error: What broke the connection; None where the server ended the stream.
+
+        Raises:
+            StoreUnavailable: It broke too often in a row.
+        """
+        if error is None:
+            return self._backoff.first
+        self._failures += 1
+        seconds = self._backoff.delay(self._failures)
+        if seconds is not None:
+            return seconds
+        if isinstance(error, StoreUnavailable):
+            raise error
+        raise unreachable(self._url, error) from error
+
+
+def result(call: Call[T], response: httpx2.Response, url: str) -> T:
+    """What a successful answer says. Raises StoreUnavailable if it makes no sense."""
+    try:
+        return call.read(response.content)
+    except ValueError as error:
+        raise foreign(url) from error
+
+
+def unreachable(url: str, error: Exception) -> StoreUnavailable:
+    """The server did not answer."""
+    return StoreUnavailable(
+        f"server {url}: {str(error) or type(error).__name__}; start one with `gaitswarm serve`, or"
+        " check the URL"
+    )
+
+
+def foreign(url: str) -> StoreUnavailable:
+    """The server answered something else."""
+    return StoreUnavailable(
+        f"server {url} does not answer as a gaitswarm server of this version does"
+    )
+
+
+def error_of(response: httpx2.Response) -> GaitswarmError:
+    """The error that the server had, again."""
+    try:
+        problem = ProblemView.model_validate_json(response.content)
+    except ValidationError:
+        return StoreUnavailable(f"server answered {response.status_code} without saying why")
+    if problem.type.endswith(":idempotency-conflict"):
+        return IdempotencyConflict(problem.detail)
+    kind = _ERRORS.get(problem.status)
+    if kind is not None:
+        return kind(problem.detail)
+    # What the client got wrong is bad input; anything else is for the server's owner.
+    if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
+        return StoreUnavailable(problem.detail)
+    field = problem.errors[0].field if problem.errors else ""
+    return InvalidRequest(problem.detail.removeprefix(f"{field}: "), field=field)
+
+
+def _retry_after(response: httpx2.Response) -> float:
+    """Seconds that the server asks to wait; 0 if it does not say."""
+    text = response.headers.get("Retry-After", "")
+    try:
+        return max(0.0, float(text))
+    except ValueError:
+        pass
+    try:
+        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
+    except ValueError:
+        return 0.0

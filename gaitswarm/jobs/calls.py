@@ -1,0 +1,224 @@
+"""Requests of the HTTP API as values: what is sent, and how its answer is read. No I/O here.
+
+The client that blocks and the one that does not send the same ones.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, Generic, TypeVar
+from urllib.parse import quote
+
+from pydantic import BaseModel
+
+from gaitswarm.errors import NotFound
+from gaitswarm.requests.replay import ReplayRequest
+from gaitswarm.requests.surface import SurfaceRequest
+from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.tables import EvaluationTable, TableFormat
+from gaitswarm.views import (
+    BestView,
+    CatalogueView,
+    EstimateView,
+    EvaluationView,
+    IterationView,
+    JobSummaryView,
+    JobView,
+    PageView,
+    RankingRequest,
+    RankingView,
+    SimulationView,
+)
+from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.replay import WalkReplay, decoded_replay
+from gaitswarm.views.surface import SurfaceView
+from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.spec import Spec
+from sim.controllers import ControllerName
+from sim.identification.recorded_walk import RecordedWalk
+
+T = TypeVar("T")
+V = TypeVar("V", bound=BaseModel)
+
+IDEMPOTENCY_KEY: Final = "Idempotency-Key"
+
+_PAGE: Final = 100
+"""Items asked for at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Generic[T]):
+    """One request.
+
+    Attributes:
+        method: HTTP method.
+        path: Path under the API's prefix.
+        read: Makes the result of a successful answer's body; raises ValueError for one that is
+            not what it should be.
+        params: Query.
+        body: JSON; None for none.
+        headers: Further headers.
+    """
+
+    method: str
+    path: str
+    read: Callable[[bytes], T]
+    params: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
+    body: str | None = None
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether sending it twice does what sending it once does."""
+        return self.method == "GET" or IDEMPOTENCY_KEY in self.headers
+
+
+def submit(spec: Spec, key: str) -> Call[JobView]:
+    """Queue a job."""
+    headers = {IDEMPOTENCY_KEY: key}
+    return _posted("/jobs", JobView, spec, headers)
+
+
+def estimate(spec: Spec) -> Call[EstimateView]:
+    """Say what a job would cost."""
+    return _posted("/estimates", EstimateView, spec)
+
+
+def jobs(
+    state: JobState | None, search: str, order: JobOrder, after: str | None
+) -> Call[PageView[JobSummaryView]]:
+    """A page of the list of jobs."""
+    chosen = {"search": search, "order": order.value}
+    if state is not None:
+        chosen["state"] = state.value
+    return _page("/jobs", PageView[JobSummaryView], after, chosen)
+
+
+def job(job_id: str) -> Call[JobView]:
+    """Look at one job."""
+    return _got(_job(job_id), JobView)
+
+
+def command(job_id: str, asked: Command, accept_changes: bool) -> Call[JobView]:
+    """Pause, resume or cancel."""
+    body = json.dumps({"accept_changes": True}) if accept_changes else None
+    return Call("POST", f"{_job(job_id)}/{asked.value}", JobView.model_validate_json, body=body)
+
+
+def extend(job_id: str, iterations: int) -> Call[JobView]:
+    """Give a job another budget."""
+    body = json.dumps({"iterations": iterations})
+    return Call("POST", f"{_job(job_id)}/extend", JobView.model_validate_json, body=body)
+
+
+def best(job_id: str) -> Call[BestView]:
+    """Take the best design."""
+    return _got(f"{_job(job_id)}/best", BestView)
+
+
+def iterations(job_id: str, after: str | None) -> Call[PageView[IterationView]]:
+    """A page of a job's committed iterations."""
+    return _page(f"{_job(job_id)}/iterations", PageView[IterationView], after)
+
+
+def evaluations_of(job_id: str, iteration: int) -> Call[CatalogueView[EvaluationView]]:
+    """Every particle of one iteration."""
+    path = f"{_job(job_id)}/iterations/{iteration}/evaluations"
+    return _got(path, CatalogueView[EvaluationView])
+
+
+def evaluations(job_id: str, spec: Spec) -> Call[EvaluationTable]:
+    """Every evaluation of a job at once."""
+
+    def read(content: bytes) -> EvaluationTable:
+        return EvaluationTable.from_parquet(spec, content)
+
+    return Call("GET", f"{_job(job_id)}/export", read, {"format": "parquet"})
+
+
+def export(job_id: str, file_format: TableFormat) -> Call[bytes]:
+    """Every evaluation of a job as a file."""
+    return Call("GET", f"{_job(job_id)}/export", bytes, {"format": file_format})
+
+
+def events(job_id: str, last: int | None) -> Call[bytes]:
+    """The stream of what happens to a job, after one iteration."""
+    headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
+    if last is not None:
+        headers["Last-Event-ID"] = str(last)
+    return Call("GET", f"{_job(job_id)}/events", bytes, headers=headers)
+
+
+def ranking(job_id: str, request: RankingRequest) -> Call[RankingView]:
+    """Judge all designs of a job by another preference."""
+    return _posted(f"{_job(job_id)}/ranking", RankingView, request)
+
+
+def parameters(job_ids: Sequence[str]) -> Call[IdentifiabilityView]:
+    """See which parameters runs agree on."""
+    first, *others = job_ids
+    path = f"{_job(first)}/parameters"
+    return Call("GET", path, IdentifiabilityView.model_validate_json, {"also": others})
+
+
+def record(walk: RecordedWalk) -> Call[RecordingView]:
+    """Keep a recorded walk."""
+    return _posted("/recordings", RecordingView, walk)
+
+
+def recording(recording_id: str) -> Call[RecordedWalk]:
+    """Take a recorded walk."""
+    return _got(f"/recordings/{_segment(recording_id, 'recording')}", RecordedWalk)
+
+
+def simulate(request: SimulationRequest) -> Call[SimulationResult]:
+    """Let one design walk."""
+
+    def read(content: bytes) -> SimulationResult:
+        return SimulationResult.from_view(SimulationView.model_validate_json(content))
+
+    return Call("POST", "/simulations", read, body=request.model_dump_json())
+
+
+def replay(request: ReplayRequest) -> Call[WalkReplay]:
+    """Let one design walk, to look at it."""
+    return Call("POST", "/replays", decoded_replay, body=request.model_dump_json())
+
+
+def surface(controller: ControllerName, request: SurfaceRequest) -> Call[SurfaceView]:
+    """Take a fuzzy controller's surfaces."""
+    path = f"/controllers/{_segment(controller, 'controller')}/surface"
+    return _posted(path, SurfaceView, request)
+
+
+def _got(path: str, kind: type[V]) -> Call[V]:
+    return Call("GET", path, kind.model_validate_json)
+
+
+def _posted(
+    path: str, kind: type[V], body: BaseModel, headers: Mapping[str, str] | None = None
+) -> Call[V]:
+    text = body.model_dump_json()
+    return Call("POST", path, kind.model_validate_json, body=text, headers=headers or {})
+
+
+def _page(
+    path: str, kind: type[V], after: str | None, params: Mapping[str, str] | None = None
+) -> Call[V]:
+    cursor = {} if after is None else {"after": after}
+    chosen = {**(params or {}), **cursor, "limit": str(_PAGE)}
+    return Call("GET", path, kind.model_validate_json, chosen)
+
+
+def _job(job_id: str) -> str:
+    return f"/jobs/{_segment(job_id, 'job')}"
+
+
+def _segment(name: str, what: str) -> str:
+    """An id as one segment of a path."""
+    if not name or name in (".", ".."):
+        raise NotFound(f"no {what} has the id {name!r}")
+    return quote(name, safe="")

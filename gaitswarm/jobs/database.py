@@ -1,0 +1,370 @@
+"""Jobs in a database that this process opens itself."""
+
+from __future__ import annotations
+
+import shlex
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Final, Unpack
+
+from gaitswarm.errors import NotFound, simulation_errors
+from gaitswarm.jobs.embedded import Workers, run_here
+from gaitswarm.jobs.port import JobEvent, Jobs
+from gaitswarm.requests import arguments
+from gaitswarm.requests.replay import run_replay
+from gaitswarm.requests.surface import run_surface
+from gaitswarm.settings import default_database
+from gaitswarm.simulation import simulate_request
+from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.specs import (
+    PreferenceInput,
+    RobotInput,
+    ScenarioInput,
+    SpecInput,
+    SpecOptions,
+    chosen_spec,
+)
+from gaitswarm.tables import EvaluationTable, TableFormat, encoded_table
+from gaitswarm.views import (
+    BestView,
+    EstimateView,
+    HistoryIterationView,
+    IterationView,
+    JobSummaryView,
+    JobView,
+    RankingView,
+    StateView,
+)
+from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.replay import WalkReplay, decoded_replay
+from gaitswarm.views.surface import SurfaceView
+from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.service import JobService
+from services.runtime import EvaluatorKind
+from sim.controllers import ControllerName
+from sim.identification.recorded_walk import RecordedWalk
+
+POLL_SECONDS: Final = 0.5
+"""How often a job that is followed is looked at [s]."""
+
+_PAGE: Final = 100
+
+
+class DatabaseJobs(Jobs):
+    """Jobs in a database, which this process can run as well. Owns its store."""
+
+    def __init__(
+        self, service: JobService, url: str, *, poll_seconds: float = POLL_SECONDS
+    ) -> None:
+        """Take over a service.
+
+        Args:
+            service: Of the database; closed with this.
+            url: Of the database, as it was opened.
+            poll_seconds: How often a job that is followed is looked at [s].
+        """
+        self._service = service
+        self._url = url
+        self.poll_seconds = poll_seconds
+
+    @property
+    def url(self) -> str:
+        """The database's file name or URL."""
+        return self._url
+
+    @property
+    def place(self) -> str:
+        """Options by which a command finds the same jobs; the default goes without saying."""
+        return "" if self._url == str(default_database()) else f" --db {shlex.quote(self._url)}"
+
+    def submit(
+        self,
+        spec: SpecInput | None = None,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[SpecOptions],
+    ) -> JobView:
+        """Queue a job in the database, for `run` or a runner of another process."""
+        wanted = chosen_spec(spec, options)
+        with simulation_errors("spec"):
+            job, _ = self._service.submit(wanted, idempotency_key=idempotency_key)
+        return self._in_full(job)
+
+    def estimate(
+        self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
+    ) -> EstimateView:
+        """Say what a job would cost on this machine."""
+        wanted = chosen_spec(spec, options)
+        with simulation_errors("spec"):
+            return EstimateView.from_estimate(self._service.estimate(wanted))
+
+    def run(
+        self,
+        job_id: str,
+        *,
+        evaluator: EvaluatorKind | Evaluator = "in-process",
+        cpus: int | None = None,
+        ray_address: str | None = None,
+        accept_changes: bool = False,
+        on_iteration: Callable[[IterationView], None] | None = None,
+        stop: threading.Event | None = None,
+    ) -> JobView:
+        """Run a job here and now, from its last committed iteration to its end.
+
+        A paused or failed job is resumed. Ctrl-C gives the job back to the queue, as does an
+        exception of `on_iteration`, which is passed on.
+
+        Args:
+            job_id: Identifier of the job.
+            evaluator: "in-process": threads of this process; "ray": a Ray cluster; or an evaluator
+                that is open already and stays so.
+            cpus: Walks to compute at once on this machine; default all processors.
+            ray_address: A Ray cluster that runs already; without, one is started and ended.
+            accept_changes: Whether the job goes on although what its numbers depend on (code,
+                robot, compiler) has changed, which is then recorded with it.
+            on_iteration: Called after each iteration is committed.
+            stop: When it is set, by another thread, the job is given back to the queue and the
+                method returns.
+
+        Returns:
+            The job as it is then: ended, paused, or queued if it was stopped.
+
+        Raises:
+            Interrupted: Ctrl-C; says how to go on.
+            Conflict: The job was cancelled, or another process runs it.
+            ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
+            EvaluatorUnavailable: Ray cannot be started or reached.
+        """
+        workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
+
+        def committed(index: int) -> None:
+            if on_iteration is not None:
+                after = index - 1 if index else None
+                on_iteration(next(self.iterations(job_id, after=after)))
+
+        ended = run_here(
+            self._service,
+            self._url,
+            job_id,
+            workers=workers,
+            on_commit=committed,
+            stop=stop,
+            accept_changes=accept_changes,
+        )
+        return self._in_full(ended)
+
+    def jobs(
+        self,
+        *,
+        state: JobState | str | None = None,
+        search: str = "",
+        order: JobOrder | str = JobOrder.CREATED,
+        limit: int | None = None,
+    ) -> Iterator[JobSummaryView]:
+        """List the database's jobs, read by pages."""
+        found = self._all(arguments.state(state), search, arguments.order(order))
+        return map(JobSummaryView.from_job, islice(found, limit))
+
+    def job(self, job_id: str) -> JobView:
+        """Read one job."""
+        return self._in_full(self._service.job(job_id))
+
+    def command(
+        self, job_id: str, command: Command | str, *, accept_changes: bool = False
+    ) -> JobView:
+        """Change a job's state; a process that runs it sees that."""
+        asked = arguments.command(command)
+        return self._in_full(self._service.command(job_id, asked, accept_changes=accept_changes))
+
+    def extend(self, job_id: str, iterations: int) -> JobView:
+        """Write another budget for a job."""
+        return self._in_full(self._service.extend(job_id, iterations))
+
+    def best(self, job_id: str) -> BestView:
+        """Read the best design of a job."""
+        job = self._service.job(job_id)
+        best = self._service.best(job_id)
+        if best is None:
+            raise NotFound(
+                f"job {job_id} has no design yet that walks in every scenario; ask again after its"
+                " next iteration, or see why designs fail in its evaluations"
+            )
+        return BestView.from_evaluation(best, job.spec)
+
+    def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
+        """Read committed iterations by pages."""
+        while True:
+            page = self._service.iterations(job_id, after=after, limit=_PAGE)
+            yield from map(IterationView.from_iteration, page.items)
+            if page.next is None or not page.items:
+                return
+            after = page.items[-1].index
+
+    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
+        """Read committed iterations with their particles, by pieces."""
+        spec = self._service.job(job_id).spec
+        for iteration, evaluations in self._service.history(job_id):
+            yield HistoryIterationView.from_iteration_and_evaluations(iteration, evaluations, spec)
+
+    def evaluations(self, job_id: str) -> EvaluationTable:
+        """Read every evaluation."""
+        job = self._service.job(job_id)
+        return EvaluationTable.from_pieces(job.spec, self._service.column_pieces(job))
+
+    def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
+        """Look at the job from time to time, and tell what is new."""
+        news = self.news(job_id, after=after)
+        while True:
+            yield from news.poll()
+            if news.ended:
+                return
+            time.sleep(self.poll_seconds)
+
+    def news(self, job_id: str, *, after: int | None = None) -> JobNews:
+        """What is new of a job, for those who do the waiting.
+
+        Args:
+            job_id: Identifier of the job.
+            after: Leave out iterations up to this index.
+
+        Returns:
+            An object that is to be asked from time to time.
+        """
+        return JobNews(self._service, job_id, after)
+
+    def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
+        """Rank a job's designs from what is stored."""
+        request = arguments.ranking(preference, top)
+        job = self._service.job(job_id)
+        ranked = self._service.rank(job, request.resolved_preference(), top=request.top)
+        return RankingView.from_ranked_job(request, ranked)
+
+    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
+        """Compare runs from what is stored."""
+        jobs = [self._service.job(job_id) for job_id in arguments.runs(job_ids)]
+        return IdentifiabilityView.from_identifiability(
+            list(job_ids), self._service.identifiability(jobs)
+        )
+
+    def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
+        """Write every evaluation as a file, in parts as they are read."""
+        chosen = arguments.table_format(file_format)
+        job = self._service.job(job_id)
+        return encoded_table(chosen, job.spec, self._service.column_pieces(job))
+
+    def record(self, walk: RecordedWalk) -> RecordingView:
+        """Write a recorded walk into the database."""
+        return RecordingView.from_walk(self._service.record(walk), walk)
+
+    def recording(self, recording_id: str) -> RecordedWalk:
+        """Read a recorded walk."""
+        return self._service.recording(recording_id)
+
+    def simulate(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        preference: PreferenceInput = "A",
+        log: bool = False,
+    ) -> SimulationResult:
+        """Let a design walk in this process."""
+        return simulate_request(
+            arguments.simulation(
+                design,
+                scenarios=scenarios,
+                controller=controller,
+                robot=robot,
+                preference=preference,
+                log=log,
+            )
+        )
+
+    def replay(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenario: ScenarioInput = "normal-fast",
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        rate: float = 50.0,
+    ) -> WalkReplay:
+        """Let a design walk in this process, to look at it."""
+        request = arguments.replay(
+            design, scenario=scenario, controller=controller, robot=robot, rate=rate
+        )
+        with simulation_errors("design"):
+            return decoded_replay(run_replay(request))
+
+    def surface(
+        self,
+        design: Mapping[str, float],
+        *,
+        controller: ControllerName = "fuzzy-pi",
+        error_points: int = 65,
+        current_points: int = 33,
+        velocity_error: float = 0.0,
+    ) -> SurfaceView:
+        """Compute a fuzzy controller's surfaces."""
+        request = arguments.surface(
+            design,
+            error_points=error_points,
+            current_points=current_points,
+            velocity_error=velocity_error,
+        )
+        return run_surface(arguments.controller(controller), request)
+
+    def close(self) -> None:
+        """Close the store."""
+        self._service.store.close()
+
+    def _all(self, state: JobState | None, search: str, order: JobOrder) -> Iterator[Job]:
+        after: str | None = None
+        while True:
+            page = self._service.jobs(
+                state=state, search=search, order=order, after=after, limit=_PAGE
+            )
+            yield from page.items
+            if page.next is None:
+                return
+            after = page.next
+
+    def _in_full(self, job: Job) -> JobView:
+        found = job.progress.best_fitness is not None
+        return JobView.from_job_and_best(job, self._service.best(job.id) if found else None)
+
+
+class JobNews:
+    """What has been told of a job, and what is new.
+
+    Attributes:
+        ended: Whether the job has ended, so that nothing more is to come.
+    """
+
+    def __init__(self, service: JobService, job_id: str, after: int | None) -> None:
+        self.ended = False
+        self._service = service
+        self._job_id = job_id
+        self._after = after
+        self._told: JobState | None = None
+
+    def poll(self) -> Iterator[JobEvent]:
+        """Iterations that were committed since the last time, then the state if it is another."""
+        # The job first: whatever it counts as committed is then among the iterations.
+        job = self._service.job(self._job_id)
+        more = True
+        while more:
+            page = self._service.iterations(self._job_id, after=self._after, limit=_PAGE)
+            for iteration in page.items:
+                self._after = iteration.index
+                yield IterationView.from_iteration(iteration)
+            more = page.next is not None
+        if job.state is not self._told:
+            self._told = job.state
+            yield StateView.from_job(job)
+        self.ended = job.state.terminal

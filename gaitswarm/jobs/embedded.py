@@ -1,0 +1,168 @@
+"""A job run by this process: taken up, run to its end, given back on Ctrl-C."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final, get_args
+
+from gaitswarm.errors import Conflict, Interrupted, InvalidRequest
+from gaitswarm.views import JobView
+from services.optimizer.jobs.job import Command, CompletedIteration, Job, JobState
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.service import JobService
+from services.runtime import EvaluatorKind, open_evaluator, run_embedded
+
+_TAKEN_UP: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
+"""States in which going on with a job needs the command to."""
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """What walks run on: a kind of workers to open, or workers that are open already.
+
+    Raises InvalidRequest for a kind that does not exist, and for no processor.
+    """
+
+    evaluator: EvaluatorKind | Evaluator
+    cpus: int | None = None
+    ray_address: str | None = None
+
+    def __post_init__(self) -> None:
+        kinds = get_args(EvaluatorKind)
+        if isinstance(self.evaluator, str) and self.evaluator not in kinds:
+            raise InvalidRequest(
+                f"{self.evaluator!r} is none of {', '.join(kinds)}", field="evaluator"
+            )
+        if self.cpus is not None and self.cpus < 1:
+            raise InvalidRequest("must be at least 1", field="cpus")
+
+    @contextmanager
+    def opened(self) -> Iterator[Evaluator]:
+        """The workers; those that are opened here are closed again."""
+        if not isinstance(self.evaluator, str):
+            yield self.evaluator
+            return
+        evaluator = open_evaluator(self.evaluator, address=self.ray_address, cpus=self.cpus)
+        try:
+            yield evaluator
+        finally:
+            evaluator.close()
+
+
+def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
+    """Check that a job to be resumed is the one that is asked for.
+
+    Args:
+        stored: Spec of the job.
+        asked: Spec that was given once more.
+        job_id: Identifier of the job.
+
+    Raises:
+        Conflict: They differ in more than the name; names the fields.
+    """
+    before, wanted = stored.model_dump(), asked.resolved().model_dump()
+    changed = [f for f in before if f != "name" and before[f] != wanted.get(f)]
+    if changed:
+        raise Conflict(
+            f"job {job_id} was submitted with another {', '.join(changed)}, and a job stays what it"
+            " is; resume it without a spec and options, or start a new one"
+        )
+
+
+def run_here(
+    service: JobService,
+    url: str,
+    job_id: str,
+    *,
+    workers: Workers,
+    on_commit: Callable[[int], None],
+    stop: threading.Event | None,
+    accept_changes: bool,
+) -> Job:
+    """Run a job until it ends, is paused, or `stop` is set.
+
+    Args:
+        service: Of the database that the job is in.
+        url: Of the database, for messages.
+        job_id: Identifier of the job.
+        workers: What walks run on.
+        on_commit: Called with the index of every iteration that was committed.
+        stop: When set, the job is given back to the queue.
+        accept_changes: Whether it goes on although what its numbers depend on has changed.
+
+    Returns:
+        The job as it is then.
+
+    Raises:
+        Interrupted: Ctrl-C, unless the job has ended meanwhile.
+        Conflict: The job was cancelled, or another process runs it.
+        ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
+    """
+    job = _taken_up(service, job_id, accept_changes=accept_changes)
+    if job.state.terminal:
+        return job
+
+    def committed(done: CompletedIteration, _state: JobState) -> None:
+        on_commit(done.iteration)
+
+    stop = stop or threading.Event()
+    try:
+        with _ctrl_c(stop) as interrupted, workers.opened() as evaluator:
+            job = run_embedded(
+                service.store,
+                evaluator,
+                job_id,
+                on_commit=committed,
+                stop=stop,
+                accepts_changes=accept_changes,
+            )
+    except KeyboardInterrupt as error:
+        raise _interrupted(service.job(job_id), url) from error
+    if interrupted.is_set() and not job.state.terminal:
+        raise _interrupted(job, url)
+    return job
+
+
+def _taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
+    """An earlier job, ready to be run on. Raises NotFound, Conflict."""
+    job = service.job(job_id)
+    if job.state is JobState.CANCELLED:
+        raise Conflict(f"job {job_id} was cancelled, which is for good; start a new one")
+    if job.state is not JobState.SUCCEEDED and not accept_changes:
+        service.check_unchanged(job)
+    return service.command(job_id, Command.RESUME) if job.state in _TAKEN_UP else job
+
+
+def _interrupted(job: Job, url: str) -> Interrupted:
+    return Interrupted(JobView.from_job_and_best(job, None), url)
+
+
+@contextmanager
+def _ctrl_c(stop: threading.Event) -> Iterator[threading.Event]:
+    """The first Ctrl-C sets `stop` and the event that is yielded; the second interrupts at once.
+
+    Where Python's own handler is not in place, or is not this thread's to replace, Ctrl-C does
+    what it does there.
+    """
+    pressed = threading.Event()
+    mine = threading.current_thread() is threading.main_thread()
+    if not mine or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield pressed
+        return
+
+    def handle(_number: int, _frame: Any) -> None:
+        if pressed.is_set():
+            raise KeyboardInterrupt
+        pressed.set()
+        stop.set()
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

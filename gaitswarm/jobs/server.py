@@ -1,0 +1,334 @@
+"""Jobs of a gaitswarm server, over its HTTP API."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from typing import Final, TypeVar, Unpack
+
+import httpx2
+from pydantic import BaseModel, ValidationError
+
+from gaitswarm.errors import InvalidRequest, StoreUnavailable
+from gaitswarm.jobs import calls
+from gaitswarm.jobs.attempts import (
+    BACKOFF,
+    RECONNECT,
+    Attempts,
+    Following,
+    foreign,
+    result,
+    unreachable,
+)
+from gaitswarm.jobs.calls import Call
+from gaitswarm.jobs.port import JobEvent, Jobs
+from gaitswarm.requests import arguments
+from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.specs import (
+    PreferenceInput,
+    RobotInput,
+    ScenarioInput,
+    SpecInput,
+    SpecOptions,
+    chosen_spec,
+)
+from gaitswarm.tables import EvaluationTable, TableFormat
+from gaitswarm.views import (
+    PREFIX,
+    BestView,
+    EstimateView,
+    HistoryIterationView,
+    IterationView,
+    JobSummaryView,
+    JobView,
+    PageView,
+    RankingView,
+)
+from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.replay import WalkReplay
+from gaitswarm.views.surface import SurfaceView
+from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.run.coordinator import Backoff
+from sim.controllers import ControllerName
+from sim.identification.recorded_walk import RecordedWalk
+
+T = TypeVar("T")
+V = TypeVar("V", bound=BaseModel)
+
+TIMEOUT: Final = 30.0
+"""Seconds in which a server must begin to answer, and go on."""
+
+
+class ServerJobs(Jobs):
+    """Jobs behind a server.
+
+    A connection that breaks and a 503 are met by further attempts, where that is safe: for whatever
+    only reads, and for `submit`, which sends an idempotency key of its own.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        timeout: float = TIMEOUT,
+        backoff: Backoff = BACKOFF,
+        reconnect: Backoff = RECONNECT,
+        headers: Mapping[str, str] | None = None,
+        transport: httpx2.BaseTransport | None = None,
+    ) -> None:
+        """Make a client; nothing is sent yet.
+
+        Args:
+            url: Of the server, such as http://127.0.0.1:8000.
+            timeout: Longest silence of the server [s].
+            backoff: How long to wait before which of the further attempts.
+            reconnect: The same where a stream of events broke; each event that comes begins anew.
+            headers: Sent with every request, such as what a proxy asks for.
+            transport: How requests are sent, in place of httpx2's own.
+
+        Raises:
+            InvalidRequest: It is not a URL.
+        """
+        self._url = server_url(url)
+        self._backoff = backoff
+        self._reconnect = reconnect
+        self._client = httpx2.Client(
+            base_url=self._url + PREFIX, timeout=timeout, headers=headers, transport=transport
+        )
+
+    @property
+    def url(self) -> str:
+        """The server's URL."""
+        return self._url
+
+    @property
+    def place(self) -> str:
+        """Options by which a command finds the same jobs."""
+        return f" --server {self._url}"
+
+    def submit(
+        self,
+        spec: SpecInput | None = None,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[SpecOptions],
+    ) -> JobView:
+        """Queue a job on the server; repeated as often as needed, it is queued once."""
+        key = idempotency_key or uuid.uuid4().hex
+        return self._send(calls.submit(chosen_spec(spec, options), key))
+
+    def estimate(
+        self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
+    ) -> EstimateView:
+        """Let the server say what a job would cost there."""
+        return self._send(calls.estimate(chosen_spec(spec, options)))
+
+    def jobs(
+        self,
+        *,
+        state: JobState | str | None = None,
+        search: str = "",
+        order: JobOrder | str = JobOrder.CREATED,
+        limit: int | None = None,
+    ) -> Iterator[JobSummaryView]:
+        """List the server's jobs, page by page."""
+        wanted, sorted_by = arguments.state(state), arguments.order(order)
+        found = self._items(lambda after: calls.jobs(wanted, search, sorted_by, after))
+        return islice(found, limit)
+
+    def job(self, job_id: str) -> JobView:
+        """Ask the server for one job."""
+        return self._send(calls.job(job_id))
+
+    def command(
+        self, job_id: str, command: Command | str, *, accept_changes: bool = False
+    ) -> JobView:
+        """Send a command to a job."""
+        call = calls.command(job_id, arguments.command(command), accept_changes)
+        return self._send(call)
+
+    def extend(self, job_id: str, iterations: int) -> JobView:
+        """Send another budget for a job."""
+        return self._send(calls.extend(job_id, iterations))
+
+    def best(self, job_id: str) -> BestView:
+        """Ask the server for the best design of a job."""
+        return self._send(calls.best(job_id))
+
+    def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
+        """List committed iterations, page by page."""
+        first = None if after is None else str(after)
+        return self._items(lambda cursor: calls.iterations(job_id, cursor or first))
+
+    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
+        """List committed iterations, and ask for the particles of each."""
+        for iteration in self.iterations(job_id):
+            particles = self._send(calls.evaluations_of(job_id, iteration.index)).items
+            yield HistoryIterationView(**dict(iteration), evaluations=particles)
+
+    def evaluations(self, job_id: str) -> EvaluationTable:
+        """Download every evaluation at once."""
+        return self._send(calls.evaluations(job_id, self.job(job_id).spec))
+
+    def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
+        """Read the server's events; a connection that breaks is taken up again where it broke."""
+        self.job(job_id)
+        following = Following(self._url, after, self._reconnect)
+        while True:
+            broken: httpx2.HTTPError | StoreUnavailable | None = None
+            try:
+                yield from self._events(job_id, following)
+                if following.ended:
+                    return
+            except (httpx2.HTTPError, StoreUnavailable) as error:
+                broken = error
+            except ValidationError as error:
+                raise foreign(self._url) from error
+            time.sleep(following.after_break(broken))
+
+    def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
+        """Let the server rank a job's designs."""
+        return self._send(calls.ranking(job_id, arguments.ranking(preference, top)))
+
+    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
+        """Let the server compare runs."""
+        return self._send(calls.parameters(arguments.runs(job_ids)))
+
+    def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
+        """Download every evaluation as a file, in parts as they come."""
+        call = calls.export(job_id, arguments.table_format(file_format))
+        with self._opened(call) as response:
+            try:
+                yield from response.iter_bytes()
+            except httpx2.HTTPError as error:
+                raise unreachable(self._url, error) from error
+
+    def record(self, walk: RecordedWalk) -> RecordingView:
+        """Send a recorded walk to the server."""
+        return self._send(calls.record(walk))
+
+    def recording(self, recording_id: str) -> RecordedWalk:
+        """Ask the server for a recorded walk."""
+        return self._send(calls.recording(recording_id))
+
+    def simulate(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        preference: PreferenceInput = "A",
+        log: bool = False,
+    ) -> SimulationResult:
+        """Let a design walk on the server, which bounds how long."""
+        request = arguments.simulation(
+            design,
+            scenarios=scenarios,
+            controller=controller,
+            robot=robot,
+            preference=preference,
+            log=log,
+        )
+        return self._send(calls.simulate(request))
+
+    def replay(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenario: ScenarioInput = "normal-fast",
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        rate: float = 50.0,
+    ) -> WalkReplay:
+        """Let a design walk on the server, to look at it."""
+        request = arguments.replay(
+            design, scenario=scenario, controller=controller, robot=robot, rate=rate
+        )
+        return self._send(calls.replay(request))
+
+    def surface(
+        self,
+        design: Mapping[str, float],
+        *,
+        controller: ControllerName = "fuzzy-pi",
+        error_points: int = 65,
+        current_points: int = 33,
+        velocity_error: float = 0.0,
+    ) -> SurfaceView:
+        """Ask the server for a fuzzy controller's surfaces."""
+        request = arguments.surface(
+            design,
+            error_points=error_points,
+            current_points=current_points,
+            velocity_error=velocity_error,
+        )
+        return self._send(calls.surface(controller, request))
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._client.close()
+
+    def _items(self, page: Callable[[str | None], Call[PageView[V]]]) -> Iterator[V]:
+        after: str | None = None
+        while True:
+            found = self._send(page(after))
+            yield from found.items
+            if found.next is None:
+                return
+            after = found.next
+
+    def _events(self, job_id: str, following: Following) -> Iterator[JobEvent]:
+        with self._opened(calls.events(job_id, following.last)) as response:
+            for sent in httpx2.EventSource(response):
+                event = following.event(sent)
+                if event is not None:
+                    yield event
+
+    def _send(self, call: Call[T]) -> T:
+        return result(call, self._answer(call), self._url)
+
+    @contextmanager
+    def _opened(self, call: Call[bytes]) -> Iterator[httpx2.Response]:
+        """A successful answer whose body is read as it comes."""
+        response = self._answer(call, stream=True)
+        try:
+            yield response
+        finally:
+            response.close()
+
+    def _answer(self, call: Call[T], *, stream: bool = False) -> httpx2.Response:
+        """A successful answer, after as many attempts as it takes."""
+        attempts = Attempts(call, self._url, self._backoff)
+        while True:
+            try:
+                response = self._client.send(request_of(self._client, call), stream=stream)
+                if response.is_success:
+                    return response
+                response.read()
+                response.close()
+            except httpx2.HTTPError as error:
+                seconds = attempts.after_failure(error)
+            else:
+                seconds = attempts.after_refusal(response)
+            time.sleep(seconds)
+
+
+def server_url(url: str) -> str:
+    """The URL without a slash at its end. Raises InvalidRequest."""
+    if not url.startswith(("http://", "https://")):
+        raise InvalidRequest(f"{url!r} is not a URL like http://127.0.0.1:8000", field="server")
+    return url.rstrip("/")
+
+
+def request_of(client: httpx2.Client | httpx2.AsyncClient, call: Call[T]) -> httpx2.Request:
+    """A call as the client sends it."""
+    headers = dict(call.headers)
+    if call.body is not None:
+        headers["Content-Type"] = "application/json"
+    return client.build_request(
+        call.method, call.path, params=dict(call.params), content=call.body, headers=headers
+    )

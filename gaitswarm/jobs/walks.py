@@ -1,0 +1,102 @@
+"""The part of the port that is about single designs, outside any job."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from sim.controllers import ControllerName
+
+if TYPE_CHECKING:
+    from gaitswarm.simulation_result import SimulationResult
+    from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
+    from gaitswarm.views.replay import WalkReplay
+    from gaitswarm.views.surface import SurfaceView
+
+
+class Walks(ABC):
+    """Single designs on request, computed where the jobs are: in this process, or by the server."""
+
+    @abstractmethod
+    def simulate(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        preference: PreferenceInput = "A",
+        log: bool = False,
+    ) -> SimulationResult:
+        """Let one design walk where the jobs are; see `gaitswarm.simulate` for many.
+
+        Args:
+            design: Value of each of the controller's variables, and of any gait variable, in the
+                variables' units.
+            scenarios: One scenario or several: names or numbers of presets, or `Scenario`; default
+                all presets.
+            controller: Motor controller that drives the robot.
+            robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+            preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+            log: Whether to record every walk at 500 Hz.
+
+        Returns:
+            Arrays of one design.
+
+        Raises:
+            InvalidRequest: An argument makes no sense, the gait leaves the legs' reach, or the
+                walks last longer than the server allows.
+        """
+
+    @abstractmethod
+    def replay(
+        self,
+        design: Mapping[str, float],
+        *,
+        scenario: ScenarioInput = "normal-fast",
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = "szabadka2",
+        rate: float = 50.0,
+    ) -> WalkReplay:
+        """Let one design walk, to look at it: where every link is, frame by frame.
+
+        Args:
+            design: As for `simulate`.
+            scenario: Name or number of a preset, or `Scenario`.
+            controller: Motor controller that drives the robot.
+            robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+            rate: Frames a second, 1 to 500 [Hz].
+
+        Returns:
+            Channels by name, one row a frame, up to the end of a walk that failed.
+
+        Raises:
+            InvalidRequest: As `simulate`.
+        """
+
+    @abstractmethod
+    def surface(
+        self,
+        design: Mapping[str, float],
+        *,
+        controller: ControllerName = "fuzzy-pi",
+        error_points: int = 65,
+        current_points: int = 33,
+        velocity_error: float = 0.0,
+    ) -> SurfaceView:
+        """Take the surfaces of a fuzzy controller, by its rules and by its table.
+
+        Args:
+            design: Value of each of the controller's variables, in their units.
+            controller: A fuzzy controller.
+            error_points: Points of the grid over the error's range, 3 to 129.
+            current_points: Points of the grid over the current's range, 2 to 65.
+            velocity_error: At which the surfaces of fuzzy-pi-3 are taken [counts/s].
+
+        Returns:
+            Sets, rules and surfaces of every output.
+
+        Raises:
+            InvalidRequest: The controller is not fuzzy, or an argument makes no sense.
+        """

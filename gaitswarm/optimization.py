@@ -1,0 +1,170 @@
+"""`gaitswarm.optimize`: one job, run here and now."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.errors import InvalidRequest, JobEnded, NotFound, simulation_errors
+from gaitswarm.jobs.embedded import Workers, check_same
+from gaitswarm.jobs.open import open as open_database
+from gaitswarm.specs import SpecInput, SpecOptions, chosen_spec
+from gaitswarm.tables import EvaluationTable, Table
+from gaitswarm.views import BestView, IterationView, JobView
+from services.optimizer.jobs.job import JobState
+from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.service import check_can_be_simulated
+from services.runtime import EvaluatorKind
+
+if TYPE_CHECKING:
+    from services.optimizer.jobs.documents import AnySpec
+
+
+@dataclass(frozen=True, slots=True)
+class OptimizationResult:
+    """A job that has succeeded, and what it found.
+
+    Attributes:
+        job: The job: spec, state, rates.
+        iterations: Its committed iterations, in order: fitness over the swarm.
+        db: The database that it is in, for `gaitswarm.open` and `optimize(resume=...)`.
+    """
+
+    job: JobView
+    iterations: tuple[IterationView, ...]
+    db: str
+
+    @property
+    def best(self) -> BestView:
+        """The design of least fitness, with its result in every scenario.
+
+        Raises NotFound if no design has walked in every scenario.
+        """
+        if self.job.best is None:
+            raise NotFound(f"job {self.job.id} has no design that walks in every scenario")
+        return self.job.best
+
+    def convergence(self) -> Table:
+        """The iterations as a table.
+
+        Returns:
+            One row an iteration: index, best, mean, median, worst, best_so_far (fitness, minimized,
+            NaN where every design failed), failed (designs) and evaluate_seconds [s].
+        """
+        columns: dict[str, NDArray[Any]] = {
+            name: np.array([getattr(i, name) for i in self.iterations], dtype=kind)
+            for name, kind in _CONVERGENCE.items()
+        }
+        return Table(columns)
+
+    def evaluations(self) -> EvaluationTable:
+        """Every evaluation of the job, read from the database.
+
+        Returns:
+            One row an evaluation: design, fitness, and status, utility and objectives by scenario.
+
+        Raises:
+            StoreUnavailable: The database cannot be opened any more.
+            NotFound: Its file is gone.
+        """
+        with open_database(self.db, create=False) as jobs:
+            return jobs.evaluations(self.job.id)
+
+
+_CONVERGENCE = {
+    "index": np.int64,
+    "best": np.float64,
+    "mean": np.float64,
+    "median": np.float64,
+    "worst": np.float64,
+    "best_so_far": np.float64,
+    "failed": np.int64,
+    "evaluate_seconds": np.float64,
+}
+
+
+def optimize(
+    spec: SpecInput | None = None,
+    *,
+    resume: str | None = None,
+    accept_changes: bool = False,
+    db: str | os.PathLike[str] | None = None,
+    evaluator: EvaluatorKind | Evaluator = "in-process",
+    cpus: int | None = None,
+    ray_address: str | None = None,
+    on_iteration: Callable[[IterationView], None] | None = None,
+    **options: Unpack[SpecOptions],
+) -> OptimizationResult:
+    """Run a job here and now, without a server; every iteration is stored before the next begins.
+
+    Ctrl-C, an exception of `on_iteration`, or the death of the process leave a job that is gone on
+    with by `optimize(resume=...)`, to the same bits as if it had never stopped.
+
+    Args:
+        spec: What to do, as `JobSpec`, `IdentificationSpec`, or a document as in docs/api.md; None
+            for the defaults, those of the thesis's chapter 4.
+        resume: Identifier of an earlier job, to go on with that one. A spec or options that are
+            given as well must be the job's own.
+        accept_changes: Whether a resumed job goes on although what its numbers depend on (code,
+            robot, compiler) has changed, which is then recorded with it.
+        db: Database to keep the job in: a file, or a URL as for `gaitswarm.open`. None: that of
+            the environment (GAITSWARM_DB), else the user's own.
+        evaluator: "in-process": threads of this process; "ray": a Ray cluster; or an evaluator
+            that is open already and stays so.
+        cpus: Walks to compute at once on this machine; default all processors.
+        ray_address: A Ray cluster that runs already; without, one is started and ended.
+        on_iteration: Called after each iteration is committed, for progress.
+        **options: Fields laid over the spec, see `SpecOptions`: name, robot, controller,
+            scenarios, variables, fixed, preference, optimizer, particles, iterations, seed.
+
+    Returns:
+        The finished job with its best design and history.
+
+    Raises:
+        InvalidRequest: The job makes no sense or cannot be simulated; names the field. Nothing is
+            stored then.
+        NotFound: There is no job to resume.
+        Conflict: The job to resume is another than asked for, was cancelled, or is being run by
+            another process.
+        ProvenanceChanged: What the numbers of the job to resume depend on has changed, and that is
+            not accepted.
+        JobEnded: The job failed, or was paused or cancelled by somebody else.
+        Interrupted: Ctrl-C; a KeyboardInterrupt that says how to go on.
+        Unavailable: The database or the workers cannot be used.
+    """
+    if accept_changes and resume is None:
+        raise InvalidRequest("a new job has nothing to go on from", field="accept_changes")
+    asked = None
+    if resume is None or spec is not None or options:
+        asked = _checked(chosen_spec(spec, options))
+    workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
+    with open_database(db, create=resume is None) as jobs:
+        if asked is not None and resume is None:
+            job_id = jobs.submit(asked).id
+        else:
+            job_id = resume or ""
+            if asked is not None:
+                check_same(jobs.job(job_id).spec, asked, job_id)
+        job = jobs.run(
+            job_id,
+            evaluator=workers.evaluator,
+            cpus=cpus,
+            ray_address=ray_address,
+            accept_changes=accept_changes,
+            on_iteration=on_iteration,
+        )
+        if job.state is not JobState.SUCCEEDED:
+            raise JobEnded(job)
+        return OptimizationResult(job, tuple(jobs.iterations(job_id)), jobs.url)
+
+
+def _checked(spec: AnySpec) -> AnySpec:
+    """The spec, if it can be simulated: before a database is made for it."""
+    with simulation_errors("spec"):
+        check_can_be_simulated(spec)
+    return spec

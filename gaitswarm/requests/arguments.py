@@ -1,0 +1,151 @@
+"""Arguments as a program gives them, made into checked values and requests.
+
+All raise InvalidRequest that names the argument, before anything is asked of a database or server.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from enum import StrEnum
+from typing import Any, TypeVar, cast, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from gaitswarm.errors import InvalidRequest, NotFound, invalid_request
+from gaitswarm.requests.replay import ReplayRequest
+from gaitswarm.requests.surface import SurfaceRequest
+from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.specs import (
+    PreferenceInput,
+    RobotInput,
+    ScenarioInput,
+    robot_source,
+    scenario_entries,
+)
+from gaitswarm.tables import TableFormat
+from gaitswarm.views import RankingRequest
+from services.optimizer.jobs.job import Command, JobOrder, JobState
+from sim.controllers import CONTROLLERS, ControllerName
+
+E = TypeVar("E", bound=StrEnum)
+M = TypeVar("M", bound=BaseModel)
+
+
+def state(text: JobState | str | None) -> JobState | None:
+    """A job's state by name; None for any."""
+    return None if text is None else _one_of(JobState, text, "state")
+
+
+def order(text: JobOrder | str) -> JobOrder:
+    """An order by name."""
+    return _one_of(JobOrder, text, "order")
+
+
+def command(text: Command | str) -> Command:
+    """A command by name."""
+    return _one_of(Command, text, "command")
+
+
+def controller(name: str) -> ControllerName:
+    """A controller by name; NotFound for another, as its path is on a server."""
+    if name not in CONTROLLERS:
+        raise NotFound(f"no controller {name!r}; known are {', '.join(CONTROLLERS)}")
+    return name
+
+
+def table_format(text: str) -> TableFormat:
+    """A file's format by name."""
+    if text not in get_args(TableFormat):
+        known = ", ".join(get_args(TableFormat))
+        raise InvalidRequest(f"{text!r} is none of {known}", field="file_format")
+    return cast(TableFormat, text)
+
+
+def runs(job_ids: Sequence[str]) -> Sequence[str]:
+    """Ids of at least one job."""
+    if isinstance(job_ids, str) or not job_ids:
+        raise InvalidRequest("must be a list of at least one id", field="job_ids")
+    return job_ids
+
+
+def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
+    """By what to judge the designs of a job anew."""
+    return _valid(RankingRequest, {"preference": preference, "top": top})
+
+
+def simulation(
+    design: Mapping[str, float],
+    *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput] | None,
+    controller: ControllerName,
+    robot: RobotInput,
+    preference: PreferenceInput,
+    log: bool,
+) -> SimulationRequest:
+    """One design and the walks in which to try it; scenarios None: all presets."""
+    document: dict[str, Any] = {
+        "robot": robot_source(robot),
+        "controller": controller,
+        "design": _design(design),
+        "preference": preference,
+        "log": log,
+    }
+    if scenarios is not None:
+        document["scenarios"] = scenario_entries(scenarios)
+    return _valid(SimulationRequest, document)
+
+
+def replay(
+    design: Mapping[str, float],
+    *,
+    scenario: ScenarioInput,
+    controller: ControllerName,
+    robot: RobotInput,
+    rate: float,
+) -> ReplayRequest:
+    """One design and the walk in which to look at it."""
+    document: dict[str, Any] = {
+        "robot": robot_source(robot),
+        "controller": controller,
+        "design": _design(design),
+        "scenario": scenario,
+        "rate": rate,
+    }
+    return _valid(ReplayRequest, document)
+
+
+def surface(
+    design: Mapping[str, float],
+    *,
+    error_points: int,
+    current_points: int,
+    velocity_error: float,
+) -> SurfaceRequest:
+    """One design of a fuzzy controller, and how finely to look at it."""
+    document: dict[str, Any] = {
+        "design": _design(design),
+        "error_points": error_points,
+        "current_points": current_points,
+        "velocity_error": velocity_error,
+    }
+    return _valid(SurfaceRequest, document)
+
+
+def _design(design: Mapping[str, float]) -> dict[str, float]:
+    if not isinstance(design, Mapping):
+        raise InvalidRequest("must be a mapping of values by name", field="design")
+    return dict(design)
+
+
+def _one_of(kind: type[E], text: str, field: str) -> E:
+    try:
+        return kind(text)
+    except ValueError:
+        raise InvalidRequest(f"{text!r} is none of {', '.join(kind)}", field=field) from None
+
+
+def _valid(kind: type[M], document: dict[str, Any]) -> M:
+    try:
+        return kind.model_validate(document)
+    except ValidationError as error:
+        raise invalid_request(error, document) from error

@@ -1,0 +1,160 @@
+"""One small finished job; the four ways to reach the jobs of a database."""
+
+from __future__ import annotations
+
+import inspect
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from anyio.from_thread import BlockingPortal, start_blocking_portal
+from fastapi import FastAPI
+
+import gaitswarm
+from api import dependencies
+from api.app import create_app
+from api.server import ApiServer
+from gaitswarm.settings import Settings
+from services.optimizer.service import JobService
+from services.runtime import open_store
+
+SMALL: dict[str, Any] = {
+    "name": "small",
+    "controller": "pi",
+    "scenarios": ["normal-fast", "6"],
+    "particles": 3,
+    "iterations": 2,
+    "seed": 7,
+}
+"""A job of a dozen walks, as keywords."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A database with a job that has succeeded."""
+
+    db: Path
+    result: gaitswarm.OptimizationResult
+
+    @property
+    def id(self) -> str:
+        return self.result.job.id
+
+
+@pytest.fixture(scope="session")
+def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    db = tmp_path_factory.mktemp("finished") / "jobs.db"
+    return Finished(db, gaitswarm.optimize(db=db, **SMALL))
+
+
+@pytest.fixture
+def finished(finished_once: Finished, tmp_path: Path) -> Finished:
+    """A copy of the database, which a test may change."""
+    db = tmp_path / "jobs.db"
+    shutil.copy(finished_once.db, db)
+    return Finished(db, finished_once.result)
+
+
+@pytest.fixture(scope="session")
+def empty_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    db = tmp_path_factory.mktemp("empty") / "jobs.db"
+    gaitswarm.open(db).close()
+    return db
+
+
+@pytest.fixture
+def db(empty_once: Path, tmp_path: Path) -> Path:
+    """A database without jobs; making one takes most of a test's time."""
+    return Path(shutil.copy(empty_once, tmp_path / "new.db"))
+
+
+@pytest.fixture(scope="session")
+def lasting_server() -> Iterator[tuple[str, FastAPI]]:
+    """One server for all tests, its URL and its application; starting one takes longer."""
+    app = create_app(cast(JobService, None), settings=Settings(api_event_poll_seconds=0.02))
+    server = ApiServer(app, host="127.0.0.1", port=0, log_level="critical")
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    yield server.url, app
+    server.stop()
+    thread.join(timeout=10.0)
+    assert not thread.is_alive()
+
+
+@pytest.fixture
+def serve(lasting_server: tuple[str, FastAPI]) -> Iterator[Callable[[Path], str]]:
+    """The server, made to serve a database; its URL."""
+    url, app = lasting_server
+    with ExitStack() as stack:
+
+        def start(db: Path) -> str:
+            service = JobService(stack.enter_context(closing(open_store(str(db)))))
+            app.dependency_overrides[dependencies.service] = lambda: service
+            return url
+
+        yield start
+
+
+class Blocking:
+    """An `AsyncJobs` whose methods are called as those of `Jobs` are."""
+
+    def __init__(self, jobs: gaitswarm.AsyncJobs, portal: BlockingPortal) -> None:
+        self._jobs = jobs
+        self._portal = portal
+
+    def __getattr__(self, name: str) -> Any:
+        method = getattr(self._jobs, name)
+        if not callable(method):
+            return method
+        if inspect.iscoroutinefunction(method):
+            return lambda *args, **kwargs: self._portal.call(partial(method, *args, **kwargs))
+        return lambda *args, **kwargs: self._items(partial(method, *args, **kwargs))
+
+    def _items(self, iterate: Callable[[], Any]) -> Iterator[Any]:
+        items = iterate()
+        end = object()
+
+        async def following() -> Any:
+            return await anext(items, end)
+
+        while (item := self._portal.call(following)) is not end:
+            yield item
+
+
+@pytest.fixture(scope="session")
+def portal() -> Iterator[BlockingPortal]:
+    """An event loop in a thread."""
+    with start_blocking_portal() as portal:
+        yield portal
+
+
+Reach = Callable[[Path], gaitswarm.Jobs]
+
+
+@pytest.fixture(params=["database", "server", "async database", "async server"])
+def reach(
+    request: pytest.FixtureRequest, serve: Callable[[Path], str], portal: BlockingPortal
+) -> Iterator[Reach]:
+    """Each way to the jobs of a database file."""
+    with ExitStack() as stack:
+
+        def jobs(db: Path) -> gaitswarm.Jobs:
+            match request.param:
+                case "database":
+                    return stack.enter_context(gaitswarm.open(db))
+                case "server":
+                    return stack.enter_context(gaitswarm.connect(serve(db)))
+                case "async database":
+                    reached: gaitswarm.AsyncJobs = gaitswarm.open_async(db)
+                case _:
+                    reached = gaitswarm.connect_async(serve(db))
+            stack.enter_context(portal.wrap_async_context_manager(reached))
+            return cast(gaitswarm.Jobs, Blocking(reached, portal))
+
+        yield jobs

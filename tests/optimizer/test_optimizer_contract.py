@@ -146,6 +146,19 @@ def test_a_damaged_state_is_refused_and_named(spec: JobSpec) -> None:
         create_optimizer(spec).load(incomplete)
 
 
+def test_a_refused_state_leaves_the_state_before(spec: JobSpec) -> None:
+    optimizer = create_optimizer(spec)
+    optimizer.tell(fitness_of(optimizer.ask(), 0))
+    before = optimizer.dump()
+    optimizer.ask()
+    later = optimizer.dump()
+    optimizer.load(before)
+    outside = [[1e9] * len(row) for row in later["best_positions"]]
+    with pytest.raises(ValueError, match="best_positions: outside"):
+        optimizer.load(later | {"best_positions": outside})
+    assert optimizer.dump() == before
+
+
 def test_a_state_of_another_swarm_size_is_refused(spec: JobSpec) -> None:
     larger = spec.model_copy(
         update={"optimizer": spec.optimizer.model_copy(update={"particles": 7})}

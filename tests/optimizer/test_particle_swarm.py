@@ -51,6 +51,18 @@ def test_random_streams_do_not_depend_on_the_order_of_calls() -> None:
     assert len(set(forth.values())) == len(places)
 
 
+def test_random_streams_do_not_overlap() -> None:
+    streams = [
+        uniform(seed, purpose, iteration=iteration, particle=particle, count=1000)
+        for seed in (0, 1)
+        for purpose in (1, 2)
+        for iteration in (0, 1)
+        for particle in (0, 1, 2)
+    ]
+    together = np.concatenate(streams)
+    assert len(np.unique(together)) == len(together)
+
+
 def draw(iteration: int, particle: int) -> tuple[float, ...]:
     return tuple(uniform(7, 1, iteration=iteration, particle=particle, count=4).tolist())
 

@@ -27,23 +27,58 @@ class Optimizer(Protocol):
         """Number of completed tells."""
 
     def ask(self) -> NDArray[np.float64]:
-        """Positions to evaluate, (particles, d), inside the bounds."""
+        """Give the positions to evaluate next; the same ones again until they are told.
+
+        Returns:
+            (particles, d), inside the bounds, in the variables' own units.
+        """
 
     def tell(self, fitness: NDArray[np.float64]) -> None:
-        """Take the fitness (particles,) of the positions last asked; minimized, +inf = failed."""
+        """Take what the positions last asked for are worth.
+
+        Args:
+            fitness: (particles,) of each of them, minimized; +inf for a failed evaluation.
+
+        Raises:
+            ValueError: nothing was asked for, the shape is another, or a value is NaN or -inf.
+        """
 
     def dump(self) -> dict[str, Any]:
-        """State as JSON-able values with a schema version."""
+        """Give the whole state.
+
+        Returns:
+            JSON-able values with a schema version, from which `load` makes the same future.
+        """
 
     def load(self, state: dict[str, Any]) -> None:
-        """Take on a dumped state. Raises ValueError if it is of another version or shape."""
+        """Take on a state.
+
+        Args:
+            state: as `dump` gave it, for the same settings and bounds.
+
+        Raises:
+            ValueError: it is of another method, version or shape, or outside the bounds; the state
+                before is kept.
+        """
 
 
 M = TypeVar("M", bound=BaseModel)
 
 
 def parse_state(state: dict[str, Any], optimizer: str, model: type[M]) -> M:
-    """The state as an object. Raises ValueError that names the field that is wrong."""
+    """Read a dumped state.
+
+    Args:
+        state: what `Optimizer.dump` gave.
+        optimizer: name of the method, for messages.
+        model: of its state.
+
+    Returns:
+        The state as an object of the model.
+
+    Raises:
+        ValueError: it is not a state of that method; names the field.
+    """
     try:
         return model.model_validate(state)
     except ValidationError as error:
@@ -53,7 +88,19 @@ def parse_state(state: dict[str, Any], optimizer: str, model: type[M]) -> M:
 
 
 def matrix(rows: list[list[float]], shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
-    """(n, d) array of the rows. Raises ValueError if they have another shape."""
+    """Read an array of a dumped state.
+
+    Args:
+        rows: n lists of d numbers.
+        shape: (n, d) that is wanted.
+        name: of the field, for messages.
+
+    Returns:
+        (n, d), a new array.
+
+    Raises:
+        ValueError: the rows have another shape.
+    """
     if len(rows) != shape[0] or any(len(row) != shape[1] for row in rows):
         raise ValueError(f"{name}: expected {shape[0]} rows of {shape[1]} numbers")
     return np.array(rows, dtype=np.float64).reshape(shape)

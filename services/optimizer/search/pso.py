@@ -1,4 +1,4 @@
-"""Particle swarm (thesis 3.4.1, 4.4.1)."""
+"""Particle swarm optimization with a falling inertia (thesis 3.4.1, 4.4.1)."""
 
 from __future__ import annotations
 
@@ -65,10 +65,11 @@ class _SwarmState(BaseModel):
 
 
 class ParticleSwarm:
-    """The swarm. Implements `services.optimizer.search.optimizer.Optimizer`.
+    """A swarm that remembers each particle's best, the `pso` of job specs.
 
     It moves in the continuous box, in the variables' own units; whoever evaluates a position
-    rounds its integer variables. velocity: change of position per iteration, in the same units.
+    rounds its integer variables. A velocity is the change of position in one iteration, in the
+    same units.
     """
 
     def __init__(
@@ -79,7 +80,15 @@ class ParticleSwarm:
         iterations: int,
         seed: int,
     ) -> None:
-        """low, high: (d,) bounds. iterations: the planned run, over which inertia falls."""
+        """Create a swarm that has not been asked yet.
+
+        Args:
+            settings: of the method.
+            low: (d,) lower bounds, in the variables' own units.
+            high: (d,) upper bounds.
+            iterations: of the planned run, over which inertia falls.
+            seed: of all random numbers.
+        """
         self._settings = settings
         self._low = np.array(low, dtype=np.float64)
         self._high = np.array(high, dtype=np.float64)
@@ -95,11 +104,15 @@ class ParticleSwarm:
 
     @property
     def iteration(self) -> int:
-        """See `Optimizer.iteration`."""
+        """Number of completed tells."""
         return self._iteration
 
     def ask(self) -> NDArray[np.float64]:
-        """See `Optimizer.ask`."""
+        """Give the positions to evaluate next; the same ones again until they are told.
+
+        Returns:
+            (particles, d), inside the bounds, in the variables' own units.
+        """
         if not self._asked:
             if self._iteration == 0:
                 self._scatter()
@@ -109,7 +122,14 @@ class ParticleSwarm:
         return self._positions.copy()
 
     def tell(self, fitness: NDArray[np.float64]) -> None:
-        """See `Optimizer.tell`. Raises ValueError for a wrong shape, NaN or -inf."""
+        """Take what the positions last asked for are worth.
+
+        Args:
+            fitness: (particles,) of each of them, minimized; +inf for a failed evaluation.
+
+        Raises:
+            ValueError: nothing was asked for, the shape is another, or a value is NaN or -inf.
+        """
         if not self._asked:
             raise ValueError("tell() before ask(): there are no positions that this belongs to")
         if fitness.shape != self._best_fitness.shape:
@@ -125,7 +145,12 @@ class ParticleSwarm:
         self._asked = False
 
     def dump(self) -> dict[str, Any]:
-        """See `Optimizer.dump`. Floats survive JSON as they are: it prints the shortest repr."""
+        """Give the whole state.
+
+        Returns:
+            JSON-able values with a schema version. JSON prints the shortest text that reads back
+            as the same float, so none loses a bit.
+        """
         return {
             "optimizer": self._settings.name,
             "schema_version": _SCHEMA_VERSION,
@@ -138,7 +163,15 @@ class ParticleSwarm:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """See `Optimizer.load`."""
+        """Take on a state.
+
+        Args:
+            state: as `dump` gave it, for the same settings and bounds.
+
+        Raises:
+            ValueError: it is of another method, version or shape, or outside the bounds; the state
+                before is kept.
+        """
         dumped = parse_state(state, "pso", _SwarmState)
         shape = self._positions.shape
         arrays = {
@@ -205,7 +238,17 @@ def absorb(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A particle beyond a wall stops at it. (n, d) positions and velocities, (d,) bounds."""
+    """Let a particle beyond a wall stop at it.
+
+    Args:
+        positions: (n, d), in the variables' own units.
+        velocities: (n, d), in the same units per iteration.
+        low: (d,) lower bounds.
+        high: (d,) upper bounds.
+
+    Returns:
+        Positions inside the bounds, and velocities without the components into a wall.
+    """
     inside = np.clip(positions, low, high)
     return inside, np.where(inside == positions, velocities, 0.0)
 
@@ -216,7 +259,17 @@ def reflect(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A particle beyond a wall bounces, as often as it takes. Shapes as in `absorb`."""
+    """Let a particle beyond a wall bounce, as often as it takes.
+
+    Args:
+        positions: (n, d), in the variables' own units.
+        velocities: (n, d), in the same units per iteration.
+        low: (d,) lower bounds.
+        high: (d,) upper bounds.
+
+    Returns:
+        Positions inside the bounds, and velocities, turned round after an odd number of bounces.
+    """
     span = high - low
     outside = (positions < low) | (positions > high)
     phase = np.mod(positions - low, 2.0 * span)

@@ -13,10 +13,20 @@ _DOUBLE_BITS: Final = 53
 def uniform(
     seed: int, purpose: int, *, iteration: int, particle: int, count: int
 ) -> NDArray[np.float64]:
-    """(count,) numbers in [0, 1): Philox 4x64 keyed by (seed, purpose).
+    """Uniform random numbers of one particle: Philox 4x64 (Salmon et al. 2011).
 
-    The counter starts at (iteration, particle), so that no stream overlaps another and none
-    depends on how many numbers another one took. seed, purpose: 64 bits each.
+    The key is (seed, purpose), and the counter starts at (iteration, particle): no stream overlaps
+    another, and none depends on how many numbers another one took.
+
+    Args:
+        seed: of the job, 64 bits.
+        purpose: what the numbers are for, 64 bits.
+        iteration: from 0, 64 bits.
+        particle: from 0, 64 bits.
+        count: of numbers.
+
+    Returns:
+        (count,) in [0, 1), multiples of 2**-53.
     """
     philox = np.random.Philox(
         key=np.array([seed, purpose], dtype=np.uint64),
@@ -30,7 +40,18 @@ def uniform(
 def swarm_uniform(
     seed: int, purpose: int, *, iteration: int, particles: int, count: int
 ) -> NDArray[np.float64]:
-    """(particles, count): `uniform` of every particle, one row each."""
+    """Uniform random numbers of a whole swarm.
+
+    Args:
+        seed: of the job, 64 bits.
+        purpose: what the numbers are for, 64 bits.
+        iteration: from 0, 64 bits.
+        particles: size of the swarm.
+        count: of numbers for each particle.
+
+    Returns:
+        (particles, count) in [0, 1); a row is what `uniform` gives for that particle.
+    """
     rows = [
         uniform(seed, purpose, iteration=iteration, particle=particle, count=count)
         for particle in range(particles)

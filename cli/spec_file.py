@@ -93,13 +93,12 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
 
     from gaitswarm.errors import invalid_request
     from services.optimizer.jobs.documents import SPECS
-    from services.optimizer.service import check_can_be_simulated
 
     try:
         spec = SPECS.validate_python(data)
     except ValidationError as error:
         raise invalid_request(error, data) from error
-    check_can_be_simulated(spec)
+    spec.check_can_be_simulated()
     return spec
 
 

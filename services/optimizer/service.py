@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any, Final
@@ -13,7 +13,6 @@ from services.optimizer.analysis.identifiability import Identifiability, identif
 from services.optimizer.analysis.ranking import Ranking, rank
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
 from services.optimizer.jobs.job import (
     Command,
@@ -30,14 +29,9 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from services.optimizer.store.base import Page, Store
-from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
-from sim.robot.identifiable import with_parameters
-from sim.scenario import GAIT_VARIABLE_NAMES, with_gait
-from sim.simulate import check_reach
-from sim.variables import Variable
 
 _PIECE: Final = 16
 
@@ -276,7 +270,7 @@ class JobService:
 
     def _check(self, spec: Spec) -> None:
         """Raise InvalidRequest for a job that cannot be run."""
-        check_can_be_simulated(spec)
+        spec.check_can_be_simulated()
         self._check_recordings(spec)
 
     def _check_recordings(self, spec: Spec) -> None:
@@ -293,67 +287,11 @@ class JobService:
                 raise InvalidRequest(str(error), field=field) from error
 
 
-def check_can_be_simulated(spec: Spec) -> None:
-    """Raise InvalidRequest for bounds that nothing can run with, or a gait beyond the legs."""
-    if isinstance(spec, JobSpec):
-        _check_walks(spec)
-        return
-    robot, space = load_robot(spec.robot), spec.design_space()
-    for corner in (space.low, space.high):
-        (values,) = space.designs(corner.reshape(1, -1))
-        try:
-            with_parameters(robot, dict(zip(space.names, values.tolist(), strict=True)))
-        except SimulationInputError as error:
-            raise _blamed(error, space) from error
-
-
-def _check_walks(spec: JobSpec) -> None:
-    """A job whose designs walk.
-
-    A gait that is itself searched may leave the legs' reach at some points of the box: there a
-    status says so. Only a scenario whose gentlest gait is beyond reach is refused.
-    """
-    space = spec.design_space()
-    scenarios = spec.resolved_scenarios()
-    fixed = dict(space.fixed)
-    for corner in (space.low, space.high):
-        (values,) = space.designs(corner.reshape(1, -1))
-        design = dict(zip(space.names, values.tolist(), strict=True))
-        try:
-            CONTROLLERS[spec.controller].compile(design)
-            with_gait(scenarios[0], _gait_of(design))
-        except SimulationInputError as error:
-            raise _blamed(error, space) from error
-    gait = _gait_of(fixed) | _gentlest_gait(space.variables)
-    for index, scenario in enumerate(scenarios):
-        try:
-            check_reach(scenario, tuple(gait), tuple(gait.values()), robot=spec.robot)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
-
-
-def _blamed(error: SimulationInputError, space: DesignSpace) -> InvalidRequest:
-    """The field of the spec that an error in a design's variable comes from."""
-    culprit = str(error).partition(":")[0]
-    field = "fixed" if culprit in dict(space.fixed) else "variables"
-    return InvalidRequest(str(error), field=field)
-
-
 def _problem(spec: Spec) -> Spec:
     """The spec without what may differ between runs of one problem."""
     return spec.model_copy(
         update={"name": "", "seed": 0, "iterations": 1, "optimizer": PsoSettings()}
     )
-
-
-def _gait_of(design: Mapping[str, float]) -> dict[str, float]:
-    return {name: value for name, value in design.items() if name in GAIT_VARIABLE_NAMES}
-
-
-def _gentlest_gait(searched: tuple[Variable, ...]) -> dict[str, float]:
-    """Of the gaits that may be searched, the one whose feet stray least: short, flat, smooth."""
-    least = {v.name: v.low for v in searched if v.name in ("stride", "height")}
-    return least | {v.name: v.high for v in searched if v.name == "fir_ms"}
 
 
 def _iteration_of(evaluation: Evaluation) -> int:

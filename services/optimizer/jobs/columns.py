@@ -14,11 +14,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationColumns:
-    """One row per evaluation, in order of iteration and particle. r rows; never written to.
+    """Evaluations, one row each, in order of iteration and particle; never written to.
 
-    iteration, particle: (r,) int64. designs: (r, v), columns `Spec.design_space().names`.
-    objectives: (r, K, m), cases and objectives in the spec's order, NaN where there is none.
-    statuses: (r, K) uint8, values of `sim.outcome.Status`. fitness: (r,), +inf if a case failed.
+    Attributes:
+        iteration: (r,) index of the iteration, from 0.
+        particle: (r,) particle of the swarm, from 0.
+        designs: (r, v) values of `Spec.design_space().names`, in the variables' units.
+        objectives: (r, K, m) raw objectives, cases and objectives in the spec's order, in their
+            units, NaN where there is none.
+        statuses: (r, K) values of `sim.outcome.Status`.
+        fitness: (r,) by the job's own measure, minimized, +inf if a case failed.
     """
 
     iteration: NDArray[np.int64]
@@ -49,7 +54,14 @@ class EvaluationColumns:
         return np.asarray(self.statuses != Status.OK)
 
     def rows(self, chosen: slice | NDArray[np.intp]) -> EvaluationColumns:
-        """Some of the rows: views for a slice, copies for indices."""
+        """Choose rows.
+
+        Args:
+            chosen: slice, or (n,) indices.
+
+        Returns:
+            These rows in that order: views for a slice, copies for indices.
+        """
         return EvaluationColumns(
             self.iteration[chosen],
             self.particle[chosen],
@@ -60,13 +72,14 @@ class EvaluationColumns:
         )
 
     def after(self, iteration: int | None) -> EvaluationColumns:
-        """Rows of the iterations with a greater index; all for None."""
+        """Leave out the first iterations.
+
+        Args:
+            iteration: index of the last one to leave out; None leaves out none.
+
+        Returns:
+            The rows of all later iterations, as views.
+        """
         if iteration is None:
             return self
         return self.rows(slice(int(np.searchsorted(self.iteration, iteration, "right")), None))
-
-    def row_of(self, iteration: int, particle: int) -> int | None:
-        """Index of one evaluation's row; None if it is not here."""
-        first, last = np.searchsorted(self.iteration, [iteration, iteration + 1])
-        (found,) = np.nonzero(self.particle[first:last] == particle)
-        return int(first + found[0]) if len(found) else None

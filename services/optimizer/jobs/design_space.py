@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.errors import InvalidRequest
+from sim.errors import SimulationInputError
 from sim.variables import Variable
 
 
@@ -17,6 +19,10 @@ class DesignSpace:
 
     A *position* is a point of the box, (d,) in the variables' own units. A *design* is what is
     simulated: integer variables rounded, fixed values appended; its columns are `names`.
+
+    Attributes:
+        variables: the d that are searched.
+        fixed: names and values of the others.
     """
 
     variables: tuple[Variable, ...]
@@ -33,8 +39,18 @@ class DesignSpace:
     ) -> DesignSpace:
         """Combine a catalogue with a user's choice.
 
-        required: every one must be chosen or fixed (the controller's); optional: may be (the
-        gait's). Raises ValueError that names the variable and the way out.
+        Args:
+            required: variables of which every one must be chosen or fixed: the controller's.
+            optional: variables that may be: the gait's.
+            chosen: what is searched, by name with the catalogue's bounds, or with bounds of one's
+                own; None for all that are required, less those that are fixed.
+            fixed: value of each variable that is held, by name.
+
+        Returns:
+            The space, its variables in the order of `chosen`.
+
+        Raises:
+            ValueError: the choice makes no sense; names the variable and the way out.
         """
         catalogue = {variable.name: variable for variable in (*required, *optional)}
         known = ", ".join(catalogue)
@@ -82,7 +98,14 @@ class DesignSpace:
         return np.array([variable.high for variable in self.variables])
 
     def designs(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Positions (n, d) -> designs (n, len(names))."""
+        """What is simulated for points of the box.
+
+        Args:
+            positions: (n, d), inside the bounds.
+
+        Returns:
+            (n, len(names)), integer variables rounded to even halves and fixed values appended.
+        """
         columns = np.empty((len(positions), len(self.names)))
         for j, variable in enumerate(self.variables):
             column = positions[:, j]
@@ -90,6 +113,26 @@ class DesignSpace:
         for j, (_, value) in enumerate(self.fixed, start=len(self.variables)):
             columns[:, j] = value
         return columns
+
+    def corners(self) -> Iterator[dict[str, float]]:
+        """The designs at the lower and at the upper ends of all bounds, by variable."""
+        for corner in (self.low, self.high):
+            (values,) = self.designs(corner.reshape(1, -1))
+            yield dict(zip(self.names, values.tolist(), strict=True))
+
+    def refusal(self, error: SimulationInputError) -> InvalidRequest:
+        """An error in a design as one of the spec's field that the design has the value from.
+
+        Args:
+            error: begins with the name of the variable that is to blame, and a colon.
+
+        Returns:
+            The same message about `variables` or `fixed`.
+        """
+        culprit = str(error).partition(":")[0]
+        return InvalidRequest(
+            str(error), field="fixed" if culprit in dict(self.fixed) else "variables"
+        )
 
 
 def _checked(entry: str | Variable, known: Variable) -> Variable:

@@ -29,4 +29,4 @@ AnySpec = Annotated[
 ]
 
 SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec]] = TypeAdapter(AnySpec)
-"""Reads a spec of any kind. Raises ValidationError."""
+"""Reads a document with a spec of any kind; raises ValidationError for what is none."""

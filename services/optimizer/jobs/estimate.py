@@ -32,9 +32,14 @@ _REMEMBERED: Final = 64
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """evaluations: designs; walks: each design in each case; simulated_seconds: all walks [s].
+    """What a job would cost.
 
-    seconds: wall time [s], None where nothing is known; basis: what it is derived from.
+    Attributes:
+        evaluations: designs that are judged.
+        walks: each design in each case.
+        simulated_seconds: simulated time of all walks together [s].
+        seconds: wall time [s], None where nothing is known.
+        basis: what the wall time is derived from, for people.
     """
 
     evaluations: int
@@ -47,9 +52,16 @@ class Estimate:
 def estimate(
     spec: Spec, cases: Sequence[Case], earlier: Sequence[Job], measured: MeasuredRates
 ) -> Estimate:
-    """cases: those of the spec. earlier: jobs, of which those that are like it tell a rate.
+    """Estimate a job by the rate of jobs like it, or else of a short walk in this thread.
 
-    Without one, a short walk is measured in this thread.
+    Args:
+        spec: of the job.
+        cases: those of the spec.
+        earlier: jobs, newest first, of which those that are like it tell a rate.
+        measured: rates that were measured before, to which a new one is added.
+
+    Returns:
+        Counts, and times where a rate is known.
     """
     evaluations = spec.iterations * spec.optimizer.particles
     one = duration(spec, cases)
@@ -72,9 +84,14 @@ def estimate(
 
 
 def duration(spec: Spec, cases: Sequence[Case]) -> float:
-    """Simulated time of one design in some of the spec's cases [s].
+    """Simulated time of one design in some of a spec's cases.
 
-    A cycle time that is searched counts by the middle of its bounds.
+    Args:
+        spec: of the job.
+        cases: of the spec, or like them.
+
+    Returns:
+        All walks together [s]; a cycle time that is searched counts by the middle of its bounds.
     """
     cycle_time = _typical(spec.design_space(), "cycle_time")
     return sum(
@@ -96,9 +113,17 @@ class MeasuredRates:
         self._rates: OrderedDict[str, float] = OrderedDict()
 
     def rate(self, spec: Spec, cases: Sequence[Case]) -> tuple[float | None, str]:
-        """The rate of all cores and what it is based on; None without a compiled kernel.
+        """Measure, unless it was measured before, how fast walks of a spec are simulated.
 
         Compiles the robot's kernel if need be, as the job itself would.
+
+        Args:
+            spec: of a job.
+            cases: those of the spec.
+
+        Returns:
+            Simulated seconds per second on all cores, None without a compiled kernel or a design
+            that can begin to walk; and what that is based on, for people.
         """
         if prepare(spec.robot) != "native":
             return None, "nothing: without a C compiler walks take some hundred times as long"

@@ -12,11 +12,12 @@ from pydantic import ConfigDict, Field, model_validator
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.spec import Judgement, Spec
 from sim.case import Case
+from sim.errors import SimulationInputError
 from sim.identification.current_fit import LINK_CURRENTS, CurrentFit
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import Objective
 from sim.robot import load_robot
-from sim.robot.identifiable import identifiable_variables
+from sim.robot.identifiable import identifiable_variables, with_parameters
 
 Floats = NDArray[np.float64]
 
@@ -74,30 +75,50 @@ class IdentificationSpec(Spec):
         return self
 
     def design_space(self) -> DesignSpace:
-        """See `Spec.design_space`: any of the robot's parameters; the others stay as described."""
+        """Any of the robot's parameters; the others stay as described."""
         known = identifiable_variables(load_robot(self.robot))
         chosen = self.variables
         if chosen is None:
             chosen = tuple(v for v in known if v.name not in self.fixed)
         return DesignSpace.build(required=(), optional=known, chosen=chosen, fixed=self.fixed)
 
+    def check_can_be_simulated(self) -> None:
+        """Check that there is a robot at both ends of all bounds.
+
+        Raises:
+            InvalidRequest: bounds or values that no robot can have; names the field.
+        """
+        robot, space = load_robot(self.robot), self.design_space()
+        for values in space.corners():
+            try:
+                with_parameters(robot, values)
+            except SimulationInputError as error:
+                raise space.refusal(error) from error
+
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """See `Spec.objectives`: mean absolute error of the currents of each link."""
+        """Raw objectives of a fit: mean absolute error of the currents of each link [A]."""
         return LINK_CURRENTS
 
     @property
     def case_names(self) -> tuple[str, ...]:
-        """See `Spec.case_names`: the recordings' ids, shortened."""
+        """Ids of the recordings, shortened, in order."""
         return tuple(recording[:12] for recording in self.recordings)
 
     @property
     def recording_ids(self) -> tuple[str, ...]:
-        """See `Spec.recording_ids`."""
+        """Ids of the recorded walks, in order."""
         return self.recordings
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:
-        """See `Spec.cases`: one fit to each recorded walk."""
+        """One fit to each recorded walk.
+
+        Args:
+            recordings: those that `recording_ids` names, by id.
+
+        Returns:
+            The fits, in the order of `case_names`.
+        """
         names = self.design_space().names
         return tuple(
             CurrentFit(name, self.robot, recordings[recording], names)
@@ -105,7 +126,15 @@ class IdentificationSpec(Spec):
         )
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """See `Spec.judge`: a case's utility is the mean over `links`, fitness that over walks."""
+        """Judge designs by the mean absolute error of currents (eq. 2.21).
+
+        Args:
+            objectives: (n, K, 3) errors of coxa, femur and tibia in each walk [A].
+            failed: (n, K), true for a fit without a result.
+
+        Returns:
+            Utilities are the mean over `links`, fitness that over walks [A].
+        """
         columns = [link - 1 for link in self.links]
         means = [
             [math.fsum(walk) / len(columns) for walk in design]
@@ -117,7 +146,7 @@ class IdentificationSpec(Spec):
             return Judgement(np.array(fitness), np.log(errors))
 
     def resolved(self) -> IdentificationSpec:
-        """See `Spec.resolved`."""
+        """The same job with its variables written out."""
         space = self.design_space()
         return self.model_copy(
             update={"variables": space.variables, "fixed": dict(space.fixed)},

@@ -69,7 +69,18 @@ TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
 
 
 def commanded(state: JobState, command: Command) -> JobState:
-    """The state after a command; Conflict says what is possible instead."""
+    """The state after a command.
+
+    Args:
+        state: before it.
+        command: of the user.
+
+    Returns:
+        The state that `TRANSITIONS` names.
+
+    Raises:
+        Conflict: not possible in that state; says what is.
+    """
     try:
         return TRANSITIONS[state, command]
     except KeyError:
@@ -83,10 +94,19 @@ LARGEST_BUDGET: Final = 1_000_000
 
 
 def extended(state: JobState, committed: int, iterations: int) -> JobState:
-    """The state of a job after it got another budget, of `iterations` in all.
+    """The state of a job after it got another budget.
 
-    committed: iterations that it has. Raises Conflict for a job that was cancelled, InvalidRequest
-    for a budget that is spent already.
+    Args:
+        state: before.
+        committed: iterations that it has.
+        iterations: of the new budget, in all.
+
+    Returns:
+        QUEUED for a job that had succeeded, else the state before.
+
+    Raises:
+        Conflict: the job was cancelled.
+        InvalidRequest: the budget is spent already, or too large.
     """
     if state is JobState.CANCELLED:
         raise Conflict("cannot extend a job that is cancelled; submit its spec as a new one")
@@ -103,10 +123,14 @@ def extended(state: JobState, committed: int, iterations: int) -> JobState:
 class Evaluation:
     """One design, judged in every case of its job.
 
-    design: (v,) values of `Job.spec.design_space().names`.
-    objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN where there
-        is none; statuses: (K,) uint8.
-    fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
+    Attributes:
+        iteration: index of the iteration, from 0.
+        particle: of the swarm, from 0.
+        design: (v,) values of `Job.spec.design_space().names`, in the variables' units.
+        objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, in their
+            units, NaN where there is none.
+        statuses: (K,) values of `sim.outcome.Status`.
+        fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
     """
 
     iteration: int
@@ -119,7 +143,16 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a job is; read with the job in one query."""
+    """How far a job is, by its committed iterations.
+
+    Attributes:
+        iterations: how many there are.
+        evaluations: designs judged in them.
+        best_fitness: least fitness so far, None while every design has failed.
+        best_iteration: iteration that found it.
+        best_particle: particle that found it.
+        compute_seconds: time that evaluating them took [s].
+    """
 
     iterations: int = 0
     evaluations: int = 0
@@ -131,11 +164,21 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A job as stored.
+    """A job as stored; times are UTC.
 
-    spec: resolved, no preset is left to be looked up; its `iterations` are the present budget.
-    provenance: what its numbers depend on, since which iteration. accepts_changes: whether its
-        user has said that it may go on although that has changed; until it is claimed.
+    Attributes:
+        id: twelve letters and digits.
+        spec: resolved, no preset is left to be looked up; its `iterations` are the present budget.
+        state: where it is in its life.
+        created_at: when it was submitted.
+        updated_at: when its state or progress last changed.
+        started_at: when it was first claimed.
+        finished_at: when it ended.
+        error: why it failed.
+        progress: how far it is.
+        provenance: what its numbers depend on, since which iteration.
+        accepts_changes: whether its user has said that it may go on although that has changed;
+            until it is claimed.
     """
 
     id: str
@@ -177,8 +220,14 @@ def refusal(job: Job, now: JobProvenance) -> str | None:
 class Iteration:
     """One committed iteration, as it is listed: no particles.
 
-    index counts from 0. best, mean, median, worst: fitness over the swarm's finite values, None
-    if no particle has one. best_so_far: over this and all earlier iterations.
+    Attributes:
+        index: from 0.
+        best: least fitness of the swarm, None if every design failed; `mean`, `median` and `worst`
+            likewise, over the finite values.
+        best_so_far: least fitness of this and all earlier iterations.
+        failed: designs that failed in at least one case.
+        evaluate_seconds: time that its evaluation took [s].
+        committed_at: when it was committed, UTC.
     """
 
     index: int
@@ -196,8 +245,12 @@ class Iteration:
 class Ask:
     """An iteration that is to be evaluated: stored before it is sent out.
 
-    positions: (particles, d) as the optimizer gave them; state: the optimizer's dump after the ask.
-    Both are stored as standard JSON, so every number in them is finite.
+    Positions and state are stored as standard JSON, so every number in them is finite.
+
+    Attributes:
+        iteration: index of the iteration, from 0.
+        positions: (particles, d) as the optimizer gave them, in the variables' units.
+        state: the optimizer's dump after the ask.
     """
 
     iteration: int
@@ -207,7 +260,12 @@ class Ask:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answered:
-    """A committed ask with its fitness (particles,), from which the next one follows."""
+    """A committed ask, from which the next one follows.
+
+    Attributes:
+        ask: what was asked.
+        fitness: (particles,) of its designs, +inf for one that failed.
+    """
 
     ask: Ask
     fitness: NDArray[np.float64]
@@ -217,7 +275,12 @@ class Answered:
 class CompletedIteration:
     """All that one transaction commits of an iteration.
 
-    designs: (n, v); outcomes: one per case, of n designs each; fitness: (n,).
+    Attributes:
+        iteration: index of the iteration, from 0.
+        designs: (n, v) values of `Job.spec.design_space().names`, in the variables' units.
+        outcomes: K, one per case, of the n designs each.
+        fitness: (n,) of the designs, +inf for one that failed.
+        evaluate_seconds: time that the evaluation took [s].
     """
 
     iteration: int
@@ -229,12 +292,16 @@ class CompletedIteration:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A lease on a job. `token` fences: a store refuses writes under an older one.
+    """A lease on a job.
 
-    ask: the stored one to go on with; None for a job that has not begun, or was extended after its
-        budget was spent.
-    answered: the last committed one, where there is no other to go on with.
-    recordings: those that the job's spec names.
+    Attributes:
+        job: as it was when it was claimed.
+        runner: name of who holds it.
+        token: fences: a store refuses writes under an older one.
+        ask: the stored one to go on with; None for a job that has not begun, or was extended after
+            its budget was spent.
+        recordings: those that the job's spec names, by id.
+        answered: the last committed one, where there is no other to go on with.
     """
 
     job: Job
@@ -249,9 +316,11 @@ class Claim:
 class TimeLeft:
     """Rates so far, and the rest of the budget at that rate.
 
-    eta_seconds: [s]; 0 for a job that succeeded, None unless it runs and has committed something.
-    evaluations_per_second: designs judged [1/s]; simulations_per_second: walks, one per design and
-        scenario [1/s]; None before the first commit.
+    Attributes:
+        eta_seconds: time to the end of the budget [s]; 0 for a job that succeeded, None unless it
+            runs and has committed something.
+        evaluations_per_second: designs judged [1/s]; None before the first commit.
+        simulations_per_second: walks, one per design and case [1/s]; None before the first commit.
     """
 
     eta_seconds: float | None
@@ -260,9 +329,16 @@ class TimeLeft:
 
 
 def time_left(job: Job, now: datetime) -> TimeLeft:
-    """now: aware; the iteration under way counts as done in part, by the time since the last one.
+    """Estimate when a job ends, from its own committed iterations.
 
     Rates are over the time spent evaluating, so pauses and the time in the queue do not count.
+
+    Args:
+        job: as it was read.
+        now: aware; the iteration under way counts as done in part, by the time since the last one.
+
+    Returns:
+        Rates and time left.
     """
     progress = job.progress
     if progress.iterations == 0 or progress.compute_seconds <= 0.0:

@@ -12,9 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 from services.optimizer.jobs.spec import Judgement, exponential
 from sim.choice import NAME, OWN, alternatives
 
-N_PREFERRED: Final = 5
-"""Objectives f1..f5 enter the product; f6 belongs to the single-scenario fitness of chapter 3."""
-
+# f6 belongs to the fitness of chapter 3, which is of a single scenario.
 _FIELDS: Final = ("torque", "acceleration", "angular_acceleration", "energy", "reciprocal_speed")
 
 
@@ -66,7 +64,17 @@ PREFERENCES: Final[dict[PreferenceName, Preference]] = {
 def judge(
     objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
 ) -> Judgement:
-    """Eq. 4.1 and 4.2 of n designs in K scenarios: objectives (n, K, >= 5), failed (n, K)."""
+    """Judge designs by the bias-weighted product and the geometric mean (eq. 4.1, 4.2).
+
+    Args:
+        objectives: (n, K, >= 5) raw objectives of n designs in K scenarios, f1..f5 of table 4.1
+            first, in their units.
+        failed: (n, K), true where a walk has no utility.
+        preference: biases and exponents.
+
+    Returns:
+        Fitness and logarithms of the utilities.
+    """
     logarithms = log_utilities(objectives, failed, preference)
     return Judgement(geometric_mean(logarithms), logarithms)
 
@@ -74,11 +82,15 @@ def judge(
 def log_utilities(
     objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
 ) -> NDArray[np.float64]:
-    """Logarithm of eq. 4.1 for every design and scenario.
+    """Logarithm of the bias-weighted product (eq. 4.1).
 
-    objectives: (..., >= 5), f1..f5 first; failed: (...) true where the walk has no utility.
-    Returns (...): the logarithm of the utility, +inf where failed or where an objective with a
-    weight is not finite.
+    Args:
+        objectives: (..., >= 5) raw objectives, f1..f5 of table 4.1 first, in their units.
+        failed: (...), true where a walk has no utility.
+        preference: biases and exponents.
+
+    Returns:
+        (...), +inf where a walk failed, or where an objective with a weight is not finite.
     """
     flat = objectives.reshape(-1, objectives.shape[-1])
     values = [
@@ -89,7 +101,14 @@ def log_utilities(
 
 
 def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Eq. 4.2 over the last axis: (n, scenarios) log utilities -> (n,) fitness, +inf if any is."""
+    """Geometric mean over scenarios (eq. 4.2).
+
+    Args:
+        log_utility: (n, K) logarithms of utilities, +inf where a walk failed.
+
+    Returns:
+        (n,) fitness, +inf where any walk failed or a double ends.
+    """
     means = [
         math.inf if math.inf in row else math.fsum(row) / len(row) for row in log_utility.tolist()
     ]

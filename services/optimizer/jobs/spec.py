@@ -30,10 +30,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judgement:
-    """n designs after K cases; both to be minimized.
+    """What n designs are worth after K cases; all to be minimized.
 
-    fitness: (n,), +inf where a case failed; log_utilities: (n, K), logarithm of what a design is
-    worth in each case, +inf where it failed.
+    Attributes:
+        fitness: (n,), +inf where a case failed.
+        log_utilities: (n, K) logarithm of what a design is worth in each case, +inf where it
+            failed.
     """
 
     fitness: Floats
@@ -47,7 +49,14 @@ class Judgement:
 
 
 def exponential(logarithm: float) -> float:
-    """Its exponential, +inf where a double ends. Of Python's math: the same bits on any CPU."""
+    """The exponential function. Python's, as numpy's differs in the last bit between processors.
+
+    Args:
+        logarithm: any number but NaN.
+
+    Returns:
+        Its exponential, +inf where a double ends.
+    """
     try:
         return math.exp(logarithm)
     except OverflowError:
@@ -88,30 +97,58 @@ class Spec(BaseModel):
 
     @abstractmethod
     def design_space(self) -> DesignSpace:
-        """The optimizer's variables and the fixed ones, checked against the catalogue."""
+        """The variables that are searched and the fixed ones, checked against the catalogue.
+
+        Raises:
+            ValueError: the choice makes no sense; names the variable. A spec that was validated
+                raises nothing.
+        """
+
+    @abstractmethod
+    def check_can_be_simulated(self) -> None:
+        """Check what only the simulator can tell: whether designs can be run at all.
+
+        Raises:
+            InvalidRequest: bounds or values that nothing can run with; names the field.
+        """
 
     @property
     @abstractmethod
     def objectives(self) -> tuple[Objective, ...]:
-        """What is known of a design after one case: columns of its raw objectives."""
+        """What is known of a design after one case: the m columns of its raw objectives."""
 
     @property
     @abstractmethod
     def case_names(self) -> tuple[str, ...]:
-        """The cases that every design is put to, in order."""
+        """Names of the K cases that every design is put to, in order."""
 
     @abstractmethod
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:
-        """The cases themselves. recordings: those that the spec names."""
+        """The cases that every design is put to.
+
+        Args:
+            recordings: those that `recording_ids` names, by id.
+
+        Returns:
+            K cases, in the order of `case_names`.
+        """
 
     @property
     def recording_ids(self) -> tuple[str, ...]:
-        """Recordings that the cases need."""
+        """Ids of the recorded walks that the cases need."""
         return ()
 
     @abstractmethod
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Fitness from raw objectives (n, K, m); failed: (n, K), cases without a result."""
+        """Say what designs are worth.
+
+        Args:
+            objectives: (n, K, m) raw objectives, in their units.
+            failed: (n, K), true for a case without a result.
+
+        Returns:
+            Fitness and utilities of the n designs.
+        """
 
     @abstractmethod
     def resolved(self) -> Self:
@@ -119,13 +156,28 @@ class Spec(BaseModel):
 
 
 def judge_outcomes(spec: Spec, outcomes: tuple[Outcome, ...]) -> Judgement:
-    """Fitness of n designs from one outcome per case."""
+    """Judge designs by what the simulator says of them.
+
+    Args:
+        spec: of their job.
+        outcomes: K, one per case, of the same n designs each.
+
+    Returns:
+        Fitness and utilities of the n designs.
+    """
     objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
     failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
     return spec.judge(objectives, failed)
 
 
 def create_optimizer(spec: Spec) -> Optimizer:
-    """A fresh optimizer for the job, before its first ask."""
+    """Create the optimizer that a job asks for.
+
+    Args:
+        spec: of the job.
+
+    Returns:
+        The optimizer before its first ask.
+    """
     space = spec.design_space()
     return ParticleSwarm(spec.optimizer, space.low, space.high, spec.iterations, spec.seed)

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice, judge
 from services.optimizer.jobs.spec import Judgement, Spec
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
+from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import OBJECTIVES, Objective
-from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from sim.scenario import (
+    GAIT_VARIABLE_NAMES,
+    GAIT_VARIABLES,
+    SCENARIOS,
+    Scenario,
+    ScenarioChoice,
+    find_scenario,
+    with_gait,
+)
+from sim.simulate import check_reach
+from sim.variables import Variable
 
 Floats = NDArray[np.float64]
 
@@ -74,7 +87,7 @@ class JobSpec(Spec):
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def design_space(self) -> DesignSpace:
-        """See `Spec.design_space`: the controller's variables, and any of the gait's."""
+        """The controller's variables, and any of the gait's."""
         controller = CONTROLLERS[self.controller]
         return DesignSpace.build(
             required=controller.variables,
@@ -83,18 +96,42 @@ class JobSpec(Spec):
             fixed=self.fixed,
         )
 
+    def check_can_be_simulated(self) -> None:
+        """Check that the controller can be compiled and that the legs reach their feet's paths.
+
+        A gait that is itself searched may leave the legs' reach at some points of the box: there a
+        status says so. Only a scenario whose gentlest gait is beyond reach is refused.
+
+        Raises:
+            InvalidRequest: bounds or values that nothing can run with, or a scenario out of reach;
+                names the field.
+        """
+        space, scenarios = self.design_space(), self.resolved_scenarios()
+        for design in space.corners():
+            try:
+                CONTROLLERS[self.controller].compile(design)
+                with_gait(scenarios[0], _gait_of(design))
+            except SimulationInputError as error:
+                raise space.refusal(error) from error
+        gait = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)
+        for index, scenario in enumerate(scenarios):
+            try:
+                check_reach(scenario, tuple(gait), tuple(gait.values()), robot=self.robot)
+            except SimulationInputError as error:
+                raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
+
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """See `Spec.objectives`: f1..f6 of table 4.1."""
+        """Raw objectives of a walk: f1..f6 of table 4.1."""
         return OBJECTIVES
 
     @property
     def case_names(self) -> tuple[str, ...]:
-        """See `Spec.case_names`: the scenarios."""
+        """Names of the scenarios, in order."""
         return tuple(scenario.name for scenario in self.resolved_scenarios())
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
-        """See `Spec.cases`: one walk in each scenario."""
+        """One walk in each scenario; needs no recordings."""
         names = self.design_space().names
         return tuple(
             Walk(self.robot, self.controller, scenario, names)
@@ -102,11 +139,19 @@ class JobSpec(Spec):
         )
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """See `Spec.judge`: by the preference."""
+        """Judge designs by the preference (eq. 4.1, 4.2).
+
+        Args:
+            objectives: (n, K, 6) raw objectives, in their units.
+            failed: (n, K), true for a walk without a result.
+
+        Returns:
+            Fitness and utilities of the n designs.
+        """
         return judge(objectives, failed, self.resolved_preference())
 
     def resolved(self) -> JobSpec:
-        """See `Spec.resolved`."""
+        """The same job with scenarios, preference and variables written out."""
         space = self.design_space()
         return self.model_copy(
             update={
@@ -116,3 +161,13 @@ class JobSpec(Spec):
                 "fixed": dict(space.fixed),
             }
         )
+
+
+def _gait_of(design: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in design.items() if name in GAIT_VARIABLE_NAMES}
+
+
+def _gentlest_gait(searched: Sequence[Variable]) -> dict[str, float]:
+    """Of the gaits that may be searched, the one whose feet stray least: short, flat, smooth."""
+    least = {v.name: v.low for v in searched if v.name in ("stride", "height")}
+    return least | {v.name: v.high for v in searched if v.name == "fir_ms"}

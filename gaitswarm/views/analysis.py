@@ -7,12 +7,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ScenarioResultView, evaluation_views
 from services.optimizer.analysis.distribution import QUANTILES, Distribution
-from services.optimizer.analysis.ranking import RankedDesign
+from services.optimizer.analysis.ranking import RankedDesign, RankedJob
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Evaluation
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.service import RankedJob
 
 
 class DistributionItemView(View):

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
 from typing import Any, Final
 
 from services.optimizer.analysis.distribution import Distribution, distribution
-from services.optimizer.analysis.history_cache import HistoryCache
-from services.optimizer.analysis.identifiability import Identifiability, identifiability
-from services.optimizer.analysis.ranking import Ranking, rank
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
+from services.optimizer.analysis.history import PIECE, HistoryCache, read_columns, read_history
+from services.optimizer.analysis.identifiability import (
+    Identifiability,
+    check_comparable,
+    identifiability,
+)
+from services.optimizer.analysis.ranking import RankedJob, rank
+from services.optimizer.errors import InvalidRequest, NotFound, ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
 from services.optimizer.jobs.job import (
@@ -27,34 +30,22 @@ from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.search.pso import PsoSettings
 from services.optimizer.store.base import Page, Store
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
 
-_PIECE: Final = 16
-
-_PIECE_ROWS: Final = 2000
-
 _EARLIER: Final = 50
 """Newest jobs among which one like a new job is looked for."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RankedJob:
-    """A job's designs by another preference. columns: those that the ranking's rows refer to."""
-
-    spec: JobSpec
-    columns: EvaluationColumns
-    ranking: Ranking
 
 
 @dataclass(frozen=True, slots=True)
 class JobService:
     """Jobs as their users see them. Thread-safe, as the store is.
 
-    provenance: of what is computed from here for a spec.
+    Attributes:
+        store: where jobs are kept; its owner's to close.
+        provenance: spec -> provenance of what is computed from here for it.
     """
 
     store: Store
@@ -95,24 +86,58 @@ class JobService:
         )
 
     def record(self, walk: RecordedWalk) -> str:
-        """Keep a recorded walk, to which jobs can fit; its id."""
+        """Keep a recorded walk, to which jobs can fit.
+
+        Args:
+            walk: as it was recorded.
+
+        Returns:
+            Its id, the same for the same walk.
+        """
         return self.store.add_recording(walk)
 
     def recording(self, recording_id: str) -> RecordedWalk:
-        """Raises NotFound."""
+        """Read a recorded walk.
+
+        Args:
+            recording_id: as `record` gave it.
+
+        Returns:
+            The walk.
+
+        Raises:
+            NotFound: no walk of that id.
+        """
         return self.store.recordings([recording_id])[recording_id]
 
     def estimate(self, spec: Spec) -> Estimate:
-        """What a job would cost, by the rate of jobs like it or a walk that is measured here.
+        """Say what a job would cost, by the rate of jobs like it or a walk that is measured here.
 
-        Raises InvalidRequest as `submit` does.
+        Args:
+            spec: of the job; it is not submitted.
+
+        Returns:
+            Counts, and times where a rate is known.
+
+        Raises:
+            InvalidRequest: it cannot be simulated; names the field.
         """
         self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
         return estimate(spec, cases, self.store.jobs(limit=_EARLIER).items, self._rates)
 
     def job(self, job_id: str) -> Job:
-        """Raises NotFound."""
+        """Read a job.
+
+        Args:
+            job_id: id of the job.
+
+        Returns:
+            The job as it is now.
+
+        Raises:
+            NotFound: no job of that id.
+        """
         return self.store.job(job_id)
 
     def jobs(
@@ -124,11 +149,25 @@ class JobService:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]:
-        """See `Store.jobs`."""
+        """List jobs, page by page. Jobs submitted meanwhile do not shift later pages.
+
+        Args:
+            state: only jobs in it; None for any.
+            search: only jobs whose name or id contains this, whatever its case.
+            order: how they are sorted.
+            after: `next` of the page before, of the same order.
+            limit: most jobs on a page.
+
+        Returns:
+            A page; `next` is None on the last one.
+
+        Raises:
+            InvalidRequest: `after` is no cursor of that order.
+        """
         return self.store.jobs(state=state, search=search, order=order, after=after, limit=limit)
 
     def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
-        """Pause, resume or cancel. Raises NotFound, Conflict.
+        """Pause, resume or cancel a job.
 
         Args:
             job_id: id of the job.
@@ -138,84 +177,151 @@ class JobService:
 
         Returns:
             The job as it is then.
+
+        Raises:
+            NotFound: no job of that id.
+            Conflict: not possible in its state; says what is.
         """
         return self.store.command(job_id, command, accept_changes=accept_changes)
 
     def check_unchanged(self, job: Job) -> None:
-        """Raise ProvenanceChanged for a job whose next numbers, computed here, would not depend on
-        what those that it has depend on.
+        """Check that a job's next numbers, computed here, depend on what those that it has do.
+
+        Args:
+            job: as it was read.
+
+        Raises:
+            ProvenanceChanged: they would not; says what is different.
         """
         refused = refusal(job, self.provenance(job.spec))
         if refused is not None:
             raise ProvenanceChanged(f"job {job.id} cannot go on: {refused}")
 
     def extend(self, job_id: str, iterations: int) -> Job:
-        """Give a job another budget, of `iterations` in all. Raises NotFound, Conflict,
-        InvalidRequest.
+        """Give a job another budget.
+
+        Args:
+            job_id: id of the job.
+            iterations: of the budget, in all.
+
+        Returns:
+            The job as it is then; queued if it had succeeded.
+
+        Raises:
+            NotFound: no job of that id.
+            Conflict: it was cancelled.
+            InvalidRequest: the budget is spent already, or too large.
         """
         return self.store.extend(job_id, iterations)
 
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100
     ) -> Page[Iteration]:
-        """Committed iterations with index > after."""
+        """List committed iterations, page by page.
+
+        Args:
+            job_id: id of the job.
+            after: only iterations with a greater index; None for all.
+            limit: most iterations on a page.
+
+        Returns:
+            A page, by index; `next` is None on the last one.
+
+        Raises:
+            NotFound: no job of that id.
+        """
         return self.store.iterations(job_id, after=after, limit=limit)
 
     def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """Every particle of a committed iteration."""
+        """Read every particle of a committed iteration.
+
+        Args:
+            job_id: id of the job.
+            iteration: index, from 0.
+
+        Returns:
+            By particle.
+
+        Raises:
+            NotFound: no job of that id, or no such iteration of it.
+        """
         return self.store.evaluations(job_id, iteration)
 
     def best(self, job_id: str) -> Evaluation | None:
-        """The best design so far."""
+        """Read the best design so far.
+
+        Args:
+            job_id: id of the job.
+
+        Returns:
+            The earliest of least fitness, None while every design has failed.
+
+        Raises:
+            NotFound: no job of that id.
+        """
         return self.store.best(job_id)
 
     def history(
         self, job_id: str, *, after: int | None = None
     ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
-        """Every committed iteration with index > after, with its particles, in order.
+        """Read every committed iteration with its particles.
 
-        Read by pieces as it is consumed: however long it takes, no transaction stays open, and a
-        job that runs meanwhile is followed to its end. Raises NotFound at the first item.
+        Read by pieces as it is consumed: however long it takes, no transaction stays open, and
+        what is committed meanwhile comes too.
+
+        Args:
+            job_id: id of the job.
+            after: only iterations with a greater index; None for all.
+
+        Returns:
+            Iterations and their particles, in order.
+
+        Raises:
+            NotFound: no job of that id; at the first item.
         """
-        while True:
-            page = self.store.iterations(job_id, after=after, limit=_PIECE)
-            if page.items:
-                first, last = page.items[0].index, page.items[-1].index
-                found = self.store.evaluations_between(job_id, first, last + 1)
-                by_iteration = {k: tuple(g) for k, g in groupby(found, key=_iteration_of)}
-                for iteration in page.items:
-                    yield iteration, by_iteration.get(iteration.index, ())
-                after = last
-            if page.next is None:
-                return
+        return read_history(self.store, job_id, after=after)
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """Every committed evaluation. Raises Conflict for a job too large to be held in memory."""
+        """Read every committed evaluation at once.
+
+        Args:
+            job: as it was read.
+
+        Returns:
+            Its columns, as of its progress or later.
+
+        Raises:
+            Conflict: the job is too large to be held in memory.
+        """
         return self._histories.columns(job)
 
-    def column_pieces(self, job: Job, *, rows: int = _PIECE_ROWS) -> Iterator[EvaluationColumns]:
+    def column_pieces(self, job: Job, *, rows: int = PIECE) -> Iterator[EvaluationColumns]:
         """As `columns`, piece by piece as they are consumed: for histories of any length.
 
         Args:
             job: As it was read; iterations committed later are left out.
             rows: Evaluations in a piece at most, but one iteration at least.
 
-        Yields:
+        Returns:
             Whole iterations, in order.
         """
-        step = max(1, rows // job.spec.optimizer.particles)
-        for first in range(0, job.progress.iterations, step):
-            last = min(first + step, job.progress.iterations)
-            piece = self.store.evaluation_columns(job.id, first, last)
-            if piece is not None:
-                yield piece
+        return read_columns(self.store, job, rows=rows)
 
     def distribution(
         self, job: Job, *, after: int | None = None, limit: int
     ) -> tuple[Distribution, bool]:
-        """Spread of the swarm in up to `limit` iterations with index > after; whether more follow.
+        """Say how the swarm is spread, iteration by iteration.
 
-        Raises as `columns`.
+        Args:
+            job: as it was read.
+            after: only iterations with a greater index; None for all.
+            limit: most iterations.
+
+        Returns:
+            The distribution, and whether more iterations follow.
+
+        Raises:
+            Conflict: the job is too large to be held in memory.
         """
         particles = job.spec.optimizer.particles
         columns = self.columns(job).after(after)
@@ -224,9 +330,19 @@ class JobService:
         return spread, len(page) < len(columns)
 
     def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
-        """All designs judged by another preference, from what is stored.
+        """Judge all designs by another preference, from what is stored.
 
-        Raises InvalidRequest for a job that has no preference, and as `columns`.
+        Args:
+            job: that tunes a drive, as it was read.
+            preference: to judge by.
+            top: how many designs to name.
+
+        Returns:
+            The ranking, with the evaluations that it refers to.
+
+        Raises:
+            InvalidRequest: a job of another kind, which has no preference.
+            Conflict: the job is too large to be held in memory.
         """
         if not isinstance(job.spec, JobSpec):
             raise InvalidRequest(
@@ -238,35 +354,23 @@ class JobService:
         return RankedJob(job.spec, columns, rank(columns, preference, top=top))
 
     def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
-        """Which parameters jobs that differ in seed and budget alone agree on.
+        """Say which parameters several runs of one problem agree on.
 
-        Raises InvalidRequest for jobs of different problems, Conflict while one of them has no
-        design that did not fail, and as `columns`.
+        Args:
+            jobs: at least one, all of different seeds; name, optimizer and iterations may differ
+                too.
+
+        Returns:
+            Intervals and, of several jobs, how far each parameter can be trusted.
+
+        Raises:
+            InvalidRequest: jobs of different problems, or two of one seed.
+            Conflict: a job has no design yet that did not fail, or is too large to be held in
+                memory.
         """
-        first, *others = jobs
-        seeds = {first.spec.seed: first.id}
-        for other in others:
-            if other.spec.seed in seeds:
-                raise InvalidRequest(
-                    f"job {other.id} has the seed of job {seeds[other.spec.seed]}, so that they"
-                    " agree whatever the walks say; compare runs of different seeds",
-                    field="also",
-                )
-            seeds[other.spec.seed] = other.id
-            if _problem(other.spec) != _problem(first.spec):
-                raise InvalidRequest(
-                    f"job {other.id} is of another problem than job {first.id}; runs that are"
-                    " compared differ in name, seed, optimizer and iterations alone",
-                    field="also",
-                )
-        for job in jobs:
-            if job.progress.best_fitness is None:
-                raise Conflict(
-                    f"job {job.id} has no design yet that did not fail; ask again after its next"
-                    " iteration, or leave it out"
-                )
+        check_comparable(jobs)
         runs = [self.columns(job) for job in jobs]
-        return identifiability(first.spec.design_space().variables, runs)
+        return identifiability(jobs[0].spec.design_space().variables, runs)
 
     def _check(self, spec: Spec) -> None:
         """Raise InvalidRequest for a job that cannot be run."""
@@ -285,14 +389,3 @@ class JobService:
                 walk.check_reach(spec.robot)
             except (NotFound, SimulationInputError) as error:
                 raise InvalidRequest(str(error), field=field) from error
-
-
-def _problem(spec: Spec) -> Spec:
-    """The spec without what may differ between runs of one problem."""
-    return spec.model_copy(
-        update={"name": "", "seed": 0, "iterations": 1, "optimizer": PsoSettings()}
-    )
-
-
-def _iteration_of(evaluation: Evaluation) -> int:
-    return evaluation.iteration

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.history_cache import HistoryCache
+from services.optimizer.analysis.history import HistoryCache
 from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Claim, CompletedIteration

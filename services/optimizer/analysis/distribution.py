@@ -18,12 +18,15 @@ QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distribution:
-    """I iterations.
+    """The swarm in each of I iterations.
 
-    index: (I,). fitness: (I, 7), `QUANTILES` of the swarm's finite values, NaN if there is none;
-    mean: (I,) of them. failed: (I,) number of the others.
-    diversity: (I,) standard deviation of the swarm's designs as a share of each searched variable's
-        range, mean over these variables; 0 for a swarm that has come together.
+    Attributes:
+        index: (I,) of the iteration, from 0.
+        fitness: (I, 7) `QUANTILES` of the swarm's finite fitness, NaN if there is none.
+        mean: (I,) of the same values.
+        failed: (I,) number of the other designs.
+        diversity: (I,) standard deviation of the swarm's designs as a share of each searched
+            variable's range, mean over these variables [1]; 0 for a swarm that has come together.
     """
 
     index: NDArray[np.int64]
@@ -34,7 +37,16 @@ class Distribution:
 
 
 def distribution(columns: EvaluationColumns, space: DesignSpace, particles: int) -> Distribution:
-    """particles: rows of every iteration."""
+    """Say how the swarm is spread, iteration by iteration.
+
+    Args:
+        columns: whole iterations, in order.
+        space: of their job.
+        particles: rows of every iteration.
+
+    Returns:
+        The distribution, in the order of the rows.
+    """
     fitness = columns.fitness.reshape(-1, particles)
     finite = np.isfinite(fitness)
     count = finite.sum(axis=1)
@@ -51,7 +63,15 @@ def distribution(columns: EvaluationColumns, space: DesignSpace, particles: int)
 
 
 def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
-    """(I, n), +inf for none -> (I, q): between neighbours of each row's finite values."""
+    """Quantiles of each row's finite values, linear between neighbours.
+
+    Args:
+        values: (I, n), +inf for a value that is none.
+        quantiles: q shares from 0 to 1, ascending.
+
+    Returns:
+        (I, q), NaN for a row without a finite value.
+    """
     ordered = np.sort(values, axis=1)
     last = np.isfinite(ordered).sum(axis=1) - 1
     place = np.maximum(last, 0)[:, np.newaxis] * np.array(quantiles)
@@ -73,10 +93,17 @@ def _diversity(columns: EvaluationColumns, space: DesignSpace, particles: int) -
 
 
 def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
-    """At most so many rows, ascending: whole iterations, from the first to the last, evenly.
+    """Choose whole iterations evenly, from the first to the last, for a picture of all.
 
     The row of least fitness is always among them. Where one iteration is too much, its rows are
-    thinned as well. most: at least 1.
+    thinned as well.
+
+    Args:
+        columns: whole iterations, in order.
+        most: rows to choose, at least 1.
+
+    Returns:
+        (n,) indices of rows, ascending, n <= `most`.
     """
     rows = len(columns)
     if rows <= most:

@@ -15,7 +15,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.search.pso import PsoSettings
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]
@@ -53,10 +57,14 @@ _PHRASES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class ParameterIdentifiability:
-    """One parameter. intervals: least and greatest value at each of `THRESHOLDS`, in its unit.
+    """One parameter over all runs.
 
-    best: value in the best design of all runs; bests: in each run's. trust: None for a single run,
-    which cannot tell.
+    Attributes:
+        variable: with the bounds of the search.
+        best: value in the best design of all runs, in its unit.
+        bests: value in each run's best design.
+        intervals: least and greatest value at each of `THRESHOLDS`.
+        trust: None for a single run, which cannot tell.
     """
 
     variable: Variable
@@ -66,15 +74,26 @@ class ParameterIdentifiability:
     trust: Trust | None
 
     def width(self, threshold: float = DECISIVE) -> float:
-        """Of the interval at one of `THRESHOLDS`, as a share of the range that was searched."""
+        """Width of an interval.
+
+        Args:
+            threshold: one of `THRESHOLDS`.
+
+        Returns:
+            Share of the range that was searched [1].
+        """
         low, high = self.intervals[THRESHOLDS.index(threshold)]
         return (high - low) / (self.variable.high - self.variable.low)
 
 
 @dataclass(frozen=True, slots=True)
 class Identifiability:
-    """All searched parameters. fitness: each run's best; designs: how many lie within each
-    threshold.
+    """All searched parameters.
+
+    Attributes:
+        fitness: each run's least.
+        designs: how many designs of all runs lie within each of `THRESHOLDS`.
+        parameters: in the order of the variables.
     """
 
     fitness: tuple[float, ...]
@@ -85,9 +104,17 @@ class Identifiability:
 def identifiability(
     variables: Sequence[Variable], runs: Sequence[EvaluationColumns]
 ) -> Identifiability:
-    """Intervals over runs of one problem. variables: the first columns of the runs' designs.
+    """Find the intervals of parameters over runs of one problem.
 
-    Raises ValueError unless every run has a design that did not fail.
+    Args:
+        variables: that were searched, the first columns of the runs' designs.
+        runs: all evaluations of each run.
+
+    Returns:
+        Intervals and, of several runs, how far each parameter can be trusted.
+
+    Raises:
+        ValueError: there is no run, or one without a design that did not fail.
     """
     if not runs or not all(np.isfinite(run.fitness).any() for run in runs):
         raise ValueError("every run needs a design that did not fail")
@@ -109,6 +136,47 @@ def identifiability(
         parameters.append(found if len(runs) == 1 else _judged(found))
     designs = tuple(int(sum(rows.sum() for rows in good)) for good in within)
     return Identifiability(fitness, designs, tuple(parameters))
+
+
+def check_comparable(jobs: Sequence[Job]) -> None:
+    """Check that jobs are runs of one problem that tell something about each other.
+
+    Args:
+        jobs: at least one, as they were read.
+
+    Raises:
+        InvalidRequest: jobs of different problems, or two of one seed.
+        Conflict: a job has no design yet that did not fail.
+    """
+    first, *others = jobs
+    seeds = {first.spec.seed: first.id}
+    for other in others:
+        if other.spec.seed in seeds:
+            raise InvalidRequest(
+                f"job {other.id} has the seed of job {seeds[other.spec.seed]}, so that they"
+                " agree whatever the walks say; compare runs of different seeds",
+                field="also",
+            )
+        seeds[other.spec.seed] = other.id
+        if _problem(other.spec) != _problem(first.spec):
+            raise InvalidRequest(
+                f"job {other.id} is of another problem than job {first.id}; runs that are"
+                " compared differ in name, seed, optimizer and iterations alone",
+                field="also",
+            )
+    for job in jobs:
+        if job.progress.best_fitness is None:
+            raise Conflict(
+                f"job {job.id} has no design yet that did not fail; ask again after its next"
+                " iteration, or leave it out"
+            )
+
+
+def _problem(spec: Spec) -> Spec:
+    """The spec without what may differ between runs of one problem."""
+    return spec.model_copy(
+        update={"name": "", "seed": 0, "iterations": 1, "optimizer": PsoSettings()}
+    )
 
 
 def _interval(values: Sequence[Floats]) -> tuple[float, float]:

@@ -10,16 +10,20 @@ from numpy.typing import NDArray
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.preference import Preference
+from services.optimizer.jobs.tuning import JobSpec
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankedDesign:
-    """One of the best. row: of the columns that were ranked.
+    """One of the best designs.
 
-    rank counts from 1, the earliest of equals first; rank_before: by the job's own preference, None
-    for a design that it did not rank. fitness: by the new preference.
+    Attributes:
+        row: of the columns that were ranked.
+        rank: by the new preference, from 1, the earliest of equals first.
+        rank_before: by the job's own preference; None for a design that failed by it.
+        fitness: by the new preference, minimized.
     """
 
     row: int
@@ -32,16 +36,34 @@ class RankedDesign:
 class Ranking:
     """All evaluations under one preference; fitness is minimized.
 
-    present_best: fitness of the design that the job itself holds to be the best, None without one.
-    best_so_far: (iterations,), +inf until a design has walked in every scenario.
-    correlation: Spearman's, of the fitness before and now over the designs that have both; None
-        where it is undefined.
+    Attributes:
+        top: the best designs, best first.
+        present_best: fitness of the design that the job itself holds to be the best, None without
+            one.
+        best_so_far: (iterations,), +inf until a design has walked in every scenario.
+        correlation: Spearman's, of the fitness before and now over the designs that have both;
+            None where it is undefined.
     """
 
     top: tuple[RankedDesign, ...]
     present_best: float | None
     best_so_far: Floats
     correlation: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RankedJob:
+    """A job's designs by another preference.
+
+    Attributes:
+        spec: of the job, with its own preference.
+        columns: its evaluations, to which the ranking's rows refer.
+        ranking: by the other preference.
+    """
+
+    spec: JobSpec
+    columns: EvaluationColumns
+    ranking: Ranking
 
 
 def rank(columns: EvaluationColumns, preference: Preference, *, top: int) -> Ranking:

@@ -1,8 +1,7 @@
-"""Eq. 4.1 and 4.2 for a hundred thousand designs at once.
+"""Bias-weighted product and geometric mean (thesis eq. 4.1, 4.2) of many designs at once.
 
-The same numbers as `services.optimizer.jobs.preference` to twelve digits, in a twentieth of the
-time; numpy's logarithm may differ from Python's in the last bit, so what is stored is never made
-here.
+The same numbers as `services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
+differ from Python's in the last bit, so that nothing that is stored is computed here.
 """
 
 from __future__ import annotations
@@ -24,7 +23,15 @@ _BLOCK: Final = 4096
 
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
-    """(r, K): logarithm of eq. 4.1, +inf where the walk failed or lacks a weighted objective."""
+    """Logarithm of the bias-weighted product (eq. 4.1).
+
+    Args:
+        columns: r evaluations of walks in K scenarios.
+        preference: biases and exponents.
+
+    Returns:
+        (r, K), +inf where the walk failed or lacks an objective with a weight.
+    """
     result = np.empty(columns.statuses.shape)
     weighted = [
         (m, b, e)
@@ -48,7 +55,14 @@ def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
 
 
 def fitness_of(log_utility: Floats) -> Floats:
-    """(r, K) -> (r,): eq. 4.2, +inf where any case failed or a double ends."""
+    """Geometric mean over scenarios (eq. 4.2).
+
+    Args:
+        log_utility: (r, K) logarithms of utilities, +inf where a walk failed.
+
+    Returns:
+        (r,) fitness, +inf where any walk failed or a double ends.
+    """
     failed = np.isposinf(log_utility).any(axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         fitness = np.exp(log_utility.mean(axis=1))
@@ -56,7 +70,15 @@ def fitness_of(log_utility: Floats) -> Floats:
 
 
 def utilities(columns: EvaluationColumns, spec: Spec) -> Floats:
-    """(r, K): worth of each design in each case by its job's own measure, +inf if it failed."""
+    """What each design is worth in each case by its job's own measure.
+
+    Args:
+        columns: r evaluations of a job.
+        spec: of the job.
+
+    Returns:
+        (r, K) utilities, minimized, +inf where a case failed.
+    """
     if isinstance(spec, JobSpec):
         logarithms = log_utilities(columns, spec.resolved_preference())
     else:

@@ -1,4 +1,4 @@
-"""Histories of jobs held as columns, so that a question about all evaluations is answered at once.
+"""Whole histories of jobs: at once as columns that are held in memory, or piece by piece.
 
 Committed iterations never change: what was read once is kept, and only what was committed since is
 read. The store is asked by pieces, each a short transaction.
@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import attrgetter
 from typing import Final, TypeVar
 
 import numpy as np
@@ -16,7 +19,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.errors import Conflict
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.job import Evaluation, Iteration, Job
 from services.optimizer.store.base import Store
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -24,26 +27,87 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 DEFAULT_BYTES: Final = 512 << 20
 """Ten jobs of 100 000 evaluations in six scenarios."""
 
-_PIECE: Final = 2000
-"""Evaluations read in one transaction, which takes some tens of milliseconds."""
+PIECE: Final = 2000
+"""Evaluations read in one transaction."""
+
+_PIECE_ITERATIONS: Final = 16
+
+
+def read_history(
+    store: Store, job_id: str, *, after: int | None
+) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
+    """Read committed iterations with their particles, piece by piece as they are consumed.
+
+    Args:
+        store: where they are.
+        job_id: id of the job.
+        after: only iterations with a greater index; None for all.
+
+    Yields:
+        An iteration and its particles, in order.
+
+    Raises:
+        NotFound: no job of that id; at the first item.
+    """
+    while True:
+        page = store.iterations(job_id, after=after, limit=_PIECE_ITERATIONS)
+        if page.items:
+            first, last = page.items[0].index, page.items[-1].index
+            found = store.evaluations_between(job_id, first, last + 1)
+            by_iteration = {k: tuple(g) for k, g in groupby(found, key=attrgetter("iteration"))}
+            for iteration in page.items:
+                yield iteration, by_iteration.get(iteration.index, ())
+            after = last
+        if page.next is None:
+            return
+
+
+def read_columns(store: Store, job: Job, *, rows: int) -> Iterator[EvaluationColumns]:
+    """Read a job's evaluations as columns, piece by piece as they are consumed.
+
+    Args:
+        store: where they are.
+        job: as it was read; iterations committed later are left out.
+        rows: evaluations in a piece at most, but one iteration at least.
+
+    Yields:
+        Whole iterations, in order.
+    """
+    step = max(1, rows // job.spec.optimizer.particles)
+    for first in range(0, job.progress.iterations, step):
+        piece = store.evaluation_columns(job.id, first, min(first + step, job.progress.iterations))
+        if piece is not None:
+            yield piece
 
 
 class HistoryCache:
-    """Columns of the jobs that were asked about last. Thread-safe.
-
-    max_bytes: memory of all jobs together; the job asked about longest ago is dropped first.
-    """
+    """Columns of the jobs that were asked about last. Thread-safe."""
 
     def __init__(self, store: Store, *, max_bytes: int = DEFAULT_BYTES) -> None:
+        """Create an empty cache.
+
+        Args:
+            store: where histories are read.
+            max_bytes: memory of all jobs together; the job asked about longest ago is dropped
+                first.
+        """
         self._store = store
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
         self._histories: OrderedDict[str, _History] = OrderedDict()
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """Every evaluation of the job's committed iterations, as of its progress or later.
+        """Every evaluation of a job's committed iterations.
 
-        Raises Conflict for a job that is too large to be held.
+        Args:
+            job: as it was read.
+
+        Returns:
+            Its columns as of its progress or later, which cannot be written to and stay as they
+            are when more are read.
+
+        Raises:
+            Conflict: the job is too large to be held.
         """
         history = self._history(job)
         with history.lock:
@@ -69,7 +133,7 @@ class HistoryCache:
 
     def _read_on(self, history: _History, job: Job) -> None:
         first = history.iterations
-        piece = max(1, _PIECE // job.spec.optimizer.particles)
+        piece = max(1, PIECE // job.spec.optimizer.particles)
         last = min(first + piece, job.progress.iterations)
         found = self._store.evaluation_columns(job.id, first, last)
         if found is not None:

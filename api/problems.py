@@ -95,7 +95,19 @@ def problem(
     errors: Sequence[FieldErrorView] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """A problem as response. kind: last part of its type."""
+    """Make a problem.
+
+    Args:
+        request_path: path that was asked for.
+        status: HTTP status.
+        kind: last part of the problem's type.
+        detail: what went wrong and what to do about it.
+        errors: every offending field.
+        headers: of the response, beside its media type.
+
+    Returns:
+        The response.
+    """
     view = ProblemView(
         type=f"urn:gaitswarm:problem:{kind}",
         title=_TITLES.get(kind, HTTPStatus(status).phrase),
@@ -109,7 +121,15 @@ def problem(
 
 
 def internal_error(request_path: str, request_id: str) -> Response:
-    """The answer to a bug: nothing of the inside is shown, but how to report it is."""
+    """Answer a bug: nothing of the inside is shown, but how to report it is.
+
+    Args:
+        request_path: path that was asked for.
+        request_id: by which the log names the cause.
+
+    Returns:
+        The response.
+    """
     return problem(
         request_path,
         500,
@@ -120,7 +140,11 @@ def internal_error(request_path: str, request_id: str) -> Response:
 
 
 def add_problem_handlers(app: FastAPI) -> None:
-    """Answer every error of the table above with a problem."""
+    """Answer every error of the table above with a problem.
+
+    Args:
+        app: takes on the handlers.
+    """
     app.add_exception_handler(RequestValidationError, _on_invalid)
     app.add_exception_handler(HTTPException, _on_http_error)
     app.add_exception_handler(GaitswarmError, _on_domain_error)

@@ -47,7 +47,12 @@ class DistributionView(View):
 
     @classmethod
     def from_distribution(cls, found: Distribution, *, more: bool) -> DistributionView:
-        """more: whether further iterations follow."""
+        """Make a page of a distribution.
+
+        Args:
+            found: the page's iterations.
+            more: whether further ones follow.
+        """
         rows = zip(
             found.index.tolist(),
             found.fitness.tolist(),
@@ -135,7 +140,12 @@ class RankingView(View):
 
     @classmethod
     def from_ranked_job(cls, request: RankingRequest, ranked: RankedJob) -> RankingView:
-        """ranked: by the request's preference."""
+        """Make the answer to a request.
+
+        Args:
+            request: as it was sent.
+            ranked: the job's designs by the request's preference.
+        """
         ranking, columns = ranked.ranking, ranked.columns
         so_far = ranking.best_so_far.tolist()
         return cls(

@@ -22,12 +22,27 @@ class View(BaseModel):
 
 
 def listing_name(params: tuple[type[Any], ...], kind: str) -> str:
-    """Name of the schema of a list of views: (JobSummaryView,), "Page" -> JobSummaryPage."""
+    """Name the schema of a list of views: (JobSummaryView,), "Page" -> JobSummaryPage.
+
+    Args:
+        params: types of the items, as pydantic gives them.
+        kind: of list.
+
+    Returns:
+        The name, as clients see it.
+    """
     return "".join(param.__name__.removesuffix("View") for param in params) + kind
 
 
 def finite(value: float | None) -> float | None:
-    """The value, or None where it is missing, infinite or undefined."""
+    """Make a number one that JSON has.
+
+    Args:
+        value: any number, or None.
+
+    Returns:
+        The number, None where it is missing, infinite or undefined.
+    """
     return None if value is None or not math.isfinite(value) else float(value)
 
 
@@ -35,9 +50,17 @@ MEDIA_TYPE: Final = "application/octet-stream"
 
 
 def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
-    """Length of the header (uint32), header (padded with spaces), numbers; all little-endian.
+    """Frame numbers behind a header that explains them; all little-endian.
 
     The numbers begin at a multiple of four bytes, as typed arrays want them.
+
+    Args:
+        header: what the numbers mean.
+        numbers: of any shape; those beyond float32 become infinite.
+
+    Returns:
+        Length of the header (uint32), the header (JSON, padded with spaces), the numbers (float32,
+        the last axis the fastest).
     """
     text = header.model_dump_json().encode()
     text += b" " * (-len(text) % 4)

@@ -25,7 +25,14 @@ class CatalogueView(View, Generic[T]):
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """Name of the schema, as clients see it."""
+        """Name the schema of a list.
+
+        Args:
+            params: type of the items, as pydantic gives it.
+
+        Returns:
+            The name, as clients see it.
+        """
         return listing_name(params, "List")
 
 

@@ -37,7 +37,11 @@ class ObjectiveView(View):
 
     @classmethod
     def from_objective(cls, objective: Objective) -> ObjectiveView:
-        """As the simulator declares it."""
+        """Make a view of an objective.
+
+        Args:
+            objective: as the simulator declares it.
+        """
         return cls(name=objective.name, unit=objective.unit, description=objective.description)
 
 
@@ -66,10 +70,16 @@ class ScenarioResultView(View):
     )
 
     @classmethod
-    def from_trial(
+    def from_case(
         cls, status: int, objectives: Mapping[str, float], log_utility: float
     ) -> ScenarioResultView:
-        """log_utility: +inf for a failed walk."""
+        """Make a view of what one case yields.
+
+        Args:
+            status: value of `sim.outcome.Status`.
+            objectives: raw objectives by name, in their units, NaN where there is none.
+            log_utility: logarithm of the utility, +inf for a failed walk.
+        """
         ended = Status(status)
         return cls.model_validate(
             {
@@ -111,13 +121,26 @@ class BestView(EvaluationView):
 
     @classmethod
     def from_evaluation(cls, evaluation: Evaluation, spec: Spec) -> BestView:
-        """spec: that of the evaluation's job."""
+        """Make a view of the best design.
+
+        Args:
+            evaluation: of a design that did not fail.
+            spec: of its job.
+        """
         (view,) = evaluation_views([evaluation], spec)
         return cls.model_validate(dict(view))
 
 
 def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
-    """Views of evaluations of one job, in their order; utilities are derived from its spec."""
+    """Make views of evaluations of one job.
+
+    Args:
+        evaluations: n of them.
+        spec: of their job, from which utilities are derived.
+
+    Returns:
+        n views, in the same order.
+    """
     if not evaluations:
         return []
     variables = spec.design_space().names
@@ -149,10 +172,21 @@ def case_results(
     values: NDArray[np.float64],
     log_utilities: NDArray[np.float64],
 ) -> dict[str, ScenarioResultView]:
-    """names, statuses, log_utilities (K,), values (K, m) of one design in K cases, by name."""
+    """Make views of one design in K cases.
+
+    Args:
+        names: K names of the cases.
+        objectives: m, columns of `values`.
+        statuses: (K,) values of `sim.outcome.Status`.
+        values: (K, m) raw objectives, in their units, NaN where there is none.
+        log_utilities: (K,) logarithms of the utilities, +inf for a failed case.
+
+    Returns:
+        K views by name, in the same order.
+    """
     columns = [objective.name for objective in objectives]
     return {
-        name: ScenarioResultView.from_trial(status, dict(zip(columns, row, strict=True)), log)
+        name: ScenarioResultView.from_case(status, dict(zip(columns, row, strict=True)), log)
         for name, status, row, log in zip(
             names, statuses.tolist(), values.tolist(), log_utilities.tolist(), strict=True
         )
@@ -160,5 +194,12 @@ def case_results(
 
 
 def utility(log_utility: float) -> float | None:
-    """Number of its logarithm; None where it is not finite."""
+    """Make a utility of its logarithm.
+
+    Args:
+        log_utility: +inf for a failed case.
+
+    Returns:
+        The utility, None where it is not finite.
+    """
     return finite(exponential(log_utility))

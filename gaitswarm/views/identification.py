@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from gaitswarm.views.base import View
@@ -11,6 +9,7 @@ from services.optimizer.analysis.identifiability import (
     THRESHOLDS,
     Identifiability,
     ParameterIdentifiability,
+    Trust,
 )
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.identification.recorded_walk import RecordedWalk
@@ -37,7 +36,7 @@ class ParameterView(View):
     intervals: list[IntervalView] = Field(
         description="One for each of `thresholds`, over all runs."
     )
-    trust: Literal["trusted", "rough", "unknown"] | None = Field(
+    trust: Trust | None = Field(
         description="How far the runs agree at the threshold of 5 %: within 15 %, within 35 %, or"
         " not within 35 % of the range that was searched; null for a single run, which cannot"
         " tell.",
@@ -50,7 +49,11 @@ class ParameterView(View):
 
     @classmethod
     def from_parameter(cls, found: ParameterIdentifiability) -> ParameterView:
-        """As the optimizer's service finds it."""
+        """Make a view of one parameter.
+
+        Args:
+            found: what the runs say of it.
+        """
         trust = found.trust
         return cls(
             name=found.variable.name,
@@ -60,7 +63,7 @@ class ParameterView(View):
             best=found.best,
             bests=list(found.bests),
             intervals=[IntervalView(low=low, high=high) for low, high in found.intervals],
-            trust=None if trust is None else trust.value,
+            trust=trust,
             explanation=None if trust is None else trust.phrase,
         )
 
@@ -82,7 +85,12 @@ class IdentifiabilityView(View):
 
     @classmethod
     def from_identifiability(cls, jobs: list[str], found: Identifiability) -> IdentifiabilityView:
-        """jobs: ids of the runs, in order."""
+        """Make a view of all parameters.
+
+        Args:
+            jobs: ids of the runs.
+            found: what they say, each run in the same order.
+        """
         return cls(
             jobs=jobs,
             fitness=list(found.fitness),
@@ -113,7 +121,12 @@ class RecordingView(View):
 
     @classmethod
     def from_walk(cls, recording_id: str, walk: RecordedWalk) -> RecordingView:
-        """recording_id: as the store gave it."""
+        """Make a view of a recording.
+
+        Args:
+            recording_id: as the store gave it.
+            walk: the recording.
+        """
         return cls(
             id=recording_id,
             scenario=walk.scenario.name,

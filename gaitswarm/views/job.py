@@ -50,7 +50,14 @@ class PageView(View, Generic[T]):
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """Name of the schema, as clients see it."""
+        """Name the schema of a page.
+
+        Args:
+            params: type of the items, as pydantic gives it.
+
+        Returns:
+            The name, as clients see it.
+        """
         return listing_name(params, "Page")
 
 
@@ -127,7 +134,11 @@ class JobSummaryView(View):
 
     @classmethod
     def from_job(cls, job: Job) -> JobSummaryView:
-        """From the job alone: no further query."""
+        """Make a summary from the job alone, without a further query.
+
+        Args:
+            job: as it was read.
+        """
         return cls.model_validate(_summary(job))
 
 
@@ -152,7 +163,12 @@ class JobView(JobSummaryView):
 
     @classmethod
     def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
-        """best: as `JobService.best` returns it."""
+        """Make a view of a job in full.
+
+        Args:
+            job: as it was read.
+            best: its best design so far, if there is one.
+        """
         view = None if best is None else BestView.from_evaluation(best, job.spec)
         objectives = [ObjectiveView.from_objective(o) for o in job.spec.objectives]
         return cls.model_validate(
@@ -216,7 +232,11 @@ class IterationView(View):
 
     @classmethod
     def from_iteration(cls, iteration: Iteration) -> IterationView:
-        """An iteration as the store lists it."""
+        """Make a view of an iteration.
+
+        Args:
+            iteration: as the store lists it.
+        """
         return cls.model_validate(_at_a_glance(iteration))
 
 
@@ -229,7 +249,13 @@ class HistoryIterationView(IterationView):
     def from_iteration_and_evaluations(
         cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
     ) -> HistoryIterationView:
-        """evaluations: those of the iteration; spec: that of its job."""
+        """Make a view of an iteration with its particles.
+
+        Args:
+            iteration: as the store lists it.
+            evaluations: its particles.
+            spec: of the job.
+        """
         particles = evaluation_views(evaluations, spec)
         return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
 
@@ -244,12 +270,23 @@ class StateView(View):
 
     @classmethod
     def from_job(cls, job: Job) -> StateView:
-        """The job's present state."""
+        """Make a view of a job's present state.
+
+        Args:
+            job: as it was read.
+        """
         return cls(id=job.id, state=job.state, error=job.error, iterations=job.progress.iterations)
 
 
 def job_links(job: Job) -> dict[str, str]:
-    """Paths of the job's resources, and of the commands that its state allows."""
+    """Say where a client goes on from a job.
+
+    Args:
+        job: as it was read.
+
+    Returns:
+        Paths of its resources, and of the commands that its state allows, by name.
+    """
     here = f"{PREFIX}/jobs/{job.id}"
     resources = {name: f"{here}/{name}" for name in _RESOURCES}
     if isinstance(job.spec, JobSpec):
@@ -329,7 +366,11 @@ class EstimateView(View):
 
     @classmethod
     def from_estimate(cls, estimate: Estimate) -> EstimateView:
-        """As the service estimates it."""
+        """Make a view of an estimate.
+
+        Args:
+            estimate: as the service makes it.
+        """
         return cls(
             evaluations=estimate.evaluations,
             walks=estimate.walks,

@@ -47,10 +47,17 @@ class ParticlesHeaderView(View):
 def encoded_particles(
     job: Job, columns: EvaluationColumns, *, after: int | None, most: int
 ) -> bytes:
-    """`framed` header and float32 columns, one after another; NaN for what does not exist.
+    """Encode evaluations for pictures of the whole search.
 
-    columns: of the whole job. after: only iterations with a greater index. most: rows, thinned
-    evenly in iterations; the best of them is always there.
+    Args:
+        job: as it was read.
+        columns: its evaluations, all of them.
+        after: only iterations with a greater index; None for all.
+        most: rows at most, at least 1; more are thinned evenly in iterations, and the best of them
+            is always there.
+
+    Returns:
+        `framed` ParticlesHeaderView and columns, one after another; NaN for what does not exist.
     """
     wanted = columns.after(after)
     chosen = wanted.rows(thinned(wanted, most))

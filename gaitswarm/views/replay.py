@@ -13,6 +13,7 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite, framed, unframed
 from gaitswarm.views.evaluation import StatusName
+from gaitswarm.views.simulation import QUANTITIES
 from sim.kernel.parameters import gravity_on
 from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from sim.replay import Replay
@@ -24,19 +25,24 @@ from sim.scenario import Scenario
 VERSION: Final = 1
 
 _CHANNELS: Final[dict[str, tuple[str, str]]] = {
-    "time": ("s", "time since the start"),
+    "time": QUANTITIES["time"],
     "link_pose": ("m, 1", "every link in the world: x, y, z, then quaternion x, y, z, w"),
     "foot_position": ("m", "lower end of every leg in the world: x, y, z"),
-    "foot_force": ("N", "force of the ground on every foot in the world: x, y, z"),
-    "joint_angle": ("rad", "angle of every joint"),
-    "desired_angle": ("rad", "desired angle of every joint"),
-    "motor_angle": ("rad", "angle of every joint at its encoder, before any backlash"),
-    "current": ("A", "motor current of every joint"),
-    "voltage": ("V", "motor voltage of every joint"),
-    "load_torque": ("N m", "gear torque of every joint"),
+    **{
+        name: QUANTITIES[name]
+        for name in (
+            "foot_force",
+            "joint_angle",
+            "desired_angle",
+            "motor_angle",
+            "current",
+            "voltage",
+            "load_torque",
+        )
+    },
     "body_acceleration": ("m/s2", "of the body in its own frame, without gravity: x, y, z"),
     "body_velocity": ("m/s, rad/s", "of the body in its own frame: 3 linear, then 3 angular"),
-    "supply": ("V", "voltage of the battery"),
+    "supply": QUANTITIES["supply"],
 }
 """Arrays of a `Replay` in the order of a frame: unit and description."""
 
@@ -61,7 +67,11 @@ class ShapeView(View):
 
     @classmethod
     def from_shape(cls, shape: Shape) -> ShapeView:
-        """As the simulator has it."""
+        """Make a view of a solid.
+
+        Args:
+            shape: as the simulator has it.
+        """
         return cls(type=shape.type, size=shape.size, origin=shape.origin, role=shape.role)
 
 
@@ -76,7 +86,11 @@ class LinkView(View):
 
     @classmethod
     def from_link(cls, link: VisibleLink) -> LinkView:
-        """As the simulator has it."""
+        """Make a view of a link.
+
+        Args:
+            link: as the simulator has it.
+        """
         shapes = [ShapeView.from_shape(shape) for shape in link.shapes]
         return cls(name=link.name, parent=link.parent, shapes=shapes)
 
@@ -166,10 +180,18 @@ def encoded_replay(
     status: Status,
     objectives: NDArray[np.float64],
 ) -> bytes:
-    """Length of the header (uint32), header (JSON, padded with spaces to whole words), then frames
-    of float32, all little-endian.
+    """Encode a walk to be looked at.
 
-    scenario: as it was walked; objectives: (6,).
+    Args:
+        walk: its frames; it ends before the first one that float32 cannot hold.
+        robot: that walked.
+        scenario: as it was walked, with what the design says of the gait.
+        rate: frames a second, as asked for [Hz].
+        status: how the walk ended.
+        objectives: (6,) raw objectives f1..f6, in their units, NaN where there is none.
+
+    Returns:
+        `framed` ReplayHeaderView and numbers by frame.
     """
     legs = [leg.name for leg in robot.legs]
     channels = _channels(walk, robot.joint_names, legs)

@@ -21,7 +21,7 @@ LOG_RATE: Final = 500
 
 LogValues = Annotated[list[Any], WithJsonSchema({"type": "array", "items": {}})]
 
-_COLUMNS: Final[dict[str, tuple[str, str]]] = {
+QUANTITIES: Final[dict[str, tuple[str, str]]] = {
     "time": ("s", "time since the start"),
     "base_position": ("m", "position of the body in the world: x, y, z"),
     "base_orientation": ("1", "orientation of the body in the world: quaternion x, y, z, w"),
@@ -36,6 +36,7 @@ _COLUMNS: Final[dict[str, tuple[str, str]]] = {
     "foot_force": ("N", "force of the ground on every foot in the world frame: x, y, z"),
     "supply": ("V", "voltage of the battery"),
 }
+"""Arrays of a `WalkLog`, unit and description of each."""
 
 
 class LogColumnView(View):
@@ -57,12 +58,16 @@ class WalkLogView(View):
         default=LOG_RATE, description="Rows per second of simulated time [Hz].", examples=[500]
     )
     columns: dict[str, LogColumnView] = Field(
-        description="Recorded quantities by name: " + ", ".join(_COLUMNS) + "."
+        description="Recorded quantities by name: " + ", ".join(QUANTITIES) + "."
     )
 
     @classmethod
     def from_log(cls, log: WalkLog) -> WalkLogView:
-        """All arrays of the log; what is not finite is null."""
+        """Make a view of all arrays of a log; what is not finite is null.
+
+        Args:
+            log: of one walk.
+        """
         # model_construct: hundreds of thousands of numbers that need no checking again.
         return cls.model_construct(
             rate=LOG_RATE,
@@ -70,7 +75,7 @@ class WalkLogView(View):
                 name: LogColumnView.model_construct(
                     unit=unit, description=description, values=_nullable(getattr(log, name))
                 )
-                for name, (unit, description) in _COLUMNS.items()
+                for name, (unit, description) in QUANTITIES.items()
             },
         )
 
@@ -117,7 +122,18 @@ class SimulationView(View):
         objectives: NDArray[np.float64],
         logs: Sequence[WalkLog | None],
     ) -> SimulationView:
-        """names, statuses (K,), objectives (K, 6): one walk per scenario; logs: K or none."""
+        """Make a view of one design's walks, one in each of K scenarios.
+
+        Args:
+            robot: that walked, as it was asked for.
+            controller: that drove it.
+            design: value of every variable by name.
+            preference: by which to judge.
+            names: K names of the scenarios.
+            statuses: (K,) values of `sim.outcome.Status`.
+            objectives: (K, 6) raw objectives f1..f6, in their units, NaN where there is none.
+            logs: K, or none if they were not asked for; None for a robot that never moved.
+        """
         judged = judge(objectives[None], (statuses != Status.OK)[None], preference)
         results = case_results(names, OBJECTIVES, statuses, objectives, judged.log_utilities[0])
         recorded = [None if log is None else WalkLogView.from_log(log) for log in logs]

@@ -56,7 +56,11 @@ class RuleView(View):
 
     @classmethod
     def from_rule(cls, rule: Rule) -> RuleView:
-        """As the inference has it."""
+        """Make a view of a rule.
+
+        Args:
+            rule: as the inference has it.
+        """
         return cls(antecedents=dict(rule.antecedents), then=rule.consequent, weight=rule.weight)
 
 
@@ -103,7 +107,11 @@ class FuzzyOutputView(UniverseView):
 
     @classmethod
     def from_surface(cls, surface: Surface) -> FuzzyOutputView:
-        """See `sim.controllers.surface`."""
+        """Make a view of one output.
+
+        Args:
+            surface: of the inference and of its table, over one grid.
+        """
         axes = surface.source.axes
         velocity = axes.get("velocity")
         return cls.model_construct(
@@ -139,7 +147,12 @@ class SurfaceView(View):
 
     @classmethod
     def from_surfaces(cls, controller: ControllerName, surfaces: Sequence[Surface]) -> SurfaceView:
-        """surfaces: of every output, on the same grid."""
+        """Make a view of a controller.
+
+        Args:
+            controller: its name.
+            surfaces: of every output, on the same grid.
+        """
         inputs = {name: m for surface in surfaces for name, m in surface.inputs.items()}
         held = {name: value for surface in surfaces for name, value in surface.held.items()}
         return cls(

@@ -137,8 +137,8 @@ __all__ = [
 _MODULES: Final = {
     "gaitswarm.errors": (
         "Conflict", "EvaluatorUnavailable", "GaitswarmError", "IdempotencyConflict", "Interrupted",
-        "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged", "StoreUnavailable",
-        "Unavailable",
+        "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged",
+        "StoreUnavailable", "Unavailable",
     ),
     "gaitswarm.jobs.async_database": ("AsyncDatabaseJobs",),
     "gaitswarm.jobs.async_port": ("AsyncJobs",),

@@ -18,7 +18,6 @@ from gaitswarm.tables import EvaluationTable, Table
 from gaitswarm.views import BestView, IterationView, JobView
 from services.optimizer.jobs.job import JobState
 from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.service import check_can_be_simulated
 from services.runtime import EvaluatorKind
 
 if TYPE_CHECKING:
@@ -166,5 +165,5 @@ def optimize(
 def _checked(spec: AnySpec) -> AnySpec:
     """The spec, if it can be simulated: before a database is made for it."""
     with simulation_errors("spec"):
-        check_can_be_simulated(spec)
+        spec.check_can_be_simulated()
     return spec

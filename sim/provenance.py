@@ -25,6 +25,7 @@ _SUFFIXES: Final = (".py", ".c", ".h")
 
 _NOT_IN_A_CASE: Final = (
     "benchmark.py",
+    "measurement",
     "provenance.py",
     "replay.py",
     "robot/shapes.py",

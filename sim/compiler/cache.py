@@ -52,7 +52,14 @@ def find(pattern: str) -> tuple[Path | None, tuple[Path, ...]]:
 
 
 def is_intact(library: Path) -> bool:
-    """Whether the file can be read and matches the checksum beside it."""
+    """Whether a file can be read and matches the checksum beside it.
+
+    Args:
+        library: The file.
+
+    Returns:
+        False if either is missing or cannot be read.
+    """
     try:
         recorded = _checksum_of(library).read_text(encoding="ascii", errors="replace").split()
         return recorded[:1] == [hashlib.sha256(library.read_bytes()).hexdigest()]

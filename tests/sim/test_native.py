@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -199,3 +200,42 @@ def test_a_robot_may_have_any_name() -> None:
     named = RobotFiles(toml=toml.replace('name = "quadruped"', 'name = "a/b"', 1), urdf=urdf)
     assert load_robot(named).description.name == "a/b"
     assert prepare(named) == "native"
+
+
+IDENTITIES = """
+import os, sys
+from pathlib import Path
+import sim.kernel
+from sim.kernel.source import kernel_identity
+from sim.robot import load_robot
+robot, folder = load_robot("szabadka2"), Path(sim.kernel.__file__).parent
+for name in ["unchanged", *sys.argv[1:]]:
+    # What a process has read of the files it keeps, so each is looked at by a process of its own.
+    if (child := os.fork()) == 0:
+        if name != "unchanged":
+            with (folder / name).open("a") as file:
+                file.write("\\n")
+        print(name, kernel_identity(robot).hex(), flush=True)
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
+
+
+def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_path: Path) -> None:
+    used = run_python(
+        "import sys, sim.kernel.emit_c, sim.kernel.physics_step, sim.kernel.source\n"
+        "print(*(name for name in sys.modules if name.startswith('sim.kernel.')))"
+    )
+    files = ["driver.c", *(f"{name.split('.')[-1]}.py" for name in used.stdout.split())]
+    assert {"physics_step.py", "contact.py", "inertia.py"} < set(files)
+    shutil.copytree(ROOT / "sim", tmp_path / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", IDENTITIES, *files],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )
+    identities = [line.split()[1] for line in done.stdout.splitlines()]
+    assert len(identities) == len(set(identities)) == 1 + len(files)

@@ -1,0 +1,77 @@
+"""Every public function of the simulator says what each of its arguments means."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+SIM = Path(__file__).parents[2] / "sim"
+
+TREES = {
+    path.relative_to(SIM).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
+    for path in SIM.rglob("*.py")
+}
+
+ALGEBRA = "kernel/spatial.py"
+"""Here a formula of its arguments says what a function does."""
+
+
+def classes(tree: ast.Module) -> Iterator[ast.ClassDef]:
+    return (node for node in tree.body if isinstance(node, ast.ClassDef))
+
+
+def functions(node: ast.Module | ast.ClassDef) -> Iterator[ast.FunctionDef]:
+    """Public ones."""
+    for child in node.body:
+        if isinstance(child, ast.FunctionDef) and not child.name.startswith("_"):
+            yield child
+
+
+PORTS = {
+    method.name
+    for tree in TREES.values()
+    for port in classes(tree)
+    if any(isinstance(base, ast.Name) and base.id == "Protocol" for base in port.bases)
+    for method in functions(port)
+}
+"""Methods that a port documents, so that a line is enough for an implementation."""
+
+
+def undocumented(function: ast.FunctionDef, *, is_method: bool, is_algebra: bool) -> list[str]:
+    """Arguments that the docstring does not tell of."""
+    text, a = ast.get_docstring(function) or "", function.args
+    names = [x.arg for x in (*a.posonlyargs, *a.args)][int(is_method) :]
+    names += [x.arg for x in (a.vararg, *a.kwonlyargs, a.kwarg) if x is not None]
+    if text and "\n" not in text:
+        if is_method and function.name in PORTS:
+            return []
+        if is_algebra:
+            return [name for name in names if not re.search(rf"\b{name}\b", text)]
+    listed = text.partition("Args:")[2]
+    return [name for name in names if f"\n    {name}: " not in listed]
+
+
+def test_every_argument_of_a_public_function_is_documented() -> None:
+    silent = []
+    for path, tree in TREES.items():
+        owners = [node for node in classes(tree) if not node.name.startswith("_")]
+        for owner in (tree, *owners):
+            for function in functions(owner):
+                missing = undocumented(
+                    function, is_method=owner is not tree, is_algebra=path == ALGEBRA
+                )
+                silent += [f"{path}: {function.name}: {name}" for name in missing]
+    assert silent == []
+
+
+def test_no_docstring_only_sends_its_reader_elsewhere() -> None:
+    senders = [
+        f"{path}: {node.name}"
+        for path, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and (ast.get_docstring(node) or "").startswith("See `")
+    ]
+    assert senders == []

@@ -12,21 +12,8 @@ from sim.compiler.compilation import vector_header
 from sim.kernel.parameters import internal_state_size
 from sim.robot import Robot
 
-_GENERATOR: Final = (
-    "articulated_body.py",
-    "backlash.py",
-    "contact.py",
-    "driver.c",
-    "emit_c.py",
-    "inertia.py",
-    "integration.py",
-    "motor.py",
-    "parameters.py",
-    "physics_step.py",
-    "source.py",
-    "spatial.py",
-)
-"""Files of this package that determine the source."""
+_NOT_IN_THE_SOURCE: Final = ("native.py", "observation.py", "reference.py", "walk.py")
+"""Files of this package that the source does not depend on; a new one counts until it is here."""
 
 _deriving: Final = threading.Lock()
 """CasADi's symbols are made by one thread at a time."""
@@ -87,8 +74,12 @@ def kernel_source(robot: Robot) -> str:
 def _generator() -> bytes:
     """What the source of every robot's kernel depends on."""
     digest = hashlib.sha256(vector_header().encode())
-    folder = resources.files("sim.kernel")
-    for name in _GENERATOR:
-        digest.update((folder / name).read_bytes())
+    files = {
+        file.name: file
+        for file in resources.files("sim.kernel").iterdir()
+        if file.name.endswith((".py", ".c")) and file.name not in _NOT_IN_THE_SOURCE
+    }
+    for name in sorted(files):
+        digest.update(files[name].read_bytes())
     digest.update(f"{metadata.version('casadi')} {metadata.version('pin')}".encode())
     return digest.digest()

@@ -195,6 +195,44 @@ def test_integers_wrap_rather_than_let_the_compiler_assume_that_they_never_do() 
     assert library.grows(2**31 - 1) == 0
 
 
+def test_a_source_is_derived_without_the_files_that_its_identity_leaves_out() -> None:
+    done = run_python(
+        "import sys\n"
+        "from sim.kernel.source import kernel_source\n"
+        "from sim.robot import load_robot\n"
+        "kernel_source(load_robot('szabadka2'))\n"
+        "print(*sorted(name for name in sys.modules if name.startswith('sim.kernel.')))"
+    )
+    derived_by = {name.removeprefix("sim.kernel.") for name in done.stdout.split()}
+    assert {"articulated_body", "emit_c", "source"} <= derived_by, done.stderr
+    assert not derived_by & {"native", "observation", "reference", "walk"}
+
+
+def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "sim", tmp_path / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+
+    def identity() -> str:
+        done = run_python(
+            "from sim.kernel.source import kernel_identity\n"
+            "from sim.robot import load_robot\n"
+            "print(kernel_identity(load_robot('szabadka2')).hex())",
+            PYTHONPATH=str(tmp_path),
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    kernel = tmp_path / "sim" / "kernel"
+    found = [identity()]
+    for changed in (kernel / "driver.c", kernel / "spatial.py", kernel / "a_new_law.py"):
+        with changed.open("a") as file:
+            file.write("\n")
+        found.append(identity())
+    assert len(set(found)) == len(found)
+    with (kernel / "reference.py").open("a") as file:
+        file.write("\n")
+    assert identity() == found[-1]
+
+
 def test_a_robot_may_have_any_name() -> None:
     toml, urdf = ((QUADRUPED / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
     named = RobotFiles(toml=toml.replace('name = "quadruped"', 'name = "a/b"', 1), urdf=urdf)

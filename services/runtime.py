@@ -178,7 +178,8 @@ def _claim(
             return claim
         job = store.job(job_id)
         if job.state not in (JobState.QUEUED, JobState.RUNNING, JobState.PAUSING):
-            raise Conflict(f"job {job_id} is {job.state}; only a queued job can be run")
+            why = f" ({job.error})" if job.error else ""
+            raise Conflict(f"job {job_id} is {job.state}{why}; only a queued job can be run")
         if waited == 0.0 and on_wait is not None:
             on_wait("another process runs this job, or was killed while it did")
         if waited >= _PATIENCE:

@@ -45,7 +45,7 @@ def list_iterations(
     "/iterations/{iteration}/evaluations",
     operation_id="list_evaluations",
     summary="List an iteration's evaluations",
-    responses=problems(404, 422),
+    responses=problems(404, 409, 422),
 )
 def list_evaluations(
     job: ExistingJob,
@@ -62,7 +62,10 @@ def list_evaluations(
 
 
 @router.get(
-    "/best", operation_id="get_best", summary="Take the best design", responses=problems(404, 422)
+    "/best",
+    operation_id="get_best",
+    summary="Take the best design",
+    responses=problems(404, 409, 422),
 )
 def get_best(job: ExistingJob, service: Service) -> BestView:
     """The design of least fitness so far, with its results in every scenario.
@@ -83,7 +86,7 @@ def get_best(job: ExistingJob, service: Service) -> BestView:
     operation_id="export_job",
     summary="Download every evaluation",
     response_class=StreamingResponse,
-    responses=binary("The table, as a file.", *MEDIA_TYPES.values()) | problems(404, 422),
+    responses=binary("The table, as a file.", *MEDIA_TYPES.values()) | problems(404, 409, 422),
 )
 def export_job(
     job: ExistingJob,

@@ -39,7 +39,7 @@ def add_recording(walk: RecordedWalk, service: Service, response: Response) -> R
     tags=["recordings"],
     operation_id="get_recording",
     summary="Look at a recorded walk",
-    responses=problems(404, 422),
+    responses=problems(404, 409, 422),
 )
 def get_recording(
     recording_id: Annotated[

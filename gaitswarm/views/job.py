@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.views.base import View, finite, listing_name
 from gaitswarm.views.evaluation import BestView, EvaluationView, ObjectiveView, evaluation_views
+from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.estimate import Estimate
 from services.optimizer.jobs.job import (
@@ -18,6 +19,7 @@ from services.optimizer.jobs.job import (
     Iteration,
     Job,
     JobState,
+    UnreadableSpec,
     time_left,
 )
 from services.optimizer.jobs.provenance import ProvenanceRecord
@@ -27,7 +29,10 @@ from services.optimizer.jobs.tuning import JobSpec
 PREFIX: Final = "/v1"
 """Version of the HTTP API, in every path."""
 
-_RESOURCES: Final = ("best", "iterations", "events", "distribution", "particles", "export")
+_RESOURCES: Final = ("iterations", "events")
+
+_RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
+"""Those that only a job has whose spec can be read."""
 
 T = TypeVar("T")
 
@@ -66,8 +71,9 @@ class JobSummaryView(View):
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
-    kind: Literal["tuning", "identification"] = Field(
-        description="Whether it tunes a drive or fits parameters of the robot to recorded walks.",
+    kind: Literal["tuning", "identification"] | None = Field(
+        description="Whether it tunes a drive or fits parameters of the robot to recorded walks;"
+        " null if its spec cannot be read.",
         examples=["tuning"],
     )
     state: JobState = Field(
@@ -75,18 +81,26 @@ class JobSummaryView(View):
         " failed or succeeded.",
         examples=["running"],
     )
-    error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
+    error: str | None = Field(
+        description="Why it failed, or why its spec cannot be read; null if neither is so.",
+        examples=[None],
+    )
     controller: str | None = Field(
         description="Motor controller that it tunes; null for a job that tunes none.",
         examples=["fuzzy-pi"],
     )
     scenarios: list[str] = Field(
-        description="Scenarios in which every design walks, or recordings that it is fitted to.",
+        description="Scenarios in which every design walks, or recordings that it is fitted to;"
+        " empty if the spec cannot be read.",
         examples=[["normal-fast", "turn-right-fast"]],
     )
-    particles: int = Field(description="Size of the swarm [1].", examples=[25])
+    particles: int = Field(
+        description="Size of the swarm [1]; 0 if the spec cannot be read.", examples=[25]
+    )
     iterations: int = Field(description="Iterations committed so far [1].", examples=[12])
-    iterations_planned: int = Field(description="Budget of iterations [1].", examples=[25])
+    iterations_planned: int = Field(
+        description="Budget of iterations [1]; 0 if the spec cannot be read.", examples=[25]
+    )
     evaluations: int = Field(
         description="Designs judged so far, each in every scenario [1].", examples=[300]
     )
@@ -121,9 +135,9 @@ class JobSummaryView(View):
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(
-        description="Where to go on: `self`, `best`, `iterations`, `events`, `distribution`,"
-        " `particles`, `export`, `ranking` (POST) for a job that tunes a drive, and those of"
-        " `pause`, `resume`, `cancel`, `extend` (POST) that its state allows.",
+        description="Where to go on: `self`, `iterations`, `events`; where the spec can be read,"
+        " `best`, `distribution`, `particles`, `export`, and `ranking` (POST) for a job that tunes"
+        " a drive; those of `pause`, `resume`, `cancel`, `extend` (POST) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -145,14 +159,18 @@ class JobSummaryView(View):
 class JobView(JobSummaryView):
     """A job in full: what was asked, how far it is, and its best design so far."""
 
+    model_config = ConfigDict(serialize_by_alias=True)
+
     best: BestView | None = Field(
         description="Best design so far; null while there is none that walks in every scenario."
     )
     objectives: list[ObjectiveView] = Field(
         description="What every case of this job yields; columns of its results."
     )
-    spec: AnySpec = Field(
-        description="What was asked, with every preset written out as it was on submission."
+    stored_spec: AnySpec | None = Field(
+        alias="spec",
+        description="What was asked, with every preset written out as it was on submission; null"
+        " if this version cannot read it, and `error` says why.",
     )
     provenance: list[ProvenanceRecord] = Field(
         description="What its numbers depend on beside the spec: code, libraries, content of the"
@@ -161,22 +179,36 @@ class JobView(JobSummaryView):
         " recorded."
     )
 
+    @property
+    def spec(self) -> AnySpec:
+        """What was asked.
+
+        Raises:
+            Unreadable: This version cannot read it; says why, and what to do.
+        """
+        if self.stored_spec is None:
+            raise Unreadable(f"job {self.id}: {self.error}")
+        return self.stored_spec
+
     @classmethod
     def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
         """Make a view of a job in full.
 
         Args:
             job: as it was read.
-            best: its best design so far, if there is one.
+            best: its best design so far, if there is one; not shown if the spec cannot be read.
         """
-        view = None if best is None else BestView.from_evaluation(best, job.spec)
-        objectives = [ObjectiveView.from_objective(o) for o in job.spec.objectives]
+        view, objectives, spec = None, [], None
+        if job.readable:
+            spec = job.spec
+            view = None if best is None else BestView.from_evaluation(best, spec)
+            objectives = [ObjectiveView.from_objective(o) for o in spec.objectives]
         return cls.model_validate(
             {
                 **_summary(job),
                 "best": view,
                 "objectives": objectives,
-                "spec": job.spec,
+                "spec": spec,
                 "provenance": job.provenance,
             }
         )
@@ -288,35 +320,30 @@ def job_links(job: Job) -> dict[str, str]:
         Paths of its resources, and of the commands that its state allows, by name.
     """
     here = f"{PREFIX}/jobs/{job.id}"
-    resources = {name: f"{here}/{name}" for name in _RESOURCES}
-    if isinstance(job.spec, JobSpec):
+    names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
+    resources = {name: f"{here}/{name}" for name in names}
+    if isinstance(job.stored_spec, JobSpec):
         resources["ranking"] = f"{here}/ranking"
     commands = {
         command.value: f"{here}/{command.value}"
-        for state, command in TRANSITIONS
-        if state is job.state
+        for (state, command), after in TRANSITIONS.items()
+        if state is job.state and (job.readable or after is not JobState.QUEUED)
     }
-    if job.state is not JobState.CANCELLED:
+    if job.readable and job.state is not JobState.CANCELLED:
         commands["extend"] = f"{here}/extend"
     return {"self": here, **resources, **commands}
 
 
 def _summary(job: Job) -> dict[str, object]:
-    progress, spec = job.progress, job.spec
+    progress = job.progress
     rates = time_left(job, datetime.now(UTC))
     return {
         "id": job.id,
-        "name": spec.name,
-        "kind": spec.kind,
         "state": job.state,
-        "error": job.error,
-        "controller": spec.controller if isinstance(spec, JobSpec) else None,
-        "scenarios": list(spec.case_names),
-        "particles": spec.optimizer.particles,
+        "error": job.error or _why_unreadable(job.stored_spec),
+        **_asked(job.stored_spec),
         "iterations": progress.iterations,
-        "iterations_planned": spec.iterations,
         "evaluations": progress.evaluations,
-        "evaluations_planned": spec.iterations * spec.optimizer.particles,
         "best_fitness": finite(progress.best_fitness),
         "best_iteration": progress.best_iteration,
         "compute_seconds": progress.compute_seconds,
@@ -328,6 +355,27 @@ def _summary(job: Job) -> dict[str, object]:
         "started_at": job.started_at,
         "finished_at": job.finished_at,
         "links": job_links(job),
+    }
+
+
+def _why_unreadable(spec: AnySpec | UnreadableSpec) -> str | None:
+    return spec.reason if isinstance(spec, UnreadableSpec) else None
+
+
+def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
+    """What a summary says of a spec."""
+    if isinstance(spec, UnreadableSpec):
+        kind, scenarios, particles = None, [], spec.particles
+    else:
+        kind, scenarios, particles = spec.kind, list(spec.case_names), spec.optimizer.particles
+    return {
+        "name": spec.name,
+        "kind": kind,
+        "controller": spec.controller if isinstance(spec, JobSpec) else None,
+        "scenarios": scenarios,
+        "particles": particles,
+        "iterations_planned": spec.iterations,
+        "evaluations_planned": spec.iterations * particles,
     }
 
 

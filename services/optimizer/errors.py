@@ -6,7 +6,8 @@ GaitswarmError
 ├── Conflict                not possible in the job's present state (HTTP 409)
 │   ├── BudgetChanged       the job was extended since it was claimed
 │   ├── ProvenanceChanged   its numbers would depend on something else than those it has
-│   └── IdempotencyConflict the key was used before with another body
+│   ├── IdempotencyConflict the key was used before with another body
+│   └── Unreadable          this version cannot read what is stored; it stays as it is
 ├── LeaseLost               another runner, or a cancellation, has taken the job
 └── Unavailable             not possible now, whatever was asked; try again later (HTTP 503)
     ├── EvaluatorUnavailable    the workers cannot be reached
@@ -49,6 +50,10 @@ class ProvenanceChanged(Conflict):
 
 class IdempotencyConflict(Conflict):
     """The idempotency key was used before for another request."""
+
+
+class Unreadable(Conflict):
+    """This version cannot read what is stored: it was written by another one, or damaged."""
 
 
 class LeaseLost(GaitswarmError):

@@ -124,7 +124,8 @@ class JobService:
         """
         self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
-        return estimate(spec, cases, self.store.jobs(limit=_EARLIER).items, self._rates)
+        earlier = [job for job in self.store.jobs(limit=_EARLIER).items if job.readable]
+        return estimate(spec, cases, earlier, self._rates)
 
     def job(self, job_id: str) -> Job:
         """Read a job.

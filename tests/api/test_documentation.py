@@ -104,10 +104,12 @@ def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -
 
     kinds = ["JobSpec", "IdentificationSpec"]
     assert not [name for name in schemas if name.startswith(tuple(f"{kind}-" for kind in kinds))]
-    answered = schemas["JobView"]["properties"]["spec"]["oneOf"]
+    spec, null = schemas["JobView"]["properties"]["spec"]["anyOf"]
+    answered = spec["oneOf"]
     asked = document["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"]
     assert [kind["$ref"].rpartition("/")[2] for kind in answered] == kinds
     assert asked["schema"]["oneOf"] == answered
+    assert null == {"type": "null"}
     assert schemas["JobSpec"]["examples"]
 
 

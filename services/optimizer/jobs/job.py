@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import Conflict, InvalidRequest
+from services.optimizer.errors import Conflict, InvalidRequest, Unreadable
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, changes_since
 from sim.identification.recorded_walk import Recordings
@@ -163,12 +163,30 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
+class UnreadableSpec:
+    """What can be said of a spec that this version cannot read; the stored one stays as it is.
+
+    Attributes:
+        reason: What cannot be read.
+        name: Of the job, "" if that is not known either.
+        iterations: The present budget, 0 if it is not known.
+        particles: Size of the swarm, 0 if it is not known.
+    """
+
+    reason: str
+    name: str = ""
+    iterations: int = 0
+    particles: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
     """A job as stored; times are UTC.
 
     Attributes:
         id: twelve letters and digits.
-        spec: resolved, no preset is left to be looked up; its `iterations` are the present budget.
+        stored_spec: resolved, no preset is left to be looked up; its `iterations` are the present
+            budget.
         state: where it is in its life.
         created_at: when it was submitted.
         updated_at: when its state or progress last changed.
@@ -182,7 +200,7 @@ class Job:
     """
 
     id: str
-    spec: AnySpec
+    stored_spec: AnySpec | UnreadableSpec
     state: JobState
     created_at: datetime
     updated_at: datetime
@@ -192,6 +210,22 @@ class Job:
     progress: Progress = field(default_factory=Progress)
     provenance: ProvenanceRecords = ()
     accepts_changes: bool = False
+
+    @property
+    def spec(self) -> AnySpec:
+        """The spec of a job that can be read.
+
+        Raises:
+            Unreadable: It cannot; says why, and what to do.
+        """
+        if isinstance(self.stored_spec, UnreadableSpec):
+            raise Unreadable(f"job {self.id}: {self.stored_spec.reason}")
+        return self.stored_spec
+
+    @property
+    def readable(self) -> bool:
+        """Whether this version can read the spec."""
+        return not isinstance(self.stored_spec, UnreadableSpec)
 
 
 def refusal(job: Job, now: JobProvenance) -> str | None:
@@ -320,7 +354,8 @@ class TimeLeft:
         eta_seconds: time to the end of the budget [s]; 0 for a job that succeeded, None unless it
             runs and has committed something.
         evaluations_per_second: designs judged [1/s]; None before the first commit.
-        simulations_per_second: walks, one per design and case [1/s]; None before the first commit.
+        simulations_per_second: walks, one per design and case [1/s]; None before the first commit,
+            and where the spec cannot be read.
     """
 
     eta_seconds: float | None
@@ -347,9 +382,9 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
     eta: float | None = None
     if job.state is JobState.SUCCEEDED:
         eta = 0.0
-    elif job.state is JobState.RUNNING:
+    elif job.state is JobState.RUNNING and job.readable:
         one = progress.compute_seconds / progress.iterations
         remaining = max(0, job.spec.iterations - progress.iterations) * one
         under_way = min(one, max(0.0, (now - job.updated_at).total_seconds()))
         eta = max(0.0, remaining - under_way)
-    return TimeLeft(eta, rate, rate * len(job.spec.case_names))
+    return TimeLeft(eta, rate, rate * len(job.spec.case_names) if job.readable else None)

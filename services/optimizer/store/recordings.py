@@ -8,11 +8,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from datetime import datetime
+from typing import Any
 
 from pydantic import ValidationError
 from sqlalchemy import Connection, insert, select
 
-from services.optimizer.errors import NotFound, StoreUnavailable
+from services.optimizer.errors import NotFound
+from services.optimizer.store.rows import first_problems, kept
 from services.optimizer.store.tables import recordings
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -33,7 +35,12 @@ def insert_recording(connection: Connection, walk: RecordedWalk, now: datetime) 
 
 
 def load_recordings(connection: Connection, ids: Sequence[str]) -> Recordings:
-    """Recorded walks by id. Raises NotFound for the first that is not there."""
+    """Recorded walks by id.
+
+    Raises:
+        NotFound: There is no such recording; names the first.
+        Unreadable: One was stored by another version, or damaged.
+    """
     if not ids:
         return {}
     query = select(recordings.c.id, recordings.c.document).where(recordings.c.id.in_(ids))
@@ -41,9 +48,13 @@ def load_recordings(connection: Connection, ids: Sequence[str]) -> Recordings:
     for name in ids:
         if name not in documents:
             raise NotFound(f"there is no recording {name!r}")
+    return {name: _walk(name, documents[name]) for name in ids}
+
+
+def _walk(name: str, document: Any) -> RecordedWalk:
     try:
-        return {name: RecordedWalk.model_validate(documents[name]) for name in ids}
+        return RecordedWalk.model_validate(document)
     except ValidationError as error:
-        raise StoreUnavailable(
-            f"a recording was stored in a form that this version cannot read: {error}"
+        raise kept(
+            f"recording {name} cannot be read by this gaitswarm ({first_problems(error)})"
         ) from error

@@ -21,8 +21,17 @@ from services.optimizer.errors import (
     IdempotencyConflict,
     LeaseLost,
     NotFound,
+    Unreadable,
 )
-from services.optimizer.jobs.job import Answered, Ask, Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.job import (
+    Answered,
+    Ask,
+    Claim,
+    CompletedIteration,
+    Job,
+    JobState,
+    UnreadableSpec,
+)
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, with_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.recordings import load_recordings
@@ -33,14 +42,17 @@ from services.optimizer.store.rows import (
     budget,
     evaluation_rows,
     iteration_summary,
+    kept,
     provenance_document,
     provenance_records,
     spec_document,
+    storable,
     submitted_spec,
     to_ask,
     to_job,
 )
 from services.optimizer.store.tables import evaluations, iterations, jobs
+from sim.identification.recorded_walk import Recordings
 
 # No vowels, no look-alikes: an id is read aloud, and it spells no word.
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
@@ -88,6 +100,15 @@ class Submission:
     provenance: ProvenanceRecords = ()
 
 
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """What a claim brings beside the job; see `Claim`."""
+
+    ask: Ask | None
+    recordings: Recordings
+    answered: Answered | None
+
+
 def repeated_job(connection: Connection, asked: Submission) -> Job | None:
     """The job that an earlier request made with the same key; None if there is none, or no key.
 
@@ -100,14 +121,16 @@ def repeated_job(connection: Connection, asked: Submission) -> Job | None:
     row = connection.execute(query).mappings().first()
     if row is None:
         return None
+    job = to_job(row)
     # Presets and defaults may have changed since: then equal requests ask for unequal specs. And a
     # request that was worded in another way, or not kept, is the same if its spec is.
     if row["request_digest"] != asked.digest and submitted_spec(row) != asked.spec:
+        what = "the different job" if job.readable else "a job that cannot be read and compared,"
         raise IdempotencyConflict(
-            f"idempotency key {asked.key!r} was used before, for the different job {row['id']}; use"
-            " a new key for a new job"
+            f"idempotency key {asked.key!r} was used before, for {what} {row['id']}; use a new key"
+            " for a new job"
         )
-    return to_job(row)
+    return job
 
 
 def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
@@ -150,6 +173,22 @@ def outstanding_ask(connection: Connection, job: Row) -> Ask | None:
     )
     row = connection.execute(query).mappings().first()
     return to_ask(row) if row is not None else None
+
+
+def _work(connection: Connection, job: Row) -> _Work:
+    """All that a run needs beside the job. Raises Unreadable."""
+    spec = to_job(job).stored_spec
+    if isinstance(spec, UnreadableSpec):
+        raise Unreadable(spec.reason)
+    try:
+        walks = load_recordings(connection, spec.recording_ids)
+        ask = outstanding_ask(connection, job)
+        answered = answered_ask(connection, job) if ask is None else None
+    except NotFound as error:
+        raise kept(str(error)) from error
+    except (ValueError, TypeError, LookupError) as error:
+        raise kept(f"its iteration {job['iterations']} cannot be read ({error})") from error
+    return _Work(ask, walks, answered)
 
 
 def answered_ask(connection: Connection, job: Row) -> Answered | None:
@@ -256,7 +295,12 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
 def take_job(
     connection: Connection, row: Row, runner: str, lease_seconds: float, now: datetime
 ) -> Claim:
-    """Make a locked job, which nobody else holds, the runner's: it runs, under a higher token."""
+    """Make a locked job, which nobody else holds, the runner's: it runs, under a higher token.
+
+    Raises:
+        Unreadable: Something that a run needs cannot be read; nothing is changed.
+    """
+    work = _work(connection, row)
     token = row["lease_token"] + 1
     changes = entering(JobState.RUNNING, now) | {
         "started_at": row["started_at"] or now,
@@ -265,10 +309,13 @@ def take_job(
         "lease_expires_at": now + timedelta(seconds=lease_seconds),
     }
     job = to_job(update_job(connection, row, changes))
-    walks = load_recordings(connection, job.spec.recording_ids)
-    ask = outstanding_ask(connection, row)
-    answered = answered_ask(connection, row) if ask is None else None
-    return Claim(job, runner, token, ask, walks, answered)
+    return Claim(job, runner, token, work.ask, work.recordings, work.answered)
+
+
+def set_aside(connection: Connection, row: Row, reason: Unreadable, now: datetime) -> None:
+    """Let a locked job fail that cannot be read, and touch nothing else of it."""
+    error = {"error": storable(str(reason))}
+    update_job(connection, row, entering(JobState.FAILED, now) | error)
 
 
 def held(connection: Connection, claim: Claim) -> Row:
@@ -282,6 +329,11 @@ def held(connection: Connection, claim: Claim) -> Row:
     owner = row["lease_owner"]
     now = f"held by {owner}" if owner is not None else f"{row['state']} and held by nobody"
     raise LeaseLost(f"{claim.runner} has lost job {claim.job.id}: it is {now}")
+
+
+def require_readable(row: Row) -> None:
+    """Raise Unreadable, with the reason, if the job's spec cannot be read."""
+    _ = to_job(row).spec
 
 
 def require_budget_of(claim: Claim, row: Row) -> None:

@@ -10,13 +10,14 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from services.optimizer.errors import StoreUnavailable
+from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.job import (
     Ask,
@@ -26,10 +27,11 @@ from services.optimizer.jobs.job import (
     Job,
     JobState,
     Progress,
+    UnreadableSpec,
 )
 from services.optimizer.jobs.provenance import ProvenanceRecord, ProvenanceRecords
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.tables import iterations
+from services.optimizer.store.tables import UnparsedText, iterations
 from sim.outcome import Status
 
 Row = Mapping[Any, Any]
@@ -38,14 +40,28 @@ Row = Mapping[Any, Any]
 _RECORDS: Final = TypeAdapter(tuple[ProvenanceRecord, ...])
 
 
+_KEPT: Final = (
+    "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"
+    " job there; or submit a new one"
+)
+
+
 def to_job(row: Row) -> Job:
-    """A row of `jobs`. Raises as `submitted_spec` and `provenance_records`."""
+    """A row of `jobs`, whether its spec can be read or not."""
     spec = submitted_spec(row)
+    try:
+        provenance = provenance_records(row)
+    except Unreadable as error:
+        # Whoever cannot tell what the numbers depend on must not add others to them.
+        provenance, spec = (), _unreadable(row["spec"], str(error))
     if row["budget"] is not None:
-        spec = spec.model_copy(update={"iterations": row["budget"]})
+        if isinstance(spec, UnreadableSpec):
+            spec = replace(spec, iterations=row["budget"])
+        else:
+            spec = spec.model_copy(update={"iterations": row["budget"]})
     return Job(
         id=row["id"],
-        spec=spec,
+        stored_spec=spec,
         state=JobState(row["state"]),
         created_at=row["created_at"],
         updated_at=row["updated_at"],
@@ -60,35 +76,58 @@ def to_job(row: Row) -> Job:
             best_particle=row["best_particle"],
             compute_seconds=row["compute_seconds"],
         ),
-        provenance=provenance_records(row),
+        provenance=provenance,
         accepts_changes=bool(row["accepts_changes"]),
     )
 
 
-def submitted_spec(row: Row) -> AnySpec:
-    """Spec of a row of `jobs`, with the budget that it was submitted with.
-
-    Raises StoreUnavailable for a spec that this version cannot read.
-    """
+def submitted_spec(row: Row) -> AnySpec | UnreadableSpec:
+    """Spec of a row of `jobs`, with the budget that it was submitted with."""
+    document = row["spec"]
+    if isinstance(document, UnparsedText):
+        return UnreadableSpec(f"its spec is not JSON; {_KEPT}")
     try:
-        return SPECS.validate_python(row["spec"])
+        return SPECS.validate_python(document)
     except ValidationError as error:
-        raise StoreUnavailable(
-            f"job {row['id']} was stored with a spec that this version cannot read: {error}"
-        ) from error
+        problems = first_problems(error)
+    except Exception as error:  # noqa: BLE001 - whatever is wrong with one job, lists show the rest
+        problems = f"{type(error).__name__}: {error}"
+    return _unreadable(document, f"its spec cannot be read by this gaitswarm ({problems}); {_KEPT}")
+
+
+def _unreadable(document: Any, reason: str) -> UnreadableSpec:
+    """With as much of the document as everybody can understand."""
+    known = document if isinstance(document, dict) else {}
+    name, swarm = known.get("name"), known.get("optimizer")
+    return UnreadableSpec(
+        reason,
+        name=name if isinstance(name, str) else "",
+        iterations=_count(known.get("iterations")),
+        particles=_count(swarm.get("particles")) if isinstance(swarm, dict) else 0,
+    )
+
+
+def first_problems(error: ValidationError) -> str:
+    """What is wrong with a document, in a line; of many problems the first three."""
+    found = error.errors(include_url=False, include_context=False, include_input=False)
+    lines = [f"{'.'.join(map(str, entry['loc']))}: {entry['msg']}" for entry in found[:3]]
+    if len(found) > len(lines):
+        lines.append(f"{len(found) - len(lines)} more")
+    return "; ".join(lines)
+
+
+def kept(problem: str) -> Unreadable:
+    """The error for something of a job that cannot be read; says what to do."""
+    return Unreadable(f"{problem}; {_KEPT}")
 
 
 def provenance_records(row: Row) -> ProvenanceRecords:
-    """Provenance of the job of a row of `jobs`, empty if none was recorded.
-
-    Raises StoreUnavailable for records that this version cannot read.
-    """
+    """Provenance of the job of a row of `jobs`, empty if none was recorded. Raises Unreadable."""
     try:
         return _RECORDS.validate_python(row["provenance"] or ())
     except ValidationError as error:
-        raise StoreUnavailable(
-            f"job {row['id']} was stored with a provenance that this version cannot read: {error}"
-        ) from error
+        problems = first_problems(error)
+        raise kept(f"its provenance cannot be read by this gaitswarm ({problems})") from error
 
 
 def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:
@@ -97,8 +136,16 @@ def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:
 
 
 def budget(row: Row) -> int:
-    """Iterations that the job of a row of `jobs` is to run."""
-    return int(row["spec"]["iterations"] if row["budget"] is None else row["budget"])
+    """Iterations that the job of a row of `jobs` is to run. Raises Unreadable."""
+    try:
+        return int(row["spec"]["iterations"] if row["budget"] is None else row["budget"])
+    except (TypeError, LookupError, ValueError):
+        raise kept("its budget cannot be read") from None
+
+
+def _count(value: object) -> int:
+    """A number that is one, 0 for anything else."""
+    return value if isinstance(value, int) and value > 0 else 0
 
 
 def request_digest(request: Any) -> str:
@@ -112,6 +159,11 @@ def request_digest(request: Any) -> str:
     """
     canonical = json.dumps(request, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def storable(text: str) -> str:
+    """Without zero bytes, which PostgreSQL cannot hold, wherever a text has got them from."""
+    return text.replace("\0", "")
 
 
 def spec_document(spec: Spec) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from datetime import timedelta
 from typing import Any, Final
@@ -9,7 +10,7 @@ from typing import Any, Final
 from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.errors import InvalidRequest, NotFound, Unreadable
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import (
     Ask,
@@ -51,6 +52,8 @@ from services.optimizer.store.records import (
     provenance_columns,
     repeated_job,
     require_budget_of,
+    require_readable,
+    set_aside,
     state_after_commit,
     state_after_release,
     take_job,
@@ -59,6 +62,7 @@ from services.optimizer.store.records import (
 from services.optimizer.store.rows import (
     LISTED,
     request_digest,
+    storable,
     to_evaluation,
     to_iteration,
     to_job,
@@ -69,6 +73,8 @@ from sim.identification.recorded_walk import RecordedWalk, Recordings
 _LARGEST_INDEX: Final = 2**31 - 1
 _LARGEST_PAGE: Final = 10_000
 _LONGEST_KEY: Final = 200
+
+_log = logging.getLogger(__name__)
 
 
 def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
@@ -192,6 +198,8 @@ class SqlStore:
             if state is JobState.PAUSING and not lease_is_live(row, now):
                 # Its runner has gone, so nobody would ever complete the pause.
                 state = JobState.PAUSED
+            if state is JobState.QUEUED:
+                require_readable(row)
             changes = entering(state, now)
             if command is Command.RESUME:
                 queued = state is JobState.QUEUED
@@ -202,6 +210,7 @@ class SqlStore:
         """See `Store.extend`."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
+            require_readable(row)
             state = JobState(row["state"])
             after = extended(state, row["iterations"], iterations)
             # Whoever runs the job notices when it commits; until then nothing changes for it.
@@ -240,7 +249,12 @@ class SqlStore:
                 if row["state"] == JobState.PAUSING:
                     update_job(connection, row, entering(JobState.PAUSED, now))
                     continue
-                return take_job(connection, row, runner, lease_seconds, now)
+                try:
+                    return take_job(connection, row, runner, lease_seconds, now)
+                except Unreadable as error:
+                    # The next job must not wait for somebody to mend this one.
+                    _log.warning("job %s is set aside: %s", row["id"], error)
+                    set_aside(connection, row, error, now)
         return None
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
@@ -288,8 +302,7 @@ class SqlStore:
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             after = state_after_release(JobState(row["state"]), state)
-            # PostgreSQL cannot hold a zero byte, wherever an error's text has got it from.
-            text = error.replace("\0", "") if error is not None else row["error"]
+            text = storable(error) if error is not None else row["error"]
             changes = entering(after, self._clock(connection)) | {"error": text}
             update_job(connection, row, changes)
 

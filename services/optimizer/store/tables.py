@@ -7,8 +7,9 @@ to the schema revision of the database.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import Final
+from typing import Any, Final
 
 from sqlalchemy import (
     JSON,
@@ -27,7 +28,8 @@ from sqlalchemy import (
     Text,
     UniqueConstraint,
 )
-from sqlalchemy.types import TypeDecorator
+from sqlalchemy.sql.operators import OperatorType
+from sqlalchemy.types import TypeDecorator, TypeEngine
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -56,6 +58,38 @@ class UtcDateTime(TypeDecorator[datetime]):
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
+class UnparsedText(str):
+    """The text of a JSON document that is none."""
+
+    __slots__ = ()
+
+
+class Document(TypeDecorator[Any]):
+    """A JSON document; one that is damaged comes as its text.
+
+    Raising instead would keep all other rows of the same query from whoever asks for them.
+    """
+
+    impl = JSON
+    cache_ok = True
+
+    def coerce_compared_value(self, op: OperatorType | None, value: Any) -> TypeEngine[Any]:
+        """As JSON does it: a path into the document is no document."""
+        return self.impl_instance.coerce_compared_value(op, value)
+
+    def result_processor(self, dialect: Dialect, coltype: object) -> Callable[[Any], Any] | None:
+        """The parser of what the database holds."""
+        parse = super().result_processor(dialect, coltype)
+
+        def parse_if_possible(text: Any) -> Any:
+            try:
+                return text if parse is None else parse(text)
+            except ValueError:
+                return UnparsedText(text)
+
+        return parse_if_possible
+
+
 metadata: Final = MetaData(
     naming_convention={
         "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -70,7 +104,7 @@ jobs: Final = Table(
     metadata,
     Column("id", Text, nullable=False),
     Column("state", Text, nullable=False),
-    Column("spec", JSON, nullable=False),
+    Column("spec", Document, nullable=False),
     Column("idempotency_key", Text),
     Column("created_at", UtcDateTime, nullable=False),
     Column("updated_at", UtcDateTime, nullable=False),
@@ -93,7 +127,7 @@ jobs: Final = Table(
     # Of the request that the idempotency key came with; NULL without a key, and for older jobs.
     Column("request_digest", Text),
     # `ProvenanceRecords`; NULL for a job that was stored before there were any.
-    Column("provenance", JSON(none_as_null=True)),
+    Column("provenance", Document(none_as_null=True)),
     # From a resumption that accepts changes to the next claim; NULL is false.
     Column("accepts_changes", Boolean),
     PrimaryKeyConstraint("id"),
@@ -108,8 +142,8 @@ iterations: Final = Table(
     Column("job_id", Text, nullable=False),
     Column("iteration", Integer, nullable=False),
     # The ask, stored before it is sent out: (particles, d) positions and the optimizer's dump.
-    Column("positions", JSON, nullable=False),
-    Column("optimizer_state", JSON, nullable=False),
+    Column("positions", Document, nullable=False),
+    Column("optimizer_state", Document, nullable=False),
     Column("asked_at", UtcDateTime, nullable=False),
     # NULL from here on until the iteration is committed; then only fitness values may be NULL.
     Column("committed_at", UtcDateTime),
@@ -144,7 +178,7 @@ recordings: Final = Table(
     metadata,
     # Of the content: a recording never changes.
     Column("id", Text, nullable=False),
-    Column("document", JSON, nullable=False),
+    Column("document", Document, nullable=False),
     Column("created_at", UtcDateTime, nullable=False),
     PrimaryKeyConstraint("id"),
 )

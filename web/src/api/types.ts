@@ -7,7 +7,13 @@ type Schemas = components['schemas']
 export type JobSpec = Schemas['JobSpec']
 export type JobState = Schemas['JobState']
 export type JobSummary = Schemas['JobSummaryView']
-export type Job = Schemas['JobView']
+/** A job as it is answered: without a spec and a kind where the server cannot read it. */
+export type StoredJob = Schemas['JobView']
+/** A job with its spec. */
+export type Job = StoredJob & {
+  readonly spec: AnySpec
+  readonly kind: NonNullable<StoredJob['kind']>
+}
 export type Iteration = Schemas['IterationView']
 export type Evaluation = Schemas['EvaluationView']
 export type ScenarioResult = Schemas['ScenarioResultView']

@@ -2,7 +2,8 @@
 
 import { useState } from 'preact/hooks'
 import { post } from '../api/client'
-import type { Job } from '../api/types'
+import { isReadable } from '../api/readable'
+import type { StoredJob } from '../api/types'
 import { ConfirmDialog } from '../components/confirm-dialog'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
@@ -10,11 +11,11 @@ import { withQuery } from '../router/routes'
 
 type Asking = 'cancel' | 'extend' | null
 
-export function JobActions({ job, onJob }: { job: Job; onJob: (job: Job) => void }) {
+export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: StoredJob) => void }) {
   const [asking, setAsking] = useState<Asking>(null)
   const [busy, setBusy] = useState(false)
   const [error, setError] = useState<unknown>(null)
-  const command = (send: () => Promise<Job>) => {
+  const command = (send: () => Promise<StoredJob>) => {
     setBusy(true)
     setError(null)
     setAsking(null)
@@ -51,9 +52,11 @@ export function JobActions({ job, onJob }: { job: Job; onJob: (job: Job) => void
             Extend…
           </button>
         )}
-        <a class="button" href={withQuery('/jobs/new', { clone: job.id })}>
-          Clone
-        </a>
+        {isReadable(job) && (
+          <a class="button" href={withQuery('/jobs/new', { clone: job.id })}>
+            Clone
+          </a>
+        )}
         {can('cancel') && (
           <button type="button" class="danger" disabled={busy} onClick={() => setAsking('cancel')}>
             Cancel…
@@ -94,7 +97,7 @@ function ExtendDialog({
   onExtend,
   onDismiss,
 }: {
-  job: Job
+  job: StoredJob
   open: boolean
   onExtend: (iterations: number) => void
   onDismiss: () => void

@@ -1,6 +1,6 @@
 /** What a job's fitness is, by the kind of job. */
 
-import type { Job } from '../api/types'
+import type { Job, StoredJob } from '../api/types'
 
 /**
  * Unit of a job's fitness: the product that tunes a drive has none, an identification's is a mean
@@ -10,11 +10,12 @@ export function fitnessUnit({
   kind,
   objectives,
 }: {
-  readonly kind: Job['kind']
+  /** Null for a job that cannot be read. */
+  readonly kind: StoredJob['kind']
   /** Summaries are without them. */
   readonly objectives?: Job['objectives']
 }): string {
-  return kind === 'tuning' ? '1' : (objectives?.[0]?.unit ?? 'A')
+  return kind !== 'identification' ? '1' : (objectives?.[0]?.unit ?? 'A')
 }
 
 /** What the parts of a fitness are called. */

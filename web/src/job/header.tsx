@@ -1,7 +1,8 @@
 /** A job's name, state, figures and commands. */
 
+import { isReadable } from '../api/readable'
 import { useNow } from '../api/resource'
-import type { Job } from '../api/types'
+import type { StoredJob } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
 import { formatCount, quantity } from '../format/number'
@@ -10,7 +11,7 @@ import { JobActions } from './actions'
 import { fitnessUnit } from './fitness'
 import type { LiveJob } from './use-job'
 
-export function JobHeader({ live, job }: { live: LiveJob; job: Job }) {
+export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
   const { followed } = live
   const committed = Math.max(job.iterations, followed.iterations.length)
   const tone = STATE_TONES[job.state]
@@ -31,12 +32,14 @@ export function JobHeader({ live, job }: { live: LiveJob; job: Job }) {
       </div>
       {job.error && (
         <div class="notice" data-tone="bad" role="alert" data-error>
-          <strong>It failed.</strong>
+          <strong>{isReadable(job) ? 'It failed.' : 'It cannot be read.'}</strong>
           <p>{job.error}</p>
-          <p class="small">
-            What was committed before is kept. Resume tries the iteration again; clone lets you
-            change the job.
-          </p>
+          {isReadable(job) && (
+            <p class="small">
+              What was committed before is kept. Resume tries the iteration again; clone lets you
+              change the job.
+            </p>
+          )}
         </div>
       )}
       <Progress
@@ -50,7 +53,7 @@ export function JobHeader({ live, job }: { live: LiveJob; job: Job }) {
   )
 }
 
-function Figures({ job, committed }: { job: Job; committed: number }) {
+function Figures({ job, committed }: { job: StoredJob; committed: number }) {
   const now = useNow(1000)
   const unit = fitnessUnit(job)
   return (
@@ -103,14 +106,13 @@ function StreamNote({ live }: { live: LiveJob }) {
   return null
 }
 
-function subtitle(job: Job): string {
-  const { spec } = job
-  const parts = [
-    job.id,
-    job.controller ?? 'identification',
-    `${formatCount(job.particles)} particles`,
-    `seed ${spec.seed}`,
-    `submitted ${formatMoment(job.created_at)}`,
-  ]
-  return parts.join(' · ')
+function subtitle(job: StoredJob): string {
+  const asked = isReadable(job)
+    ? [
+        job.controller ?? 'identification',
+        `${formatCount(job.particles)} particles`,
+        `seed ${job.spec.seed}`,
+      ]
+    : []
+  return [job.id, ...asked, `submitted ${formatMoment(job.created_at)}`].join(' · ')
 }

@@ -1,5 +1,6 @@
 /** One job, live: header, commands, and its parts under tabs. */
 
+import { isReadable } from '../api/readable'
 import type { Job } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { jobPath } from '../router/routes'
@@ -51,8 +52,6 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       </div>
     )
   }
-  const tabs = TABS.filter(({ tab }) => !(tab in ONLY) || ONLY[tab] === job.kind)
-  const [section] = tab.split('/')
   return (
     <div
       class="stack"
@@ -61,24 +60,33 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       data-stream={streamState(live)}
     >
       <JobHeader live={live} job={job} />
+      {isReadable(job) && <Parts live={live} job={job} tab={tab} />}
+    </div>
+  )
+}
+
+function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
+  const tabs = TABS.filter(({ tab }) => !(tab in ONLY) || ONLY[tab] === job.kind)
+  const [section] = tab.split('/')
+  return (
+    <>
       <nav class="tabs" aria-label="Parts of the job">
         {tabs.map((t) => (
           <a
             key={t.tab}
-            href={jobPath(id, t.tab)}
+            href={jobPath(job.id, t.tab)}
             aria-current={t.tab === section ? 'page' : undefined}
           >
             {t.tab === 'scenarios' && job.kind === 'identification' ? 'Recordings' : t.label}
           </a>
         ))}
       </nav>
-      <Panel live={live} tab={tab} />
-    </div>
+      <Panel live={live} job={job} tab={tab} />
+    </>
   )
 }
 
-function Panel({ live, tab }: { live: LiveJob; tab: string }) {
-  const job = live.job!
+function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
   const [section, detail] = tab.split('/')
   switch (section) {
     case '':

@@ -2,6 +2,7 @@
 
 import { useMemo } from 'preact/hooks'
 import { get, post } from '../api/client'
+import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
 
@@ -21,7 +22,7 @@ export function useReference(job: Job, choice: string) {
 async function load(job: Job, choice: string, signal: AbortSignal): Promise<Reference> {
   const [kind, name, study] = choice.split(':')
   if (kind === 'job') {
-    const other = await get('/v1/jobs/{job_id}', { path: { job_id: name }, signal })
+    const other = await readableJob(name, signal)
     if (!other.best) throw new Error('that job has no design yet that walks in every scenario')
     return { label: other.name || other.id, scenarios: other.best.scenarios }
   }

@@ -3,15 +3,15 @@
 import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
 import { get, url } from '../api/client'
 import { ApiProblem } from '../api/problem'
-import type { Iteration, Job } from '../api/types'
+import type { Iteration, StoredJob } from '../api/types'
 import { EventStream, type Followed, type Source } from './event-stream'
 
 export interface LiveJob {
-  readonly job: Job | null
+  readonly job: StoredJob | null
   readonly error: unknown
   readonly followed: Followed
   /** Show what a command answered, and follow the job if it goes on. */
-  readonly replace: (job: Job) => void
+  readonly replace: (job: StoredJob) => void
   readonly reload: () => void
 }
 
@@ -31,7 +31,7 @@ const FURTHER = 1000
 const ASK_MS = 1000
 
 export function useJob(id: string): LiveJob {
-  const [job, setJob] = useState<Job | null>(null)
+  const [job, setJob] = useState<StoredJob | null>(null)
   const [error, setError] = useState<unknown>(null)
   const [followed, setFollowed] = useState<Followed>(NOTHING_YET)
   const stream = useRef<EventStream | null>(null)
@@ -88,7 +88,7 @@ export function useJob(id: string): LiveJob {
     return () => clearTimeout(timer)
   }, [followed.iterations.length])
 
-  const replace = useCallback((answer: Job) => {
+  const replace = useCallback((answer: StoredJob) => {
     setJob(answer)
     stream.current?.restart()
   }, [])

@@ -1,6 +1,7 @@
 /** The form of a new job, empty or prefilled from another job. */
 
 import { get } from '../api/client'
+import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec, Preference } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
@@ -65,7 +66,7 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   const id = query.get('clone')
   const [catalogue, cloned] = await Promise.all([
     loadCatalogue(signal),
-    id === null ? null : get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }),
+    id === null ? null : readableJob(id, signal),
   ])
   const from = cloned && withSeed(cloned, query.get('seed'))
   if (!from || from.spec.kind === 'identification') {

@@ -2,6 +2,7 @@
 
 import { get } from '../api/client'
 import { ApiProblem } from '../api/problem'
+import { readableJob } from '../api/readable'
 import type { Controller, Evaluation, Job, JobSpec, Scenario } from '../api/types'
 import type { DesignSource } from './design-source'
 
@@ -44,7 +45,7 @@ async function ofJob(
   controllers: readonly Controller[],
   signal: AbortSignal,
 ): Promise<ResolvedDesign> {
-  const job = await get('/v1/jobs/{job_id}', { path: { job_id: source.job }, signal })
+  const job = await readableJob(source.job, signal)
   const { spec } = job
   if (spec.kind === 'identification') {
     throw new ApiProblem(

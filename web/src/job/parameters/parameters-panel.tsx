@@ -3,6 +3,7 @@
 import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { ApiProblem } from '../../api/problem'
+import { readableJob } from '../../api/readable'
 import { usePolling, useResource } from '../../api/resource'
 import type { Convergence, FittedParameter, Job } from '../../api/types'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
@@ -45,9 +46,7 @@ function Fitted({ job, also }: { job: Job; also: readonly string[] }) {
       signal,
     }),
   )
-  const runs = useResource(key, (signal) =>
-    Promise.all(also.map((id) => get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }))),
-  )
+  const runs = useResource(key, (signal) => Promise.all(also.map((id) => readableJob(id, signal))))
   const isMoving = job.state === 'running' || job.state === 'pausing'
   usePolling(found.reload, RENEW_MS, isMoving)
   const choose = (ids: readonly string[]) => setQuery({ also: wordOfRuns(ids) })

@@ -29,12 +29,11 @@ from gaitswarm.views.evaluation import (
     ScenarioResultView,
     evaluation_views,
 )
+from gaitswarm.views.iteration import HistoryIterationView, IterationView
 from gaitswarm.views.job import (
     PREFIX,
     EstimateView,
     ExtensionRequest,
-    HistoryIterationView,
-    IterationView,
     JobSummaryView,
     JobView,
     PageView,

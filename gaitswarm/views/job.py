@@ -1,4 +1,4 @@
-"""Jobs, their progress and their history, and what a job would cost."""
+"""Jobs and their progress, and what a job would cost."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Final, Generic, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.views.base import View, finite, listing_name
-from gaitswarm.views.evaluation import BestView, EvaluationView, ObjectiveView, evaluation_views
+from gaitswarm.views.evaluation import BestView, ObjectiveView
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.estimate import Estimate
@@ -16,14 +16,12 @@ from services.optimizer.jobs.job import (
     LARGEST_BUDGET,
     TRANSITIONS,
     Evaluation,
-    Iteration,
     Job,
     JobState,
     UnreadableSpec,
     time_left,
 )
 from services.optimizer.jobs.provenance import ProvenanceRecord
-from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
 
 PREFIX: Final = "/v1"
@@ -240,58 +238,6 @@ class ResumeRequest(BaseModel):
     )
 
 
-class IterationView(View):
-    """One committed iteration of a job: the swarm's fitness at a glance."""
-
-    index: int = Field(description="Index of the iteration, from 0.", examples=[24])
-    best: float | None = Field(
-        description="Least fitness of this iteration [1]; null if every design failed.",
-        examples=[21.3],
-    )
-    mean: float | None = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
-    median: float | None = Field(description="Median of them [1].", examples=[23.9])
-    worst: float | None = Field(description="Greatest of them [1].", examples=[41.7])
-    best_so_far: float | None = Field(
-        description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
-    )
-    failed: int = Field(
-        description="Designs that failed in at least one scenario [1].", examples=[2]
-    )
-    evaluate_seconds: float = Field(
-        description="Time that its evaluation took [s].", examples=[1.23]
-    )
-    committed_at: datetime = Field(description="When it was committed, UTC.")
-
-    @classmethod
-    def from_iteration(cls, iteration: Iteration) -> IterationView:
-        """Make a view of an iteration.
-
-        Args:
-            iteration: as the store lists it.
-        """
-        return cls.model_validate(_at_a_glance(iteration))
-
-
-class HistoryIterationView(IterationView):
-    """One committed iteration with every particle."""
-
-    evaluations: list[EvaluationView] = Field(description="Every particle, in order.")
-
-    @classmethod
-    def from_iteration_and_evaluations(
-        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
-    ) -> HistoryIterationView:
-        """Make a view of an iteration with its particles.
-
-        Args:
-            iteration: as the store lists it.
-            evaluations: its particles.
-            spec: of the job.
-        """
-        particles = evaluation_views(evaluations, spec)
-        return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
-
-
 class StateView(View):
     """A change of a job's state, as the event stream tells it."""
 
@@ -376,20 +322,6 @@ def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
         "particles": particles,
         "iterations_planned": spec.iterations,
         "evaluations_planned": spec.iterations * particles,
-    }
-
-
-def _at_a_glance(iteration: Iteration) -> dict[str, object]:
-    return {
-        "index": iteration.index,
-        "best": finite(iteration.best),
-        "mean": finite(iteration.mean),
-        "median": finite(iteration.median),
-        "worst": finite(iteration.worst),
-        "best_so_far": finite(iteration.best_so_far),
-        "failed": iteration.failed,
-        "evaluate_seconds": iteration.evaluate_seconds,
-        "committed_at": iteration.committed_at,
     }
 
 

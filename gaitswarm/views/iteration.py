@@ -1,0 +1,78 @@
+"""Committed iterations of a job, in short and with every particle."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from pydantic import Field
+
+from gaitswarm.views.base import View, finite
+from gaitswarm.views.evaluation import EvaluationView, evaluation_views
+from services.optimizer.jobs.job import Evaluation, Iteration
+from services.optimizer.jobs.spec import Spec
+
+
+class IterationView(View):
+    """One committed iteration of a job: the swarm's fitness at a glance."""
+
+    index: int = Field(description="Index of the iteration, from 0.", examples=[24])
+    best: float | None = Field(
+        description="Least fitness of this iteration [1]; null if every design failed.",
+        examples=[21.3],
+    )
+    mean: float | None = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
+    median: float | None = Field(description="Median of them [1].", examples=[23.9])
+    worst: float | None = Field(description="Greatest of them [1].", examples=[41.7])
+    best_so_far: float | None = Field(
+        description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
+    )
+    failed: int = Field(
+        description="Designs that failed in at least one scenario [1].", examples=[2]
+    )
+    evaluate_seconds: float = Field(
+        description="Time that its evaluation took [s].", examples=[1.23]
+    )
+    committed_at: datetime = Field(description="When it was committed, UTC.")
+
+    @classmethod
+    def from_iteration(cls, iteration: Iteration) -> IterationView:
+        """Make a view of an iteration.
+
+        Args:
+            iteration: as the store lists it.
+        """
+        return cls.model_validate(_at_a_glance(iteration))
+
+
+class HistoryIterationView(IterationView):
+    """One committed iteration with every particle."""
+
+    evaluations: list[EvaluationView] = Field(description="Every particle, in order.")
+
+    @classmethod
+    def from_iteration_and_evaluations(
+        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
+    ) -> HistoryIterationView:
+        """Make a view of an iteration with its particles.
+
+        Args:
+            iteration: as the store lists it.
+            evaluations: its particles.
+            spec: of the job.
+        """
+        particles = evaluation_views(evaluations, spec)
+        return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
+
+
+def _at_a_glance(iteration: Iteration) -> dict[str, object]:
+    return {
+        "index": iteration.index,
+        "best": finite(iteration.best),
+        "mean": finite(iteration.mean),
+        "median": finite(iteration.median),
+        "worst": finite(iteration.worst),
+        "best_so_far": finite(iteration.best_so_far),
+        "failed": iteration.failed,
+        "evaluate_seconds": iteration.evaluate_seconds,
+        "committed_at": iteration.committed_at,
+    }

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
+from services.runtime import open_store
 from sim.robot import load_robot
 from tests.library.conftest import SMALL, Finished, Reach
 
@@ -184,6 +186,16 @@ def test_commands_change_the_state_until_the_job_has_ended(reach: Reach, db: Pat
     assert jobs.cancel(job.id).state == "cancelled"
     with pytest.raises(gaitswarm.Conflict):
         jobs.extend(job.id, 9)
+
+
+def test_consent_to_changes_is_kept_with_the_job(reach: Reach, db: Path) -> None:
+    jobs = reach(db)
+    job = jobs.submit(**SMALL)
+    for accepted in (True, False):
+        jobs.pause(job.id)
+        jobs.resume(job.id, accept_changes=accepted)
+        with closing(open_store(str(db))) as store:
+            assert store.job(job.id).accepts_changes is accepted
 
 
 def test_a_job_that_succeeded_is_extended(reach: Reach, finished: Finished) -> None:

@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 
 import gaitswarm
+from services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
-from services.runtime import open_evaluator
+from services.optimizer.service import JobService
+from services.runtime import open_evaluator, open_store
 from tests.library.conftest import SMALL, Finished
 
 pytestmark = pytest.mark.slow
@@ -190,6 +193,28 @@ def test_a_job_that_is_cancelled_meanwhile_is_an_error_that_has_the_job(db: Path
     assert raised.value.job.state == "cancelled"
 
 
+@pytest.fixture
+def changed(db: Path) -> str:
+    """A job that was submitted where its numbers depend on other code."""
+
+    def elsewhere(spec: Spec) -> JobProvenance:
+        return job_provenance(spec).model_copy(update={"optimizer_digest": "0" * 32})
+
+    with closing(open_store(str(db))) as store:
+        job, _ = JobService(store, provenance=elsewhere).submit(gaitswarm.JobSpec(iterations=1))
+    return job.id
+
+
+def test_a_job_whose_numbers_would_be_others_is_refused_until_that_is_accepted(
+    db: Path, changed: str
+) -> None:
+    with pytest.raises(gaitswarm.ProvenanceChanged, match="other code of search") as raised:
+        gaitswarm.optimize(resume=changed, db=db)
+    assert "accept_changes=True" in str(raised.value)
+    accepted = gaitswarm.optimize(resume=changed, db=db, accept_changes=True).job
+    assert (accepted.state, len(accepted.provenance)) == ("succeeded", 2)
+
+
 class Broken:
     """Workers on which every simulation fails."""
 
@@ -229,6 +254,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "unknown workers": ({"evaluator": "abacus"}, "evaluator"),
     "no processor": ({"cpus": 0}, "cpus"),
     "misspelt option": ({"sed": 3}, "sed"),
+    "changes of a new job": ({"accept_changes": True}, "accept_changes"),
 }
 
 

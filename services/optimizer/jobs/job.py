@@ -245,8 +245,9 @@ def refusal(job: Job, now: JobProvenance) -> str | None:
     return (
         f"what its numbers depend on is not what it was: {'; '.join(changes)}. Resume it where that"
         f" is as before, or accept the change: `gaitswarm optimize --resume {job.id}"
-        f" --accept-changes`, `gaitswarm resume {job.id} --accept-changes`, or over HTTP"
-        f' {{"accept_changes": true}} goes on and records it from iteration {iterations} on'
+        f" --accept-changes`, `gaitswarm resume {job.id} --accept-changes`, `accept_changes=True`"
+        ' in Python, or {"accept_changes": true} over HTTP'
+        f" goes on and records it from iteration {iterations} on"
     )
 
 

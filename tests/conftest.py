@@ -1,12 +1,22 @@
-"""What every test may rely on: nothing of the user's own is read or written."""
+"""What every test may rely on: nothing of the user's own is read or written.
+
+And what takes long to make, once for all tests of a process.
+"""
 
 from __future__ import annotations
 
 import os
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from services.optimizer.store.sql_store import SqlStore
+    from tests.examples.servers import Server
 
 # Machines are noisy: how long an example takes says nothing about the code.
 settings.register_profile("gaitswarm", deadline=None)
@@ -20,6 +30,45 @@ def _no_user_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         if name.startswith("GAITSWARM_"):
             monkeypatch.delenv(name)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "user-data"))
+
+
+@pytest.fixture(scope="session")
+def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An SQLite file of the newest schema, to be copied: migrating one takes ten times as long."""
+    from services.optimizer.store.sql_store import open_store
+
+    path = tmp_path_factory.mktemp("database") / "empty.db"
+    open_store(str(path)).close()
+    return path
+
+
+@pytest.fixture
+def database(empty_database: Path, tmp_path: Path) -> Path:
+    """An empty database of the test's own."""
+    return Path(shutil.copy(empty_database, tmp_path / "jobs.db"))
+
+
+@pytest.fixture
+def store(database: Path) -> Iterator[SqlStore]:
+    """The store on `database`."""
+    from services.optimizer.store.sql_store import open_store
+
+    opened = open_store(str(database))
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="session")
+def lasting_server() -> Iterator[Server]:
+    """One server in this process for most tests, which tell it whose jobs it serves.
+
+    Starting and stopping one takes longer than they do.
+    """
+    from tests.examples.servers import Server
+
+    server = Server(None)
+    yield server
+    server.close()
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

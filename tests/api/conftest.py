@@ -1,93 +1,32 @@
-"""A real server on a free loopback port, with the real store on a file of its own."""
+"""A real server before a real store, and jobs with made-up results."""
 
 from __future__ import annotations
 
-import shutil
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import httpx2
 import numpy as np
 import pytest
 
-from api import dependencies
-from api.app import create_app
-from api.server import ApiServer
-from gaitswarm.settings import Settings
 from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, Job
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore, open_store
+from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import N_OBJECTIVES, Outcome, Status
+from tests.examples.servers import Server
 
 PARTICLES = 4
 
-Serve = Callable[..., "Server"]
+Serve = Callable[..., Server]
 Commit = Callable[..., Claim]
-
-
-@pytest.fixture(scope="session")
-def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A migrated database to copy: migrating one per test would take most of their time."""
-    path = tmp_path_factory.mktemp("api") / "empty.db"
-    store = open_store(str(path))
-    store.close()
-    return path
-
-
-@pytest.fixture
-def database(empty_database: Path, tmp_path: Path) -> Path:
-    path = tmp_path / "jobs.db"
-    shutil.copy(empty_database, path)
-    return path
-
-
-@pytest.fixture
-def store(database: Path) -> Iterator[SqlStore]:
-    store = open_store(str(database))
-    yield store
-    store.close()
 
 
 @pytest.fixture
 def service(store: SqlStore) -> JobService:
     return JobService(store)
-
-
-class Server:
-    """A server in a thread, on a free port, and a client of it.
-
-    page_folder: of the built page; by default there is none, whether one was built here or not.
-    """
-
-    def __init__(
-        self, service: JobService | None, *, page_folder: Path = Path("none"), **settings: Any
-    ) -> None:
-        values = Settings(**{"api_event_poll_seconds": 0.02, **settings})
-        self.app = create_app(cast(JobService, service), settings=values, page_folder=page_folder)
-        self._server = ApiServer(
-            self.app,
-            host="127.0.0.1",
-            port=0,
-            shutdown_seconds=values.api_shutdown_seconds,
-            log_level="critical",
-        )
-        self._thread = threading.Thread(target=self._server.run)
-        self._thread.start()
-        self.client = httpx2.Client(base_url=self._server.url, timeout=20.0)
-
-    def stop(self) -> None:
-        self._server.stop()
-
-    def close(self) -> None:
-        self.stop()
-        self.client.close()
-        self._thread.join(timeout=10.0)
-        assert not self._thread.is_alive()
 
 
 @pytest.fixture
@@ -103,24 +42,10 @@ def serve(service: JobService) -> Iterator[Serve]:
         yield start
 
 
-@pytest.fixture(scope="session")
-def make_server() -> Callable[..., Server]:
-    """For servers that outlive a test; whoever makes one closes it."""
-    return Server
-
-
-@pytest.fixture(scope="session")
-def lasting_server() -> Iterator[Server]:
-    """One server for most tests; starting and stopping one takes longer than they do."""
-    server = Server(None)
-    yield server
-    server.close()
-
-
 @pytest.fixture
 def client(lasting_server: Server, service: JobService) -> httpx2.Client:
     """A client of a server with the usual settings, on this test's own database."""
-    lasting_server.app.dependency_overrides[dependencies.service] = lambda: service
+    lasting_server.serve(service)
     return lasting_server.client
 
 

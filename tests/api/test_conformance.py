@@ -21,6 +21,7 @@ from api.app import create_app
 from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
+from tests.examples.servers import Server
 
 CHECKS = [
     not_a_server_error,
@@ -40,11 +41,11 @@ schema = schemathesis.openapi.from_dict(_APP.openapi()).exclude(operation_id="st
 
 
 @pytest.fixture(scope="module")
-def url(tmp_path_factory: pytest.TempPathFactory, make_server) -> Iterator[str]:
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A server that lets nobody walk for long."""
     store = open_store(str(tmp_path_factory.mktemp("conformance") / "jobs.db"))
-    server = make_server(JobService(store), max_simulated_seconds=3.0, max_logged_seconds=2.0)
-    yield str(server.client.base_url)
+    server = Server(JobService(store), api_max_simulated_seconds=3.0, api_max_logged_seconds=2.0)
+    yield server.url
     server.close()
     store.close()
 

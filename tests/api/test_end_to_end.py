@@ -11,16 +11,7 @@ import pytest
 from services.optimizer.run.runner import Runner
 from services.optimizer.store.sql_store import SqlStore
 from services.worker.in_process import InProcessEvaluator
-
-SPEC = {
-    "name": "end to end",
-    "scenarios": [
-        {"name": "short", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
-    ],
-    "optimizer": {"particles": 4},
-    "iterations": 3,
-    "seed": 5,
-}
+from tests.examples.jobs import SMALL_SPEC
 
 
 @pytest.fixture
@@ -46,36 +37,36 @@ def streamed(client: httpx2.Client, job_id: str) -> list[dict]:
 def test_a_submitted_job_is_run_to_its_end_and_its_best_can_be_walked_again(
     client: httpx2.Client, runner: Runner
 ) -> None:
-    job_id = client.post("/v1/jobs", json=SPEC).json()["id"]
+    job_id = client.post("/v1/jobs", json=SMALL_SPEC).json()["id"]
 
     iterations = streamed(client, job_id)
 
     view = client.get(f"/v1/jobs/{job_id}").json()
     assert view["state"] == "succeeded"
-    assert (view["iterations"], view["evaluations"]) == (3, 12)
-    assert [iteration["index"] for iteration in iterations] == [0, 1, 2]
+    assert (view["iterations"], view["evaluations"]) == (2, 6)
+    assert [iteration["index"] for iteration in iterations] == [0, 1]
     listed = client.get(f"/v1/jobs/{job_id}/iterations").json()["items"]
     assert iterations == listed
     best = client.get(f"/v1/jobs/{job_id}/best").json()
     assert best["fitness"] == view["best_fitness"] == listed[-1]["best_so_far"]
     again = client.post(
-        "/v1/simulations", json={"design": best["design"], "scenarios": SPEC["scenarios"]}
+        "/v1/simulations", json={"design": best["design"], "scenarios": SMALL_SPEC["scenarios"]}
     ).json()
     assert again["fitness"] == best["fitness"]
     walked = again["scenarios"]["short"]
     assert walked["objectives"] == best["scenarios"]["short"]["objectives"]
-    particles = client.get(f"/v1/jobs/{job_id}/iterations/2/evaluations").json()["items"]
-    assert len(particles) == 4
+    particles = client.get(f"/v1/jobs/{job_id}/iterations/1/evaluations").json()["items"]
+    assert len(particles) == 3
 
 
 @pytest.mark.slow
 def test_the_same_spec_gives_the_same_bits(client: httpx2.Client, runner: Runner) -> None:
-    ids = [client.post("/v1/jobs", json=SPEC).json()["id"] for _ in range(2)]
+    ids = [client.post("/v1/jobs", json=SMALL_SPEC).json()["id"] for _ in range(2)]
     for job_id in ids:
         streamed(client, job_id)
 
     histories = [
-        [client.get(f"/v1/jobs/{job_id}/iterations/{k}/evaluations").json() for k in range(3)]
+        [client.get(f"/v1/jobs/{job_id}/iterations/{k}/evaluations").json() for k in range(2)]
         for job_id in ids
     ]
 

@@ -7,21 +7,20 @@ import pytest
 
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.walks import SHORT_WALK
 
 pytestmark = pytest.mark.slow
-
-SHORT = {"name": "short", "cycle_time": 0.6, "radius": 0.16, "hip_height": 0.15, "cycles": 1.0}
 
 
 def test_an_estimate_counts_walks_and_stores_nothing(
     client: httpx2.Client, store: SqlStore
 ) -> None:
-    spec = {"scenarios": [SHORT], "optimizer": {"particles": 3}, "iterations": 2}
-    answer = client.post("/v1/estimates", json=spec)
+    answer = client.post("/v1/estimates", json=SMALL_SPEC)
     assert answer.status_code == 200
     found = answer.json()
     assert (found["evaluations"], found["walks"]) == (6, 6)
-    assert found["simulated_seconds"] == pytest.approx(3.6)
+    assert found["simulated_seconds"] == pytest.approx(6.0)
     assert found["seconds"] > 0.0
     assert "measured" in found["basis"]
     assert store.jobs().items == ()
@@ -40,7 +39,7 @@ def test_earlier_jobs_tell_the_rate(client: httpx2.Client, job, commit, spec: Jo
     [
         ({"iterations": 0}, "iterations"),
         ({"variables": [{"name": "I", "low": -5.0, "high": -1.0}], "fixed": {}}, "variables"),
-        ({"scenarios": [{**SHORT, "hip_height": 0.5}]}, "scenarios.0"),
+        ({"scenarios": [{**SHORT_WALK, "hip_height": 0.5}]}, "scenarios.0"),
     ],
 )
 def test_a_job_that_cannot_be_submitted_cannot_be_estimated(

@@ -6,9 +6,7 @@ import base64
 import hashlib
 import json
 import re
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import httpx2
@@ -16,7 +14,9 @@ import pytest
 
 from api.page import is_built
 from services.optimizer.jobs.job import Job
-from tests.api.conftest import Serve, Server
+from tests.api.conftest import Serve
+from tests.examples.processes import python
+from tests.examples.servers import Server
 
 HTML = '<!doctype html><script type="module" src="/assets/index-A1b2.js"></script><p>Grüße</p>'
 SCRIPT = "const n = 1\n" * 1000
@@ -34,10 +34,8 @@ def build(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page(
-    make_server: Callable[..., Server], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[httpx2.Client]:
-    server = make_server(None, page_folder=build(tmp_path_factory.mktemp("built") / "page"))
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
+    server = Server(None, page_folder=build(tmp_path_factory.mktemp("built") / "page"))
     yield server.client
     server.close()
 
@@ -186,14 +184,7 @@ def test_long_json_is_compressed(page: httpx2.Client) -> None:
 def test_the_document_of_the_api_is_printed_without_server_database_or_settings(
     client: httpx2.Client,
 ) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "api.document"],
-        cwd=Path(__file__).parents[2],
-        env={"GAITSWARM_API_PORT": "none", "PATH": ""},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-    )
+    done = python("-m", "api.document", environment={"GAITSWARM_API_PORT": "none", "PATH": ""})
 
+    assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == client.get("/openapi.json").json()

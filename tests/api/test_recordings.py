@@ -5,13 +5,13 @@ from __future__ import annotations
 import httpx2
 import numpy as np
 
-from sim.controllers import CONTROLLERS
 from sim.robot import load_robot
+from tests.examples.walks import PUBLISHED_A, SHORT_WALK
 
 WALK = {
-    "scenario": {"name": "b", "cycle_time": 0.6, "radius": 0.16, "hip_height": 0.15, "cycles": 1},
+    "scenario": SHORT_WALK,
     "controller": "fuzzy-pi",
-    "design": dict(CONTROLLERS["fuzzy-pi"].published["A"]),
+    "design": PUBLISHED_A,
     "first_tick": 20,
     "joints": load_robot("szabadka2").joint_names,
     "current": np.full((10, 18), 0.125).tolist(),

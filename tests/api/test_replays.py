@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import struct
-from pathlib import Path
 from typing import Any
 
 import httpx2
@@ -12,21 +11,21 @@ import jsonschema
 import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
 from sim.outcome import OBJECTIVE_NAMES
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
+from tests.examples.paths import QUADRUPED
+from tests.examples.walks import PUBLISHED_A, SHORT_WALK, quadruped_files
 
 pytestmark = pytest.mark.slow
 
-DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
-SHORT = {"name": "short", "cycle_time": 1.0, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
-QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
+
+REQUEST: dict[str, Any] = {"design": PUBLISHED_A, "scenario": SHORT_WALK}
 
 
 def replayed(client: httpx2.Client, **body: Any) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Header, and the numbers of every channel by name: (frames, *shape)."""
-    answer = client.post("/v1/replays", json={"design": DESIGN, "scenario": SHORT, **body})
+    answer = client.post("/v1/replays", json=REQUEST | body)
     assert answer.status_code == 200, answer.text
     assert answer.headers["Content-Type"] == "application/octet-stream"
     assert answer.headers["Cache-Control"] == "no-store"
@@ -43,7 +42,7 @@ def replayed(client: httpx2.Client, **body: Any) -> tuple[dict[str, Any], dict[s
 
 
 def refused(client: httpx2.Client, **change: Any) -> dict[str, Any]:
-    answer = client.post("/v1/replays", json={"design": DESIGN, "scenario": SHORT, **change})
+    answer = client.post("/v1/replays", json=REQUEST | change)
     assert answer.status_code == 422, answer.text
     problem: dict[str, Any] = answer.json()
     return problem
@@ -98,7 +97,7 @@ def test_a_preset_is_replayed_at_the_asked_rate(client: httpx2.Client) -> None:
 
 
 def test_objectives_and_columns_are_the_simulations(client: httpx2.Client) -> None:
-    body = {"design": DESIGN, "scenarios": [SHORT], "log": True}
+    body = {"design": PUBLISHED_A, "scenarios": [SHORT_WALK], "log": True}
     result = client.post("/v1/simulations", json=body).json()["scenarios"]["short"]
     header, channels = replayed(client, rate=500)
     assert header["objectives"] == result["objectives"]
@@ -115,7 +114,7 @@ def test_objectives_and_columns_are_the_simulations(client: httpx2.Client) -> No
 
 
 def test_what_is_seen_of_the_robot_is_in_the_header(client: httpx2.Client) -> None:
-    header, channels = replayed(client, scenario={**SHORT, "load": 2.0})
+    header, channels = replayed(client, scenario={**SHORT_WALK, "load": 2.0})
     robot = load_robot("szabadka2")
     assert header["robot"]["joints"] == list(robot.joint_names)
     assert header["robot"]["legs"] == [leg.name for leg in robot.legs]
@@ -132,7 +131,7 @@ def test_what_is_seen_of_the_robot_is_in_the_header(client: httpx2.Client) -> No
 
 
 def test_on_a_slope_gravity_is_tilted_and_the_ground_is_not(client: httpx2.Client) -> None:
-    slope = {**SHORT, "slope": 10.0, "slope_direction": 90.0}
+    slope = {**SHORT_WALK, "slope": 10.0, "slope_direction": 90.0}
     header, channels = replayed(client, scenario=slope)
     assert header["ground"] == {
         "slope_deg": 10.0,
@@ -146,13 +145,13 @@ def test_on_a_slope_gravity_is_tilted_and_the_ground_is_not(client: httpx2.Clien
 
 
 def test_the_scenario_is_shown_as_the_designs_gait_walked_it(client: httpx2.Client) -> None:
-    header, _ = replayed(client, design={**DESIGN, "cycle_time": 1.2, "fir_ms": 20})
+    header, _ = replayed(client, design={**PUBLISHED_A, "cycle_time": 1.2, "fir_ms": 20})
     assert (header["scenario"]["cycle_time"], header["scenario"]["fir_ms"]) == (1.2, 20)
     assert header["duration"] == pytest.approx(1.2)
 
 
 def test_a_walk_that_fell_is_replayed_up_to_its_end(client: httpx2.Client) -> None:
-    header, channels = replayed(client, scenario={**SHORT, "slope": 45.0})
+    header, channels = replayed(client, scenario={**SHORT_WALK, "slope": 45.0})
     assert header["status"] == "fell"
     assert set(header["objectives"].values()) == {None}
     assert header["frames"] == len(channels["time"]) < 50
@@ -161,11 +160,10 @@ def test_a_walk_that_fell_is_replayed_up_to_its_end(client: httpx2.Client) -> No
 
 
 def test_a_robot_of_ones_own_can_be_watched(client: httpx2.Client) -> None:
-    files = {
-        kind: (QUADRUPED / f"robot.{kind}").read_text(encoding="utf-8") for kind in ("toml", "urdf")
-    }
     crawl = json.loads((QUADRUPED / "crawl.json").read_text(encoding="utf-8"))
-    header, channels = replayed(client, robot=files, scenario={**crawl, "cycles": 1})
+    header, channels = replayed(
+        client, robot=quadruped_files().model_dump(), scenario={**crawl, "cycles": 1}
+    )
     assert header["robot"]["name"] == "quadruped"
     assert channels["foot_position"].shape == (100, 4, 3)
     assert channels["link_pose"].shape == (100, 17, 7)
@@ -178,9 +176,9 @@ def test_a_robot_of_ones_own_can_be_watched(client: httpx2.Client) -> None:
         ({"rate": 501}, "rate", "500"),
         ({"rate": 0}, "rate", "1"),
         ({"design": {"I": 0.2}}, "design", "FI1R"),
-        ({"design": {**DESIGN, "FI1R": -5.0}}, "design", "FI1R"),
-        ({"design": {**DESIGN, "stride": 0.9}}, "scenario", "misses its foot trajectory"),
-        ({"design": {**DESIGN, "cycle_time": 1e6}}, "scenario", "40 s allowed with logs"),
+        ({"design": {**PUBLISHED_A, "FI1R": -5.0}}, "design", "FI1R"),
+        ({"design": {**PUBLISHED_A, "stride": 0.9}}, "scenario", "misses its foot trajectory"),
+        ({"design": {**PUBLISHED_A, "cycle_time": 1e6}}, "scenario", "40 s allowed with logs"),
         ({"scenarios": ["1"]}, "scenarios", "Extra"),
     ],
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from api.server import ApiServer
 from gaitswarm.settings import Settings
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
+from tests.examples.processes import loaded_by, output, start_python
 
 PROGRAM = """
 import sys
@@ -41,12 +41,7 @@ print("closed", flush=True)
 
 @pytest.fixture
 def process(database: Path) -> Iterator[subprocess.Popen[str]]:
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(database)],
-        cwd=Path(__file__).parents[2],
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
+    with start_python("-c", PROGRAM, database, stderr=None) as process:
         yield process
         process.kill()
 
@@ -56,7 +51,8 @@ def process(database: Path) -> Iterator[subprocess.Popen[str]]:
 def test_a_signal_ends_the_process_within_seconds_in_spite_of_open_streams(
     process: subprocess.Popen[str], job: Job, number: signal.Signals
 ) -> None:
-    url = process.stdout.readline().strip()
+    said = output(process.stdout)
+    url = said.readline().strip()
     with httpx2.stream("GET", f"{url}/v1/jobs/{job.id}/events", timeout=20.0) as answer:
         lines = answer.iter_lines()
         assert next(lines) == "event: state"
@@ -64,7 +60,7 @@ def test_a_signal_ends_the_process_within_seconds_in_spite_of_open_streams(
         process.send_signal(number)
         list(lines)
 
-    assert process.stdout.readline() == "closed\n"
+    assert said.readline() == "closed\n"
     assert process.wait(timeout=30.0) == 0
     assert time.monotonic() - began < 15.0
 
@@ -93,17 +89,5 @@ def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
 
 @pytest.mark.slow
 def test_the_api_brings_in_neither_ray_nor_a_database() -> None:
-    program = (
-        "import sys, api.app, api.server, gaitswarm.requests.walk\n"
-        "print(*{'ray', 'sqlalchemy', 'alembic'} & set(sys.modules))"
-    )
-
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-
-    assert done.stdout.strip() == ""
+    statements = "import api.app, api.server, gaitswarm.requests.walk"
+    assert loaded_by(statements, ["ray", "sqlalchemy", "alembic"]) == set()

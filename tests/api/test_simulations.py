@@ -9,17 +9,13 @@ import httpx2
 import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
 from sim.outcome import OBJECTIVE_NAMES, Status
-from sim.scenario import Scenario, find_scenario
-from sim.simulate import simulate
+from sim.scenario import find_scenario
+from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
 
 pytestmark = pytest.mark.slow
 
-DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
-REQUEST: dict[str, Any] = {"design": DESIGN, "scenarios": ["normal-fast"]}
-
-SHORT = {"name": "short", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
+REQUEST: dict[str, Any] = {"design": PUBLISHED_A, "scenarios": ["normal-fast"]}
 
 
 def simulated(client: httpx2.Client, **change: Any) -> dict[str, Any]:
@@ -39,9 +35,8 @@ def refused(client: httpx2.Client, **change: Any) -> dict[str, Any]:
 def test_objectives_are_the_simulators_to_the_last_bit(client: httpx2.Client) -> None:
     view = simulated(client, scenarios=["1", "turn-right-fast"])
 
-    values = np.array([list(DESIGN.values())])
     for name, result in view["scenarios"].items():
-        outcome = simulate(find_scenario(name), "fuzzy-pi", tuple(DESIGN), values).outcome
+        outcome = walk(find_scenario(name)).outcome
         assert result["status"] == "ok"
         assert list(result["objectives"]) == list(OBJECTIVE_NAMES)
         assert list(result["objectives"].values()) == outcome.objectives[0].tolist()
@@ -56,21 +51,20 @@ def test_the_fitness_is_the_geometric_mean_of_the_utilities(client: httpx2.Clien
 
 
 def test_a_scenario_and_a_gait_of_ones_own_can_be_walked(client: httpx2.Client) -> None:
-    design = {**DESIGN, "stride": 0.12}
-    found = simulated(client, scenarios=[SHORT], design=design)["scenarios"]["short"]
+    design = {**PUBLISHED_A, "stride": 0.12}
+    found = simulated(client, scenarios=[SHORT_WALK], design=design)["scenarios"]["short"]
 
-    brief, values = Scenario.model_validate(SHORT), np.array([list(design.values())])
-    walked = simulate(brief, "fuzzy-pi", tuple(design), values).outcome.objectives[0]
+    walked = walk(short_walk(), design).outcome.objectives[0]
     assert list(found["objectives"].values()) == walked.tolist()
-    usual = simulated(client, scenarios=[SHORT])["scenarios"]["short"]
+    usual = simulated(client, scenarios=[SHORT_WALK])["scenarios"]["short"]
     assert usual["objectives"]["reciprocal_speed"] < found["objectives"]["reciprocal_speed"]
 
 
 def test_the_log_has_a_row_for_every_control_tick_with_units(client: httpx2.Client) -> None:
-    result = simulated(client, log=True, scenarios=[SHORT])["scenarios"]["short"]
+    result = simulated(client, log=True, scenarios=[SHORT_WALK])["scenarios"]["short"]
 
     columns = result["log"]["columns"]
-    ticks = round(SHORT["cycle_time"] * result["log"]["rate"])
+    ticks = round(SHORT_WALK["cycle_time"] * result["log"]["rate"])
     assert result["log"]["rate"] == 500
     assert {len(column["values"]) for column in columns.values()} == {ticks}
     assert columns["joint_angle"]["unit"] == "rad"
@@ -84,17 +78,9 @@ def test_there_is_no_log_unless_asked_for(client: httpx2.Client) -> None:
 
 
 def test_a_walk_that_fails_is_a_result_not_an_error(client: httpx2.Client) -> None:
-    still = {
-        "name": "overloaded",
-        "cycle_time": 1.5,
-        "radius": 0.16,
-        "hip_height": 0.15,
-        "load": 50,
-    }
+    view = simulated(client, scenarios=[{**SHORT_WALK, "load": 50, "cycles": 3}])
 
-    view = simulated(client, scenarios=[still])
-
-    result = view["scenarios"]["overloaded"]
+    result = view["scenarios"]["short"]
     assert (result["status"], result["explanation"]) == ("fell", Status.FELL.phrase)
     assert result["utility"] is view["fitness"] is None
     assert result["objectives"] == dict.fromkeys(OBJECTIVE_NAMES)
@@ -106,12 +92,12 @@ def test_a_walk_that_fails_is_a_result_not_an_error(client: httpx2.Client) -> No
         ({"scenarios": ["on-the-moon"]}, "scenarios.0", "known are"),
         ({"scenarios": ["1", "1"]}, "scenarios", "named twice"),
         ({"design": {"I": 0.2}}, "design", "FI1R"),
-        ({"design": {**DESIGN, "warp": 9.0}}, "design", "unknown variable 'warp'"),
-        ({"design": {**DESIGN, "FI1R": -5.0}}, "design", "FI1R"),
-        ({"design": {**DESIGN, "FI1R": "much"}}, "design.FI1R", "number"),
-        ({"design": {**DESIGN, "stride": 0.9}}, "scenarios.0", "misses its foot trajectory"),
-        ({"design": {**DESIGN, "cycle_time": 1e6}}, "scenarios", "300 s allowed"),
-        ({"design": {**DESIGN, "cycle_time": -1.0}}, "scenarios.0", "cycle_time"),
+        ({"design": {**PUBLISHED_A, "warp": 9.0}}, "design", "unknown variable 'warp'"),
+        ({"design": {**PUBLISHED_A, "FI1R": -5.0}}, "design", "FI1R"),
+        ({"design": {**PUBLISHED_A, "FI1R": "much"}}, "design.FI1R", "number"),
+        ({"design": {**PUBLISHED_A, "stride": 0.9}}, "scenarios.0", "misses its foot trajectory"),
+        ({"design": {**PUBLISHED_A, "cycle_time": 1e6}}, "scenarios", "300 s allowed"),
+        ({"design": {**PUBLISHED_A, "cycle_time": -1.0}}, "scenarios.0", "cycle_time"),
         ({"scenarios": [], "log": True}, "scenarios", "at least 1"),
         ({"controller": "telepathy"}, "controller", "fuzzy-pi"),
     ],
@@ -128,6 +114,6 @@ def test_a_request_that_makes_no_sense_is_refused_by_field(
 def test_logs_are_limited_more_than_walks(serve) -> None:
     client = serve(api_max_logged_seconds=1.0).client
 
-    assert simulated(client, scenarios=[SHORT])["scenarios"]["short"]["status"] == "ok"
-    problem = refused(client, scenarios=[SHORT], log=True)
+    assert simulated(client, scenarios=[SHORT_WALK])["scenarios"]["short"]["status"] == "ok"
+    problem = refused(client, scenarios=[SHORT_WALK], log=True)
     assert "1 s allowed with logs" in problem["detail"]

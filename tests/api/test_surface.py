@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sim.controllers import CONTROLLERS
+from tests.examples.walks import PUBLISHED_A
 
-DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
-DESIGN_3 = dict(CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"])
+CHAPTER_3 = dict(CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"])
 
 pytestmark = pytest.mark.slow
 
@@ -24,7 +24,7 @@ def surface(client: httpx2.Client, controller: str, **body: Any) -> dict[str, An
 
 
 def test_fuzzy_pi_has_one_output_over_error_and_current(client: httpx2.Client) -> None:
-    view = surface(client, "fuzzy-pi", design=DESIGN)
+    view = surface(client, "fuzzy-pi", design=PUBLISHED_A)
     assert view["controller"] == "fuzzy-pi"
     assert view["velocity_error"] is None
     assert [i["name"] for i in view["inputs"]] == ["error", "current"]
@@ -38,7 +38,7 @@ def test_fuzzy_pi_has_one_output_over_error_and_current(client: httpx2.Client) -
 
 
 def test_rules_are_those_of_table_4_3_with_the_designs_weights(client: httpx2.Client) -> None:
-    (output,) = surface(client, "fuzzy-pi", design=DESIGN)["outputs"]
+    (output,) = surface(client, "fuzzy-pi", design=PUBLISHED_A)["outputs"]
     assert len(output["rules"]) == 6
     assert output["rules"][0] == {"if": {"error": "zero"}, "then": "null", "weight": 0.187}
     assert output["rules"][5] == {
@@ -49,9 +49,9 @@ def test_rules_are_those_of_table_4_3_with_the_designs_weights(client: httpx2.Cl
 
 
 def test_quantisation_says_what_the_table_costs_and_keeps(client: httpx2.Client) -> None:
-    (output,) = surface(client, "fuzzy-pi", design=DESIGN, error_points=129, current_points=65)[
-        "outputs"
-    ]
+    (output,) = surface(
+        client, "fuzzy-pi", design=PUBLISHED_A, error_points=129, current_points=65
+    )["outputs"]
     facts = output["quantisation"]
     difference = np.subtract(output["table"], output["inference"])
     assert facts["largest_difference"] == pytest.approx(np.abs(difference).max())
@@ -63,7 +63,7 @@ def test_quantisation_says_what_the_table_costs_and_keeps(client: httpx2.Client)
 
 
 def test_chapter_3_has_two_outputs_and_holds_the_velocity(client: httpx2.Client) -> None:
-    view = surface(client, "fuzzy-pi-3", design=DESIGN_3, velocity_error=6100.0)
+    view = surface(client, "fuzzy-pi-3", design=CHAPTER_3, velocity_error=6100.0)
     units = {i["name"]: i["unit"] for i in view["inputs"]}
     assert units == {"error": "counts", "current": "A", "velocity": "counts/s"}
     assert [o["name"] for o in view["outputs"]] == ["FzzP", "FzzI"]
@@ -73,8 +73,8 @@ def test_chapter_3_has_two_outputs_and_holds_the_velocity(client: httpx2.Client)
 
 
 def test_gait_variables_of_a_design_do_not_matter(client: httpx2.Client) -> None:
-    usual = surface(client, "fuzzy-pi", design=DESIGN)
-    assert surface(client, "fuzzy-pi", design={**DESIGN, "stride": 0.12}) == usual
+    usual = surface(client, "fuzzy-pi", design=PUBLISHED_A)
+    assert surface(client, "fuzzy-pi", design={**PUBLISHED_A, "stride": 0.12}) == usual
 
 
 @pytest.mark.parametrize(
@@ -84,8 +84,8 @@ def test_gait_variables_of_a_design_do_not_matter(client: httpx2.Client) -> None
         ("pid", {}, 422, "pid has no fuzzy surface"),
         ("telepathy", {}, 404, "known are fuzzy-pi"),
         ("fuzzy-pi", {"design": {"I": 0.2}}, 422, "FW1: missing"),
-        ("fuzzy-pi", {"design": {**DESIGN, "FOMF": 7}}, 422, "FOMF"),
-        ("fuzzy-pi", {"design": {**DESIGN, "warp": 9.0}}, 422, "unknown variable 'warp'"),
+        ("fuzzy-pi", {"design": {**PUBLISHED_A, "FOMF": 7}}, 422, "FOMF"),
+        ("fuzzy-pi", {"design": {**PUBLISHED_A, "warp": 9.0}}, 422, "unknown variable 'warp'"),
         ("fuzzy-pi", {"error_points": 130}, 422, "error_points"),
         ("fuzzy-pi", {"current_points": 1}, 422, "current_points"),
     ],
@@ -93,7 +93,7 @@ def test_gait_variables_of_a_design_do_not_matter(client: httpx2.Client) -> None
 def test_a_request_that_makes_no_sense_is_refused(
     client: httpx2.Client, controller: str, change: dict[str, Any], status: int, hint: str
 ) -> None:
-    body = {"design": DESIGN, **change}
+    body = {"design": PUBLISHED_A, **change}
     answer = client.post(f"/v1/controllers/{controller}/surface", json=body)
     assert answer.status_code == status, answer.text
     assert hint in answer.json()["detail"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -15,10 +14,10 @@ import pytest
 
 from services.runtime import open_store
 from tests.cli.conftest import Finished, Gaitswarm
+from tests.examples.paths import ROOT
+from tests.examples.processes import COMMAND_LINE, python
 
 pytestmark = pytest.mark.slow
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
@@ -33,14 +32,7 @@ def extended(finished: Finished, tmp_path: Path, gaitswarm: Gaitswarm) -> Finish
 def resume(job: Finished, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Go on with the job in a process of its own."""
     command = ["optimize", "--resume", job.id, "--db", str(job.db), "--evaluator", "in-process"]
-    return subprocess.run(
-        [sys.executable, "-P", "-c", "from cli.main import main; main()", *command, *options],
-        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+    return python("-P", *COMMAND_LINE, *command, *options, environment=environment)
 
 
 def changed_simulator(folder: Path, file: str, old: str, new: str) -> str:

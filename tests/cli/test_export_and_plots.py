@@ -12,13 +12,12 @@ import pytest
 
 from sim.outcome import OBJECTIVE_NAMES
 from tests.cli.conftest import Finished, Gaitswarm
+from tests.examples.commands import run_command
 
 
 @pytest.fixture(scope="module")
 def expected(finished: Finished) -> list[dict[str, Any]]:
     """Rows of the table, from the history."""
-    from tests.cli.conftest import run_command
-
     history = run_command("history", finished.id, "--db", finished.db, "--json").json
     rows = []
     for evaluation in (e for i in history["iterations"] for e in i["evaluations"]):

@@ -10,7 +10,8 @@ import pytest
 
 from cli.spec_file import LARGEST_FILE
 from services.runtime import open_store
-from tests.cli.conftest import SMALL_SPEC, Finished, Gaitswarm, WriteJson
+from tests.cli.conftest import Finished, Gaitswarm, WriteJson
+from tests.examples.jobs import SMALL_SPEC
 
 pytestmark = pytest.mark.slow
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from cli.main import run
+from tests.examples.paths import QUADRUPED
 
 pytestmark = pytest.mark.slow
 
-QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
 CRAWL = str(QUADRUPED / "crawl.json")
 SIMULATE = ["simulate", "--controller", "pi", "--design", "published:validation", "--json"]
 

@@ -3,53 +3,29 @@
 from __future__ import annotations
 
 import json
-import os
-import re
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import pytest
 
 from services.runtime import open_store
-from tests.cli.conftest import SMALL_SPEC, Gaitswarm, WriteJson
+from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
-
-
-def _start(*arguments: str | Path) -> subprocess.Popen[str]:
-    program = "from cli.main import main; main()"
-    return subprocess.Popen(
-        [sys.executable, "-u", "-c", program, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
-
-
-def _wait_for(stream: IO[str] | None, pattern: str) -> re.Match[str]:
-    assert stream is not None
-    seen = []
-    for line in stream:
-        seen.append(line)
-        found = re.search(pattern, line)
-        if found:
-            return found
-    raise AssertionError(f"{pattern} did not come: {seen}")
+SERVE = (*COMMAND_LINE, "serve", "--port", "0", "--evaluator", "in-process")
 
 
 @pytest.fixture
 def server(db: Path) -> Iterator[str]:
-    process = _start("serve", "--db", db, "--port", "0", "--evaluator", "in-process")
-    url = _wait_for(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
+    process = start_python(*SERVE, "--db", db)
+    url = line_with(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
     yield url
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
@@ -74,21 +50,14 @@ def test_the_jobs_of_a_server_that_is_killed_are_free_after_the_lease_of_its_set
     monkeypatch.setenv("GAITSWARM_LEASE_SECONDS", "3")
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
     job_id = gaitswarm("submit", "--spec", spec, "--db", db).out.strip()
-    server = _start("serve", "--db", db, "--port", "0", "--evaluator", "in-process")
+    server = start_python(*SERVE, "--db", db)
     with closing(open_store(str(db))) as store:
-        _eventually(lambda: store.job(job_id).progress.iterations > 0)
+        eventually(lambda: store.job(job_id).progress.iterations > 0)
         server.kill()
         server.communicate()
         killed = time.monotonic()
-        _eventually(lambda: store.claim("another", lease_seconds=3.0, job_id=job_id) is not None)
+        eventually(lambda: store.claim("another", lease_seconds=3.0, job_id=job_id) is not None)
         assert time.monotonic() - killed < 15.0
-
-
-def _eventually(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen within a minute"
-        time.sleep(0.05)
 
 
 def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_never_stopped(
@@ -96,9 +65,9 @@ def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_neve
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 40})
     options = ("--spec", spec, "--evaluator", "in-process", "--json")
-    process = _start("optimize", *options, "--db", db)
-    job_id = _wait_for(process.stderr, r"^job (\w+) in").group(1)
-    _wait_for(process.stderr, r"^iteration \d+/40")
+    process = start_python(*COMMAND_LINE, "optimize", *options, "--db", db)
+    job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
+    line_with(process.stderr, r"^iteration \d+/40")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -123,7 +92,8 @@ def _bits(gaitswarm: Gaitswarm, job_id: str, db: Path) -> Any:
 def test_an_optimization_on_embedded_ray_gives_the_same_bits_and_ends_quietly(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path, tmp_path: Path
 ) -> None:
-    process = _start("optimize", "--spec", small_spec, "--db", db, "--cpus", "1", "--json")
+    options = ("optimize", "--spec", small_spec, "--db", db, "--json")
+    process = start_python(*COMMAND_LINE, *options, "--cpus", "1")
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
     job = json.loads(out)

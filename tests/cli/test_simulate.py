@@ -10,7 +10,8 @@ import pytest
 
 from sim.outcome import OBJECTIVE_NAMES
 from sim.scenario import SCENARIOS
-from tests.cli.conftest import PUBLISHED_A, Gaitswarm, WriteJson
+from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.examples.walks import PUBLISHED_A
 
 pytestmark = pytest.mark.slow
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 
 import pytest
 
 from cli.exit_codes import ExitCode
 from sim.simulate import lanes, prepare
 from tests.cli.conftest import Finished, Gaitswarm
+from tests.examples.processes import COMMAND_LINE, loaded_by, output, start_python
 
 HEAVY = (
     "ray", "pinocchio", "casadi", "numpy", "sqlalchemy", "fastapi", "pydantic", "matplotlib",
@@ -21,16 +19,7 @@ HEAVY = (
 
 @pytest.mark.slow
 def test_help_imports_none_of_the_heavy_packages() -> None:
-    program = (
-        "import sys; from cli.main import run; code = run(['--help']);"
-        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr);"
-        "sys.exit(code)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
-    )
-    assert done.stderr.strip() == "[]"
-    assert "optimize" in done.stdout
+    assert loaded_by("from cli.main import run; assert run(['--help']) == 0", HEAVY) == set()
 
 
 def test_help_documents_the_exit_codes(gaitswarm: Gaitswarm) -> None:
@@ -49,17 +38,12 @@ def test_wrong_usage_is_exit_code_2(gaitswarm: Gaitswarm, arguments: list[str]) 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["simulate --help", "history {id} --json"])
 def test_a_reader_that_goes_away_is_no_error(finished: Finished, command: str) -> None:
-    program = "from cli.main import main; main()"
-    with subprocess.Popen(
-        [sys.executable, "-c", program, *command.format(id=finished.id).split()],
-        env=os.environ | {"GAITSWARM_DB": str(finished.db)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    arguments = command.format(id=finished.id).split()
+    where = {"GAITSWARM_DB": str(finished.db)}
+    with start_python(*COMMAND_LINE, *arguments, environment=where) as process:
         # Before the first word: whatever is written, nobody reads it.
-        process.stdout.close()
-        assert process.stderr.read() == ""
+        output(process.stdout).close()
+        assert output(process.stderr).read() == ""
         assert process.wait(timeout=60) == ExitCode.OK
 
 

@@ -10,7 +10,8 @@ from cli.main import run
 from sim.measurement.measured_csv import format_measured_log
 from sim.validation.comparison import compare
 from sim.validation.measures import Tolerance
-from tests.cli.conftest import Result, run_command
+from tests.examples.commands import Result, run_command
+from tests.examples.paths import QUADRUPED
 from tests.validation.conftest import TwoWalks
 
 pytestmark = pytest.mark.slow
@@ -129,9 +130,8 @@ def test_other_bad_input_is_exit_code_2_too(measured: Path, tmp_path: Path) -> N
 def test_a_robot_of_ones_own_is_validated_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    quadruped = Path(__file__).parents[2] / "examples" / "quadruped"
     log = str(tmp_path / "synthetic.csv")
-    walk = ["--robot", str(quadruped), "--scenario", str(quadruped / "crawl.json")]
+    walk = ["--robot", str(QUADRUPED), "--scenario", str(QUADRUPED / "crawl.json")]
     walk += ["--controller", "pi", "--design", "published:validation"]
     assert run(["synthesize", *walk, "--output", log]) == 0
     assert run(["validate", log, *walk, "--json"]) == 0

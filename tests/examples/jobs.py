@@ -1,0 +1,37 @@
+"""Small jobs, and all that is remembered of one."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from services.optimizer.store.base import Store
+from tests.examples.walks import SHORT_WALK
+
+SMALL_SPEC: Final[dict[str, Any]] = {
+    "name": "small",
+    "scenarios": [SHORT_WALK],
+    "optimizer": {"name": "pso", "particles": 3},
+    "iterations": 2,
+    "seed": 7,
+}
+"""Six walks of a second, as a document."""
+
+
+Bits = tuple[int, int, bytes, bytes, bytes, float]
+"""An evaluation, and nothing that is measured: iteration, particle, design, objectives, statuses,
+fitness."""
+
+
+def history(store: Store, job_id: str) -> list[Bits]:
+    """Every evaluation of a job, to the bit."""
+    return [
+        (
+            evaluation.iteration,
+            evaluation.particle,
+            evaluation.design.tobytes(),
+            evaluation.objectives.tobytes(),
+            evaluation.statuses.tobytes(),
+            evaluation.fitness,
+        )
+        for evaluation in store.evaluations_between(job_id, 0, 1_000_000)
+    ]

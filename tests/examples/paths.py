@@ -1,0 +1,11 @@
+"""Where things are in the repository."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).parents[2]
+
+QUADRUPED: Final = ROOT / "examples" / "quadruped"
+"""Folder of a robot that is not shipped, and of the walk `crawl.json`."""

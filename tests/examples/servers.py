@@ -1,0 +1,104 @@
+"""Servers on free ports of this machine: one in a thread, one as users start it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import Any, cast
+
+import httpx2
+
+from api import dependencies
+from api.app import create_app
+from api.server import ApiServer
+from gaitswarm.settings import Settings
+from services.optimizer.service import JobService
+from tests.examples.processes import COMMAND_LINE, line_with, output, start_python
+
+
+class Server:
+    """The API in a thread of this process, and a client of it.
+
+    page_folder: of the built page; by default there is none, whether one was built here or not.
+    """
+
+    def __init__(
+        self, service: JobService | None, *, page_folder: Path = Path("none"), **settings: Any
+    ) -> None:
+        assert set(settings) <= set(Settings.model_fields)
+        values = Settings(**{"api_event_poll_seconds": 0.02, **settings})
+        self.app = create_app(cast(JobService, service), settings=values, page_folder=page_folder)
+        self._server = ApiServer(
+            self.app,
+            host="127.0.0.1",
+            port=0,
+            shutdown_seconds=values.api_shutdown_seconds,
+            log_level="critical",
+        )
+        self._thread = threading.Thread(target=self._server.run)
+        self._thread.start()
+        self.url = self._server.url
+        self.client = httpx2.Client(base_url=self.url, timeout=20.0)
+
+    def serve(self, service: JobService) -> None:
+        """Serve the jobs of another database from now on."""
+        self.app.dependency_overrides[dependencies.service] = lambda: service
+
+    def stop(self) -> None:
+        """Let it begin to stop."""
+        self._server.stop()
+
+    def close(self) -> None:
+        """Stop it, and wait until it has."""
+        self.stop()
+        self.client.close()
+        self._thread.join(timeout=10.0)
+        assert not self._thread.is_alive()
+
+
+class ServerProcess:
+    """`gaitswarm serve` as a process, with a runner unless told otherwise, and a client of it."""
+
+    def __init__(self, database: Path, *options: str) -> None:
+        chosen = options or ("--evaluator", "in-process")
+        self.process = start_python(
+            *(*COMMAND_LINE, "serve", "--db", database, "--port", "0", *chosen),
+            environment={"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"},
+            stdout=None,
+        )
+        self.url = line_with(self.process.stderr, r"serves (http://[\d.:]+) and")[1]
+        self.client = httpx2.Client(base_url=self.url, timeout=60.0)
+        # A full pipe would stop the server.
+        self._drain = threading.Thread(target=output(self.process.stderr).read)
+        self._drain.start()
+
+    def submit(self, spec: dict[str, Any]) -> str:
+        """Id of a new job."""
+        answer = self.client.post("/v1/jobs", json=spec)
+        assert answer.status_code == 202, answer.text
+        return str(answer.json()["id"])
+
+    def job(self, job_id: str) -> dict[str, Any]:
+        """A job as it is now."""
+        return dict(self.client.get(f"/v1/jobs/{job_id}").json())
+
+    def wait_for(self, job_id: str, state: str, *, seconds: float = 120.0) -> dict[str, Any]:
+        """A job once it is in a state; fails if it ends in another one."""
+        ends = time.monotonic() + seconds
+        while (job := self.job(job_id))["state"] != state:
+            assert job["state"] not in ("failed", "cancelled"), job["error"]
+            assert time.monotonic() < ends, f"the job is {job['state']} still"
+            time.sleep(0.1)
+        return job
+
+    def close(self) -> None:
+        """Let it end."""
+        self.client.close()
+        self.process.terminate()
+        try:
+            self.process.wait(timeout=60.0)
+        finally:
+            self.process.kill()
+            self._drain.join()
+            output(self.process.stderr).close()

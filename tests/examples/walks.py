@@ -1,0 +1,98 @@
+"""Walks: the published design, short and steep scenarios, a robot that is not shipped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers import CONTROLLERS
+from sim.kernel.observation import WalkLog
+from sim.robot import RobotFiles
+from sim.scenario import Scenario
+from sim.simulate import Simulation, simulate
+from tests.examples.paths import QUADRUPED
+
+Floats = NDArray[np.float64]
+
+PUBLISHED_A: Final[dict[str, float]] = dict(CONTROLLERS["fuzzy-pi"].published["A"])
+"""The thesis's optimum for preference A, a design of `fuzzy-pi`."""
+
+SHORT_WALK: Final[dict[str, Any]] = {
+    "name": "short",
+    "cycle_time": 1.0,
+    "radius": 0.16,
+    "hip_height": 0.15,
+    "cycles": 1,
+}
+"""One step of a second on level ground, as a document."""
+
+
+UPHILL_WALK: Final[dict[str, Any]] = SHORT_WALK | {
+    "name": "uphill",
+    "cycle_time": 1.5,
+    "radius": 0.2,
+    "hip_height": 0.14,
+    "slope": 10.0,
+}
+"""A slower step up a slope, as a document."""
+
+
+def short_walk(**changes: object) -> Scenario:
+    """`SHORT_WALK` as a scenario, with some of its fields changed."""
+    return Scenario.model_validate(SHORT_WALK | changes)
+
+
+STEEP: Final = short_walk(
+    name="steep", cycle_time=1.5, cycles=3, load=2.0, slope=20.0, slope_direction=30.0
+)
+"""Everything that tilts or weighs down a robot at once."""
+
+
+def walk(
+    scenario: Scenario,
+    design: Mapping[str, float] = PUBLISHED_A,
+    controller: str = "fuzzy-pi",
+    **options: Any,
+) -> Simulation:
+    """One design walks. options: of `simulate`."""
+    values = np.array([list(design.values())])
+    return simulate(scenario, controller, list(design), values, **options)
+
+
+def logged_walk(
+    scenario: Scenario,
+    design: Mapping[str, float] = PUBLISHED_A,
+    controller: str = "fuzzy-pi",
+    **options: Any,
+) -> WalkLog:
+    """The log of `walk`."""
+    (log,) = walk(scenario, design, controller, log=True, **options).logs
+    assert log is not None
+    return log
+
+
+def quadruped_files() -> RobotFiles:
+    """The robot that is not shipped, as text."""
+    return RobotFiles(
+        toml=(QUADRUPED / "robot.toml").read_text(encoding="utf-8"),
+        urdf=(QUADRUPED / "robot.urdf").read_text(encoding="utf-8"),
+    )
+
+
+def random_state(rng: np.random.Generator, joints: int) -> tuple[Floats, Floats]:
+    """A pose near walking height with any attitude, and violent velocities.
+
+    q and v as the kernel has them: quaternion x y z w, twist in the body's own frame.
+    """
+    quaternion = rng.normal(size=4)
+    q = np.concatenate(
+        [
+            rng.uniform([-1, -1, 0.0], [1, 1, 0.2]),
+            quaternion / np.linalg.norm(quaternion),
+            rng.uniform(-1.5, 1.5, joints),
+        ]
+    )
+    return q, rng.normal(size=6 + joints) * 3.0

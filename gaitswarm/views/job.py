@@ -167,8 +167,9 @@ class JobView(JobSummaryView):
     )
     stored_spec: AnySpec | None = Field(
         alias="spec",
-        description="What was asked, with every preset written out as it was on submission; null"
-        " if this version cannot read it, and `error` says why.",
+        description="What was asked, with scenarios, preference and variables written out as they"
+        " were on submission; robot and controller as they were named. Null if this version cannot"
+        " read it, and `error` says why.",
     )
     provenance: list[ProvenanceRecord] = Field(
         description="What its numbers depend on beside the spec: code, libraries, content of the"

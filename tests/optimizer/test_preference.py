@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import ValidationError
@@ -85,17 +85,25 @@ def test_an_undefined_objective_counts_only_if_it_has_a_weight() -> None:
 
 
 @given(
-    rows=st.lists(st.tuples(*[st.floats(0.0, 1e6)] * 5), min_size=1, max_size=6),
-    bias=st.tuples(*[st.floats(0.0, 1e6)] * 5),
+    rows=st.lists(st.tuples(*[st.floats(0.0, 5e5)] * 5), min_size=1, max_size=6),
+    bias=st.tuples(*[st.floats(0.0, 5e5)] * 5),
     exponent=st.tuples(*[st.floats(0.01, 10.0)] * 5),
 )
-def test_no_objectives_below_a_million_overflow(
+@example(rows=[(5e5,) * 5], bias=(5e5,) * 5, exponent=(10.0,) * 5)
+def test_no_factors_up_to_a_million_overflow(
     rows: list[tuple[float, ...]], bias: tuple[float, ...], exponent: tuple[float, ...]
 ) -> None:
     fitness, utilities = worth(
         [outcome(row) for row in rows], Preference(bias=bias, exponent=exponent)
     )
     assert np.isfinite(fitness).all() and np.isfinite(utilities).all()
+
+
+def test_a_utility_beyond_a_double_is_infinite_as_that_of_a_failed_walk() -> None:
+    largest = Preference(bias=(1e6,) * 5, exponent=(10.0,) * 5)
+    fitness, utilities = worth([outcome((1e6,) * 5)], largest)
+    assert fitness.tolist() == [math.inf]
+    assert utilities.tolist() == [[math.inf]]
 
 
 @pytest.mark.parametrize(

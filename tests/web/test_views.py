@@ -22,6 +22,16 @@ RUN_AXE = """async () => {
         .map(({ id, help, nodes }) => `${id}: ${help}: ${nodes.map((n) => n.html).join(' | ')}`)
 }"""
 
+# Of a list of tabs or a group of radio buttons, Tab reaches the chosen one and arrows the others.
+OUT_OF_REACH = """() => [
+        ...document.querySelectorAll('a, button, input, select, textarea, summary')
+    ].filter((e) => e.checkVisibility() && !e.disabled && e.tabIndex < 0 && e.role !== 'tab')
+    .map((e) => e.outerHTML.slice(0, 120))"""
+
+CHARTS_WITHOUT_TABLE = """() => [...document.querySelectorAll('canvas')]
+    .filter((e) => e.checkVisibility() && !e.closest('.chart-frame, .scene'))
+    .map((e) => e.parentElement.outerHTML.slice(0, 120))"""
+
 BACKGROUND = "getComputedStyle(document.body).backgroundColor"
 
 MISSING = "status of 404"
@@ -45,6 +55,8 @@ def test_no_serious_finding_of_accessibility(
     page.add_script_tag(path=AXE)
     light = page.evaluate(BACKGROUND)
     assert page.evaluate(RUN_AXE) == []
+    assert page.evaluate(OUT_OF_REACH) == []
+    assert page.evaluate(CHARTS_WITHOUT_TABLE) == []
 
     page.get_by_role("button", name="Show in dark colours").click()
     # The choice is kept; what is loaded with it has nothing left of the change.
@@ -65,6 +77,22 @@ def test_no_screen_has_to_be_scrolled_sideways(
     for width, height in ((768, 1024), (3840, 2160)):
         page.set_viewport_size({"width": width, "height": height})
         assert page.evaluate(TOO_WIDE) == []
+
+
+def test_colours_follow_the_system_until_the_button_chooses(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, color_scheme="light").go("/jobs")
+    body = page.locator("body")
+    light = page.evaluate(BACKGROUND)
+
+    page.emulate_media(color_scheme="dark")
+    expect(body).not_to_have_css("background-color", light)
+    page.get_by_role("button", name="Show in light colours").click()
+    expect(body).to_have_css("background-color", light)
+    page.reload()
+    expect(page.get_by_role("button", name="Show in dark colours")).to_be_visible()
+    expect(body).to_have_css("background-color", light)
 
 
 def test_the_documentation_of_the_api_runs_under_its_policy(

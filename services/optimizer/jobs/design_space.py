@@ -104,7 +104,7 @@ class DesignSpace:
             positions: (n, d), inside the bounds.
 
         Returns:
-            (n, len(names)), integer variables rounded to even halves and fixed values appended.
+            (n, len(names)), integer variables rounded and fixed values appended.
         """
         columns = np.empty((len(positions), len(self.names)))
         for j, variable in enumerate(self.variables):

@@ -22,7 +22,7 @@ _MOST_JOBS: Final = 5
 """Jobs whose rates are averaged, so that one on a busy machine does not count for all."""
 
 _MEASURED: Final = 8
-"""Designs that walk to measure a rate: as many as the kernel takes at once."""
+"""Designs that walk to measure a rate: a multiple of what any kernel takes at once."""
 
 _LONGEST_WALK: Final = 5.0
 """Length of the walk that is measured [s]; a very short one would tell how long tables take."""

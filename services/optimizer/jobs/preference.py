@@ -16,7 +16,8 @@ from sim.choice import NAME, OWN, alternatives
 _FIELDS: Final = ("torque", "acceleration", "angular_acceleration", "energy", "reciprocal_speed")
 
 
-# With exponents up to ten, objectives up to a million cannot overflow a double.
+# At an exponent of ten, five factors of a million are still within a double; beyond, a utility is
+# infinite, as that of a failed walk.
 Bias = Annotated[float, Field(ge=0.0, le=1e6)]
 Exponent = Annotated[float, Field(ge=0.0, le=10.0)]
 
@@ -123,6 +124,6 @@ def _log_product(row: list[float], preference: Preference) -> float:
         factor = b + f
         if not math.isfinite(factor):
             return math.inf
-        # A factor of zero or less cannot be improved upon; only a robot at rest reaches it.
+        # A factor of zero or less cannot be improved upon.
         terms.append(e * math.log(factor) if factor > 0.0 else -math.inf)
     return math.fsum(terms)

@@ -29,7 +29,7 @@ _SOURCES: Final = (
 
 
 class JobProvenance(BaseModel):
-    """What a job's numbers depend on beside its spec, in which every preset is written out."""
+    """What a job's numbers depend on beside its spec."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -152,7 +152,10 @@ class Spec(BaseModel):
 
     @abstractmethod
     def resolved(self) -> Self:
-        """The same job with every preset written out, so that it stays what it was when stored."""
+        """The same job with presets written out, so that it stays what it was when they change.
+
+        Scenarios, preference and variables are; robot and controller stay as they were named.
+        """
 
 
 def judge_outcomes(spec: Spec, outcomes: tuple[Outcome, ...]) -> Judgement:

@@ -19,10 +19,9 @@ from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from services.runtime import open_evaluator, open_store, run_embedded
 from sim.assembly import Backend
-from sim.controllers import CONTROLLERS
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import simulate
+from tests.examples.walks import walk
 
 FILE: Final = Path(__file__).with_name("numbers.json")
 
@@ -71,11 +70,9 @@ def objectives_of_the_optimum(
     scenarios: tuple[Scenario, ...] = SCENARIOS, *, backend: Backend = "native"
 ) -> Optimum:
     """What the published design A is worth."""
-    design = CONTROLLERS["fuzzy-pi"].published["A"]
-    values = np.array([list(design.values())])
     found = {}
     for scenario in scenarios:
-        outcome = simulate(scenario, "fuzzy-pi", list(design), values, backend=backend).outcome
+        outcome = walk(scenario, backend=backend).outcome
         assert outcome.statuses.tolist() == [Status.OK]
         found[scenario.name] = dict(
             zip(OBJECTIVE_NAMES, outcome.objectives[0].tolist(), strict=True)

@@ -7,10 +7,6 @@ kernel walks, and agrees to 1e-9.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,6 +16,7 @@ from sim.compiler.compilation import Target, target
 from sim.errors import SimulationInputError
 from sim.scenario import SCENARIOS
 from sim.simulate import prepare
+from tests.examples.processes import python
 from tests.golden.numbers import (
     DEMO,
     ITERATIONS,
@@ -28,8 +25,6 @@ from tests.golden.numbers import (
     read,
     run_demo,
 )
-
-ROOT = Path(__file__).parents[2]
 
 GOLDEN = read()
 
@@ -101,12 +96,9 @@ def test_a_machine_with_narrower_vectors_gives_the_same_bits(
     if backend == "reference":
         pytest.skip("NOT TESTED without a C compiler: there is no kernel to compile more narrowly")
     narrow = min(narrow, target(), key=lambda candidate: candidate.lanes)
-    done = subprocess.run(
-        [sys.executable, "-c", NARROW_MACHINE, str(narrow.lanes), narrow.level],
-        env=os.environ | {"PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": without},
-        capture_output=True,
-        text=True,
-        check=False,
+    done = python(
+        *("-c", NARROW_MACHINE, str(narrow.lanes), narrow.level),
+        environment={"NPY_DISABLE_CPU_FEATURES": without},
     )
     assert done.returncode == 0, done.stderr
     lanes, found = json.loads(done.stdout)

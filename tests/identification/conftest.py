@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
 from sim.identification.recorded_walk import RecordedWalk, record
 from sim.measurement.measured_log import simulated_log
 from sim.measurement.synchronise import synchronise
 from sim.measurement.synthetic import Perturbation, synthetic_log
 from sim.robot import Robot, load_robot
-from sim.scenario import Scenario
-from sim.simulate import simulate
+from tests.examples.walks import PUBLISHED_A, logged_walk, short_walk
 
-DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
-SCENARIO = Scenario(name="brief", cycle_time=1.0, radius=0.16, hip_height=0.15, cycles=2.0)
+SCENARIO = short_walk(name="brief", cycles=2)
 TRUTH = {
     "battery_voltage": 10.4,
     "body_mass": 4.3,
@@ -36,10 +32,8 @@ class Twin:
 def twin() -> Twin:
     robot = load_robot("szabadka2")
     log = synthetic_log(
-        robot, SCENARIO, "fuzzy-pi", DESIGN, seed=3, perturbation=Perturbation.of(TRUTH)
+        robot, SCENARIO, "fuzzy-pi", PUBLISHED_A, seed=3, perturbation=Perturbation.of(TRUTH)
     )
-    values = np.array([list(DESIGN.values())])
-    (walk,) = simulate(SCENARIO, "fuzzy-pi", list(DESIGN), values, log=True).logs
-    assert walk is not None
-    pair = synchronise(log, simulated_log(robot, walk), SCENARIO.cycle_time)
-    return Twin(robot, record(pair, SCENARIO, "fuzzy-pi", DESIGN))
+    simulated = simulated_log(robot, logged_walk(SCENARIO))
+    pair = synchronise(log, simulated, SCENARIO.cycle_time)
+    return Twin(robot, record(pair, SCENARIO, "fuzzy-pi", PUBLISHED_A))

@@ -15,8 +15,8 @@ from sim.kernel.walk import Coding
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
 from sim.robot.identifiable import with_parameters
-from sim.simulate import simulate
-from tests.identification.conftest import DESIGN, SCENARIO, TRUTH, Twin
+from tests.examples.walks import PUBLISHED_A, logged_walk
+from tests.identification.conftest import SCENARIO, TRUTH, Twin
 from tests.sim.test_identifiable import described_values
 
 pytestmark = pytest.mark.slow
@@ -30,11 +30,10 @@ def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
     kernel, (substeps, timestep) = kernel_of(robot), control_steps(robot)
     plan = plan_walk(robot, SCENARIO, timestep)
     assert plan is not None
-    setup = plan(CONTROLLERS["fuzzy-pi"].compile(DESIGN))
+    setup = plan(CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A))
     (result,) = kernel.walk([setup], Coding.of(robot, substeps), log=True)
-    values = np.array([list(DESIGN.values())])
-    (log,) = simulate(SCENARIO, "fuzzy-pi", list(DESIGN), values, robot=robot, log=True).logs
-    assert result.states is not None and log is not None
+    log = logged_walk(SCENARIO, robot=robot)
+    assert result.states is not None
     np.testing.assert_allclose(motor_currents(robot, result.states), log.current, atol=1e-10)
 
 
@@ -58,13 +57,10 @@ def test_every_link_has_its_own_error(twin: Twin) -> None:
 
 def test_desired_angles_are_those_of_the_described_robot(twin: Twin) -> None:
     long_soles = {f"sole_{leg.name}": 0.016 for leg in twin.robot.legs}
-    values = np.array([list(DESIGN.values())])
     changed = with_parameters(twin.robot, long_soles)
-    arguments = (SCENARIO, "fuzzy-pi", list(DESIGN), values)
-    (own,) = simulate(*arguments, robot=changed, log=True).logs
-    (planned,) = simulate(*arguments, robot=changed, planner=twin.robot, log=True).logs
-    (described,) = simulate(*arguments, log=True).logs
-    assert own is not None and planned is not None and described is not None
+    own = logged_walk(SCENARIO, robot=changed)
+    planned = logged_walk(SCENARIO, robot=changed, planner=twin.robot)
+    described = logged_walk(SCENARIO)
     np.testing.assert_array_equal(planned.desired_angle, described.desired_angle)
     assert not np.array_equal(own.desired_angle, described.desired_angle)
 

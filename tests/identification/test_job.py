@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,9 @@ from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.spec import Judgement
 from services.optimizer.search.pso import PsoSettings
 from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore, open_store
+from services.optimizer.store.sql_store import SqlStore
 from services.runtime import open_evaluator, run_embedded
+from tests.examples.jobs import history
 from tests.identification.conftest import TRUTH, Twin
 
 VARIABLES = ("battery_voltage", "body_mass", "efficiency_right_front_coxa")
@@ -48,11 +48,6 @@ def test_fitness_is_the_mean_error_over_walks_and_chosen_links() -> None:
     assert everything.fitness.tolist() == [3.5, np.inf]
     np.testing.assert_allclose(everything.utilities[0], [2.0, 5.0])
     assert second_link.fitness.tolist() == [3.0, np.inf]
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> SqlStore:
-    return open_store(str(tmp_path / "jobs.db"))
 
 
 def finished(store: SqlStore, wanted: IdentificationSpec) -> str:
@@ -90,13 +85,7 @@ def test_a_job_stopped_half_way_ends_with_the_same_bits(store: SqlStore, twin: T
         run_embedded(store, evaluator, job.id)
     finally:
         evaluator.close()
-    pairs = zip(
-        store.evaluations_between(whole, 0, 4), store.evaluations_between(job.id, 0, 4), strict=True
-    )
-    for one, other in pairs:
-        assert one.design.tobytes() == other.design.tobytes()
-        assert one.objectives.tobytes() == other.objectives.tobytes()
-        assert one.fitness == other.fitness
+    assert history(store, job.id) == history(store, whole)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from sim.kernel.parameters import pack_parameters
 from sim.kernel.physics_step import physics_model
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
+from tests.examples.walks import STEEP, random_state
 from tests.mujoco.export import Feet, model
 from tests.mujoco.ground import GROUNDS, Floats, Ground, LinearZone, Stick, ground_forces
 from tests.mujoco.motors import Gears, LooseGears, gears_of
@@ -23,33 +24,11 @@ VARIANTS = {
     "stick": RobotVariant(contact_law="stick"),
     "stick and backlash": RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
 }
-STEEP = Scenario(
-    name="steep",
-    cycle_time=1.5,
-    radius=0.16,
-    hip_height=0.15,
-    load=2.0,
-    slope=20.0,
-    slope_direction=30.0,
-)
 
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
     return load_robot("szabadka2")
-
-
-def random_state(rng: np.random.Generator, joints: int) -> tuple[Floats, Floats]:
-    """q and v as our kernel has them: quaternion x y z w, twist in the base's frame."""
-    quaternion = rng.normal(size=4)
-    q = np.concatenate(
-        [
-            rng.uniform([-1, -1, 0.0], [1, 1, 0.2]),
-            quaternion / np.linalg.norm(quaternion),
-            rng.uniform(-1.5, 1.5, joints),
-        ]
-    )
-    return q, rng.normal(size=6 + joints) * 3.0
 
 
 def into(d: mujoco.MjData, q: Floats, v: Floats) -> Floats:

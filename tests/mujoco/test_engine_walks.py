@@ -8,12 +8,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
 from sim.kernel.observation import WalkLog
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import simulate
+from tests.examples import walks
 from tests.mujoco.controllers import Coded, FuzzyPi, Pi
 from tests.mujoco.export import Feet
 from tests.mujoco.walker import Controller, Floats, Trace, drag_of, walk
@@ -25,7 +24,7 @@ KARNOPP, STICK = RobotVariant(contact_law="karnopp"), RobotVariant(contact_law="
 LOOSE = RobotVariant(backlash=(2.5, 1.0, 1.0))
 NORMAL_FAST, LOADED_FAST, LOADED_SLOW, SLOPE_FAST = (SCENARIOS[k] for k in (0, 2, 3, 4))
 DRIVES: Mapping[str, tuple[str, Mapping[str, float], type[Coded]]] = {
-    "published optimum A": ("fuzzy-pi", CONTROLLERS["fuzzy-pi"].published["A"], FuzzyPi),
+    "published optimum A": ("fuzzy-pi", walks.PUBLISHED_A, FuzzyPi),
     "stiff PI": ("pi", {"P": 0.45, "I": 0.2}, Pi),
 }
 ENERGY, RECIPROCAL_SPEED = 3, 4
@@ -48,8 +47,7 @@ def our_walk(
 ) -> tuple[Floats, WalkLog]:
     """Objectives and log of the compiled kernel's walk."""
     controller, design, _ = DRIVES[drive]
-    values = np.array([list(design.values())])
-    result = simulate(scenario, controller, list(design), values, robot=variant, log=True)
+    result = walks.walk(scenario, design, controller, robot=variant, log=True)
     (log,) = result.logs
     assert result.outcome.statuses.tolist() == [Status.OK]
     assert log is not None

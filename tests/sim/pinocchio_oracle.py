@@ -1,19 +1,17 @@
-"""Pinocchio's view of a robot, in our order of joints, and states to compare it in."""
+"""Pinocchio's view of a robot, in our order of joints."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from sim.robot import Robot, RobotFiles, load_robot
+from sim.robot import Robot, load_robot
 from sim.robot.urdf import parse_urdf
-
-QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
+from tests.examples.walks import quadruped_files
 
 ROBOTS = ("szabadka2", "quadruped", "turned quadruped")
 """One that ships, the example of one's own, and the same with every frame turned in its parent's:
@@ -25,12 +23,11 @@ def robot_named(name: str) -> Robot:
     """One of ROBOTS."""
     if name == "szabadka2":
         return load_robot(name)
-    toml = (QUADRUPED / "robot.toml").read_text(encoding="utf-8")
-    urdf = (QUADRUPED / "robot.urdf").read_text(encoding="utf-8")
-    robot = load_robot(RobotFiles(toml=toml, urdf=urdf))
+    files = quadruped_files()
+    robot = load_robot(files)
     if name == "turned quadruped":
         # Its feet cannot be planned, so it cannot be loaded; its dynamics are as good as any.
-        turned = urdf.replace("<origin xyz=", '<origin rpy="0.4 -0.7 0.9" xyz=')
+        turned = files.urdf.replace("<origin xyz=", '<origin rpy="0.4 -0.7 0.9" xyz=')
         return replace(robot, urdf=parse_urdf(turned))
     return robot
 
@@ -101,16 +98,3 @@ class Oracle:
             external[joint] = pin.Force(local, np.cross(lever, local))
             world.append(force)
         return external, np.array(world)
-
-
-def random_state(rng: np.random.Generator, joints: int) -> tuple[np.ndarray, np.ndarray]:
-    """A pose near walking height with any attitude, and violent velocities."""
-    quaternion = rng.normal(size=4)
-    q = np.concatenate(
-        [
-            rng.uniform([-1, -1, 0.0], [1, 1, 0.2]),
-            quaternion / np.linalg.norm(quaternion),
-            rng.uniform(-1.5, 1.5, joints),
-        ]
-    )
-    return q, rng.normal(size=6 + joints) * 3.0

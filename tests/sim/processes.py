@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from tests.examples.paths import ROOT
+from tests.examples.processes import python
+
+__all__ = ["ROOT", "run_python"]
 
 
 def run_python(
     code: str, *, timeout: float = 120.0, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-P", "-W", "default", "-c", code],
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        check=False,
-    )
+    """Statements, with all warnings shown."""
+    return python("-P", "-W", "default", "-c", code, environment=environment, timeout=timeout)

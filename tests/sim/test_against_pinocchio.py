@@ -14,21 +14,12 @@ from sim.kernel.parameters import Floats, gravity_on, pack_parameters
 from sim.kernel.physics_step import base_inertia, link_states, physics_model
 from sim.kernel.spatial import Matrix, add, apply, cross, dot, rotation_of, scale
 from sim.robot import Robot
-from sim.scenario import Scenario
-from tests.sim.pinocchio_oracle import ROBOTS, Oracle, random_state, robot_named
+from tests.examples.walks import STEEP, random_state
+from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named
 
 pytestmark = pytest.mark.slow
 
 STATES = 500
-STEEP = Scenario(
-    name="steep",
-    cycle_time=1.5,
-    radius=0.16,
-    hip_height=0.15,
-    load=2.0,
-    slope=20.0,
-    slope_direction=30.0,
-)
 
 
 class Found:

@@ -11,8 +11,9 @@ import pytest
 from sim.kernel.parameters import gravity_on, pack_parameters
 from sim.kernel.physics_step import PhysicsModel, physics_model
 from sim.robot import Robot, parse_robot
-from sim.scenario import SCENARIOS, Scenario
-from tests.sim.pinocchio_oracle import ROBOTS, Oracle, random_state, robot_named
+from sim.scenario import SCENARIOS
+from tests.examples.walks import random_state, short_walk
+from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named
 
 pytestmark = pytest.mark.slow
 
@@ -33,7 +34,7 @@ def test_accelerations_agree_with_pinocchio_in_a_thousand_random_states(
     oracle = Oracle(robot)
     rng = np.random.default_rng(7)
     actuators, supply = robot.actuators(), robot.description.supply
-    slope = Scenario(name="steep", cycle_time=1.5, radius=0.16, hip_height=0.15, slope=20.0)
+    slope = short_walk(slope=20.0)
     oracle.model.gravity.linear = gravity_on(slope.slope)
     p = pack_parameters(robot, slope, 2e-4)
     touching, worst = 0, 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,10 +11,9 @@ from sim.errors import RobotFileError
 from sim.former_names import as_written
 from sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot, parse_robot
 from sim.scenario import Scenario
+from tests.examples.walks import quadruped_files
 
-QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
-TOML = (QUADRUPED / "robot.toml").read_text(encoding="utf-8")
-URDF = (QUADRUPED / "robot.urdf").read_text(encoding="utf-8")
+TOML, URDF = quadruped_files().toml, quadruped_files().urdf
 
 TIBIA = "[actuators.tibia]"
 WALK = {"name": "own", "cycle_time": 1.5, "radius": 0.16}

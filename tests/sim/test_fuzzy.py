@@ -14,6 +14,7 @@ from sim.controllers.fuzzy_pi_3 import integral_system
 from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape, output_points
 from sim.controllers.native_inference import infer
 from sim.controllers.quantisation import Axis, quantised, table_bytes
+from tests.examples.walks import PUBLISHED_A
 
 WEIGHTS = st.floats(0.1, 1.0)
 
@@ -121,13 +122,13 @@ def test_table_memory_follows_equation_5_1() -> None:
     assert table_bytes((10, 6), 8) == 64 * 1024
     assert table_bytes((8, 8), 8) == 64 * 1024
     assert table_bytes((6, 6, 6), 8, outputs=2) == 512 * 1024
-    law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    law = CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A)
     assert law.direct is not None
     assert law.direct.values.nbytes == table_bytes((10, 6), 8)
 
 
 def test_the_laws_scales_are_those_of_the_ranges() -> None:
-    law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    law = CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A)
     table = law.direct
     assert table is not None
     assert (5837 * table.error_gain + (1 << 15)) >> 16 == 511

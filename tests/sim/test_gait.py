@@ -16,11 +16,6 @@ from sim.robot.posture import feet_below_body, resting_height
 from sim.scenario import SCENARIOS
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return load_robot("szabadka2")
-
-
 def test_support_is_a_straight_line_at_constant_speed_and_swing_a_half_ellipse() -> None:
     phase = np.linspace(0.0, 1.0, 1001)[:-1]
     forward, lift = half_ellipse(phase, stride=0.16, height=0.03, duty_factor=0.56)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from sim.errors import SimulationInputError
 from sim.kernel.parameters import Layout, pack_parameters
-from sim.robot import RobotFiles, load_robot
+from sim.robot import load_robot
 from sim.robot.identifiable import (
     identifiable_variables,
     with_parameters,
 )
 from sim.robot.robot import Robot
 from sim.scenario import SCENARIOS
-
-QUADRUPED = Path(__file__).parents[2] / "examples" / "quadruped"
+from tests.examples.walks import quadruped_files
 
 
 def packed(robot: Robot) -> np.ndarray:
@@ -56,10 +53,7 @@ def test_the_hexapod_has_the_45_of_the_thesis() -> None:
 
 
 def test_a_robot_of_ones_own_has_those_of_its_own_legs() -> None:
-    files = RobotFiles(
-        toml=(QUADRUPED / "robot.toml").read_text(), urdf=(QUADRUPED / "robot.urdf").read_text()
-    )
-    robot = load_robot(files)
+    robot = load_robot(quadruped_files())
     names = [variable.name for variable in identifiable_variables(robot)]
     assert len(names) == 3 + 3 * 4 + 4 * 4
     changed = with_parameters(robot, {names[-1]: 0.33})

@@ -20,16 +20,12 @@ from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import lanes, simulate
+from tests.examples import walks
+from tests.examples.walks import PUBLISHED_A
 
 FUZZY = CONTROLLERS["fuzzy-pi"]
-OPTIMUM = FUZZY.published["A"]
 BACKLASH = RobotVariant(backlash=(2.5, 1.0, 1.0))
 SHORT = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.4})
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return load_robot("szabadka2")
 
 
 def swarm(n: int, seed: int = 5) -> np.ndarray:
@@ -51,11 +47,7 @@ def walk(designs: np.ndarray, scenario: Scenario = SHORT) -> np.ndarray:
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_compiled_and_readable_kernel_agree(scenario: Scenario) -> None:
     brief = scenario.model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
-    design = np.array([list(OPTIMUM.values())])
-    results = [
-        simulate(brief, "fuzzy-pi", list(OPTIMUM), design, backend=backend, log=True)
-        for backend in ("native", "reference")
-    ]
+    results = [walks.walk(brief, backend=b, log=True) for b in ("native", "reference")]
     fast, slow = results
     assert fast.outcome.statuses.tolist() == slow.outcome.statuses.tolist() == [Status.OK]
     np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
@@ -94,7 +86,7 @@ def test_a_log_does_not_change_the_walk() -> None:
 def _setup(robot: Robot, kernel: Kernel, scenario: Scenario) -> WalkSetup:
     plan = plan_walk(robot, scenario, 1.0 / PHYSICS_RATE)
     assert plan is not None
-    return plan(FUZZY.compile(OPTIMUM))
+    return plan(FUZZY.compile(PUBLISHED_A))
 
 
 def _sums(kernel: Kernel, setups: Sequence[WalkSetup], robot: Robot) -> list[tuple[Status, bytes]]:
@@ -236,9 +228,7 @@ def test_a_standing_robot_carries_its_weight(robot: Robot, kind: str) -> None:
 
 def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
     """The winding's inductance, solved exactly over the logged voltages and speeds."""
-    design = np.array([list(OPTIMUM.values())])
-    (log,) = simulate(SHORT, "fuzzy-pi", list(OPTIMUM), design, log=True).logs
-    assert log is not None
+    log = walks.logged_walk(SHORT)
     actuators = robot.actuators()
     steps = 10
     decay = np.exp(-actuators.resistance / actuators.inductance / PHYSICS_RATE)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from importlib import resources
 from pathlib import Path
 
@@ -12,8 +10,8 @@ import pytest
 
 from sim.provenance import Provenance, provenance_of, simulator_files, source_digest
 from sim.robot import RobotFiles, RobotVariant
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.examples.paths import ROOT
+from tests.examples.processes import python
 
 PROGRAM = """
 import json, sys
@@ -42,13 +40,8 @@ SHIPPED = RobotFiles(toml=robot_file("robot.toml"), urdf=robot_file("robot.urdf"
 
 @pytest.mark.slow
 def test_all_modules_that_a_case_runs_through_are_in_the_digest_which_any_process_finds() -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", PROGRAM],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = python("-W", "ignore", "-c", PROGRAM)
+    assert done.returncode == 0, done.stderr
     found, loaded = json.loads(done.stdout)
     assert Provenance(**found) == provenance_of("szabadka2")
     covered = set(simulator_files())

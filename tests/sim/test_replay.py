@@ -8,33 +8,25 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.controllers import CONTROLLERS
 from sim.kernel.observation import WalkLog
 from sim.outcome import Status
 from sim.replay import Replay, replay, ticks_at
-from sim.robot import Robot, RobotVariant, load_robot, parse_robot
+from sim.robot import Robot, RobotVariant, load_robot
 from sim.robot.posture import feet_below_body
 from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import simulate
-from tests.setup.documents import ROOT
+from tests.examples.paths import QUADRUPED
+from tests.examples.walks import quadruped_files, walk
 
 pytestmark = pytest.mark.slow
 
-DESIGN = CONTROLLERS["fuzzy-pi"].published["A"]
 BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0})
 
 
 def walked(robot: Robot, scenario: Scenario = BRIEF) -> tuple[WalkLog, Status]:
-    design = np.array([list(DESIGN.values())])
-    walk = simulate(scenario, "fuzzy-pi", list(DESIGN), design, robot=robot, log=True)
-    (log,) = walk.logs
+    result = walk(scenario, robot=robot, log=True)
+    (log,) = result.logs
     assert log is not None
-    return log, Status(walk.outcome.statuses[0])
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return load_robot("szabadka2")
+    return log, Status(result.outcome.statuses[0])
 
 
 @pytest.fixture(scope="module")
@@ -130,12 +122,11 @@ def test_frames_are_the_nearest_ticks_with_their_exact_time(
 
 
 def test_the_bodys_acceleration_is_the_objectives(robot: Robot) -> None:
-    design = np.array([list(DESIGN.values())])
-    walk = simulate(SCENARIOS[0], "fuzzy-pi", list(DESIGN), design, log=True)
-    assert walk.logs[0] is not None
-    norm = np.linalg.norm(replay(robot, walk.logs[0], rate=500).body_acceleration, axis=1)
+    result = walk(SCENARIOS[0], log=True)
+    assert result.logs[0] is not None
+    norm = np.linalg.norm(replay(robot, result.logs[0], rate=500).body_acceleration, axis=1)
     # f2 sees every physics step, the log differences over 4 ms.
-    assert np.sqrt(np.mean(norm**2)) == pytest.approx(walk.outcome.objectives[0, 1], rel=0.03)
+    assert np.sqrt(np.mean(norm**2)) == pytest.approx(result.outcome.objectives[0, 1], rel=0.03)
 
 
 def test_with_backlash_the_link_is_shown_not_its_motor() -> None:
@@ -179,12 +170,9 @@ def test_a_walk_that_hardly_began_can_be_shown(robot: Robot, log: WalkLog, ticks
 
 
 def test_a_robot_of_ones_own_is_shown() -> None:
-    folder = ROOT / "examples" / "quadruped"
-    robot = parse_robot(
-        (folder / "robot.toml").read_text(encoding="utf-8"),
-        (folder / "robot.urdf").read_text(encoding="utf-8"),
-    )
-    scenario = Scenario.model_validate_json((folder / "crawl.json").read_text(encoding="utf-8"))
+    robot = load_robot(quadruped_files())
+    crawl = (QUADRUPED / "crawl.json").read_text(encoding="utf-8")
+    scenario = Scenario.model_validate_json(crawl)
     log, _ = walked(robot, scenario.model_copy(update={"cycles": 1.0}))
     shown: Replay = replay(robot, log, rate=50)
     assert len(shown.links) == 1 + 4 * 4

@@ -8,17 +8,13 @@ import pickle
 import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError, UnreachablePose
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.scenario import SCENARIOS, Scenario, find_scenario
 from sim.simulate import check_reach, simulate
+from tests.examples.walks import PUBLISHED_A, walk
 
 pytestmark = pytest.mark.slow
-
-OPTIMUM = CONTROLLERS["fuzzy-pi"].published["A"]
-NAMES = list(OPTIMUM)
-DESIGN = np.array([list(OPTIMUM.values())])
 
 
 def intended_speed(scenario: Scenario) -> float:
@@ -29,7 +25,7 @@ def intended_speed(scenario: Scenario) -> float:
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_the_published_optimum_walks(scenario: Scenario) -> None:
-    outcome = simulate(scenario, "fuzzy-pi", NAMES, DESIGN).outcome
+    outcome = walk(scenario).outcome
     assert outcome.statuses.tolist() == [Status.OK]
     torque, acceleration, angular, energy, reciprocal_speed, height_loss = outcome.objectives[0]
     # Its soft drive lags, and swings further than asked where the gait is near its resonance.
@@ -43,7 +39,7 @@ def test_the_published_optimum_walks(scenario: Scenario) -> None:
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_a_stiff_drive_walks_at_the_speed_that_the_gait_intends(scenario: Scenario) -> None:
-    outcome = simulate(scenario, "pi", ["P", "I"], np.array([[1.0, 0.0]])).outcome
+    outcome = walk(scenario, {"P": 1.0, "I": 0.0}, "pi").outcome
     assert outcome.statuses.tolist() == [Status.OK]
     assert 0.9 < 1.0 / (outcome.objectives[0, 4] * intended_speed(scenario)) < 1.02
 
@@ -51,7 +47,7 @@ def test_a_stiff_drive_walks_at_the_speed_that_the_gait_intends(scenario: Scenar
 def test_a_load_costs_torque_and_energy() -> None:
     free = SCENARIOS[0]
     laden = free.model_copy(update={"load": 2.0})
-    light, heavy = (simulate(s, "fuzzy-pi", NAMES, DESIGN).outcome for s in (free, laden))
+    light, heavy = (walk(s).outcome for s in (free, laden))
     for name in ("torque", "energy"):
         column = OBJECTIVE_NAMES.index(name)
         assert heavy.objectives[0, column] > 1.05 * light.objectives[0, column]
@@ -62,16 +58,14 @@ def test_climbing_is_slower_than_descending() -> None:
     assert up.slope > 0.0
     down = up.model_copy(update={"slope": -up.slope})
     column = OBJECTIVE_NAMES.index("reciprocal_speed")
-    climb, descent = (
-        simulate(s, "fuzzy-pi", NAMES, DESIGN).outcome.objectives[0, column] for s in (up, down)
-    )
+    climb, descent = (walk(s).outcome.objectives[0, column] for s in (up, down))
     assert climb > descent
 
 
 @pytest.mark.parametrize("turn", [0.5, -0.5])
 def test_a_turn_bends_to_its_side_and_distance_follows_the_heading(turn: float) -> None:
     scenario = SCENARIOS[5].model_copy(update={"turn": turn})
-    result = simulate(scenario, "fuzzy-pi", NAMES, DESIGN, log=True)
+    result = walk(scenario, log=True)
     (log,) = result.logs
     assert log is not None
     x, y, z, w = log.base_orientation[-1]
@@ -84,25 +78,23 @@ def test_a_turn_bends_to_its_side_and_distance_follows_the_heading(turn: float) 
 
 
 def test_a_gait_of_the_design_replaces_the_scenarios() -> None:
-    slow = simulate(
-        SCENARIOS[0], "fuzzy-pi", [*NAMES, "cycle_time"], np.c_[DESIGN, [[2.2]]]
-    ).outcome
-    expected = simulate(SCENARIOS[1], "fuzzy-pi", NAMES, DESIGN).outcome
+    slow = walk(SCENARIOS[0], PUBLISHED_A | {"cycle_time": 2.2}).outcome
+    expected = walk(SCENARIOS[1]).outcome
     np.testing.assert_array_equal(slow.objectives, expected.objectives)
 
 
 def test_stepped_signals_shake_the_body() -> None:
     rough = SCENARIOS[0].model_copy(update={"trajectory_rate": 20.0, "fir_ms": 4})
     shaken, smooth = (
-        simulate(s, "pi", ["P", "I"], np.array([[0.25, 0.0]])).outcome.objectives[0, 1]
-        for s in (rough, SCENARIOS[0])
+        walk(s, {"P": 0.25, "I": 0.0}, "pi").outcome.objectives[0, 1] for s in (rough, SCENARIOS[0])
     )
     assert shaken > 1.5 * smooth
 
 
 def test_bad_designs_are_statuses_beside_good_ones() -> None:
-    wide = np.array([[*DESIGN[0], 0.16], [*DESIGN[0], 0.60]])
-    outcome = simulate(SCENARIOS[2], "fuzzy-pi", [*NAMES, "stride"], wide).outcome
+    published = list(PUBLISHED_A.values())
+    wide = np.array([[*published, 0.16], [*published, 0.60]])
+    outcome = simulate(SCENARIOS[2], "fuzzy-pi", [*PUBLISHED_A, "stride"], wide).outcome
     assert outcome.statuses.tolist() == [Status.OK, Status.UNREACHABLE]
     assert np.isnan(outcome.objectives[1]).all()
     limp = simulate(SCENARIOS[0], "pi", ["P", "I"], np.array([[0.0, 0.0], [0.3, 0.1]])).outcome
@@ -112,7 +104,7 @@ def test_bad_designs_are_statuses_beside_good_ones() -> None:
 
 def test_an_overloaded_robot_falls() -> None:
     crushed = SCENARIOS[0].model_copy(update={"load": 50.0})
-    assert simulate(crushed, "fuzzy-pi", NAMES, DESIGN).outcome.statuses.tolist() == [Status.FELL]
+    assert walk(crushed).outcome.statuses.tolist() == [Status.FELL]
 
 
 def test_every_status_has_a_phrase_and_a_label() -> None:
@@ -144,14 +136,14 @@ def test_an_unreachable_pose_names_scenario_leg_and_miss() -> None:
     ],
 )
 def test_bad_input_names_the_variable(change: dict[str, float], message: str) -> None:
-    design = {**OPTIMUM, **change}
     with pytest.raises(SimulationInputError, match=message):
-        simulate(SCENARIOS[0], "fuzzy-pi", list(design), np.array([list(design.values())]))
+        walk(SCENARIOS[0], PUBLISHED_A | change)
 
 
 def test_a_missing_variable_is_named() -> None:
+    design = {name: value for name, value in PUBLISHED_A.items() if name != "FW56"}
     with pytest.raises(SimulationInputError, match="FW56: missing"):
-        simulate(SCENARIOS[0], "fuzzy-pi", NAMES[:-1], DESIGN[:, :-1])
+        walk(SCENARIOS[0], design)
 
 
 def test_scenarios_are_found_by_name_and_number() -> None:

@@ -9,16 +9,11 @@ import pinocchio as pin
 import pytest
 
 from sim.errors import RobotFileError
-from sim.robot import Robot, load_robot
+from sim.robot import Robot
 from sim.robot.shapes import Shape, VisibleLink, visible_links
 from sim.robot.urdf import parse_urdf
 
 WITHOUT = '<link name="body">'
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return load_robot("szabadka2")
 
 
 def with_geometry(robot: Robot, geometry: str) -> Robot:

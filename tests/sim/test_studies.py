@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from sim.assembly import PHYSICS_RATE, plan_walk
-from sim.controllers import CONTROLLERS
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.errors import SimulationInputError
 from sim.kernel.native import native_kernel
@@ -15,10 +14,10 @@ from sim.robot import load_robot
 from sim.scenario import SCENARIOS
 from sim.studies.accuracy import noise_on_links, step_halving, tables_against_inference
 from sim.studies.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
+from tests.examples.walks import PUBLISHED_A
 
 pytestmark = pytest.mark.slow
 
-OPTIMUM = CONTROLLERS["fuzzy-pi"].published["A"]
 BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
 
 
@@ -55,7 +54,7 @@ def test_an_unknown_drive_is_answered_with_those_that_exist() -> None:
 
 
 def test_finer_tables_are_closer_to_the_inference() -> None:
-    coarse, _, fine = tables_against_inference(OPTIMUM, [BRIEF])
+    coarse, _, fine = tables_against_inference(PUBLISHED_A, [BRIEF])
     assert (coarse.variant, fine.variant) == ("6x6 bit", "10x6 bit")
     assert fine.relative[:5].max() < 0.02
     assert 0.0 < fine.relative[:5].mean() < coarse.relative[:5].mean() < 0.05
@@ -68,11 +67,11 @@ def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
     plan = plan_walk(robot, BRIEF, 1.0 / PHYSICS_RATE)
     assert plan is not None
     with pytest.raises(SimulationInputError, match="backend='reference'"):
-        kernel.walk([plan(FuzzyPi().without_table(OPTIMUM))], Coding.of(robot, 10), log=False)
+        kernel.walk([plan(FuzzyPi().without_table(PUBLISHED_A))], Coding.of(robot, 10), log=False)
 
 
 def test_five_kilohertz_keep_every_objective_within_one_percent() -> None:
-    found = step_halving("fuzzy-pi", OPTIMUM)
+    found = step_halving("fuzzy-pi", PUBLISHED_A)
     assert [(d.variant, d.scenario) for d in found] == [
         (rate, scenario.name) for scenario in SCENARIOS for rate in ("5 kHz", "10 kHz", "20 kHz")
     ]

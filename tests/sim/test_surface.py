@@ -11,20 +11,20 @@ from sim.controllers.fuzzy_pi import inference_system
 from sim.controllers.fuzzy_pi_3 import integral_system
 from sim.controllers.mamdani import Shape
 from sim.controllers.surface import Surface, surface
+from tests.examples.walks import PUBLISHED_A
 
-DESIGN = CONTROLLERS["fuzzy-pi"].published["A"]
-DESIGN_3 = CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"]
+CHAPTER_3 = CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"]
 
 
 @pytest.fixture(scope="module")
 def fuzzy_p() -> Surface:
-    (source,) = CONTROLLERS["fuzzy-pi"].inferences(DESIGN)
+    (source,) = CONTROLLERS["fuzzy-pi"].inferences(PUBLISHED_A)
     return surface(source, error_points=65, current_points=33)
 
 
 @pytest.fixture(scope="module")
 def integral() -> Surface:
-    _, source = CONTROLLERS["fuzzy-pi-3"].inferences(DESIGN_3)
+    _, source = CONTROLLERS["fuzzy-pi-3"].inferences(CHAPTER_3)
     return surface(source, error_points=33, current_points=17, velocity=6000.0)
 
 
@@ -37,7 +37,7 @@ def test_the_inference_is_that_of_the_normalised_system(fuzzy_p: Surface) -> Non
 
 
 def test_the_table_is_that_of_the_drive_that_walks(fuzzy_p: Surface) -> None:
-    table = CONTROLLERS["fuzzy-pi"].compile(DESIGN).direct
+    table = CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A).direct
     assert isinstance(table, LookupTable)
     error, current = (fuzzy_p.inputs[name].values for name in ("error", "current"))
     for k, n in ((0, 0), (17, 30), (50, 9), (64, 32)):

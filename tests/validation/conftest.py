@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
 from sim.kernel.observation import WalkLog
 from sim.measurement.measured_csv import format_measured_log
 from sim.measurement.measured_log import MeasuredLog, simulated_log
 from sim.measurement.synthetic import synthetic_log
 from sim.robot import Robot, load_robot
 from sim.scenario import Scenario, find_scenario
-from sim.simulate import simulate
-
-DESIGN = CONTROLLERS["fuzzy-pi"].published["A"]
+from tests.examples.walks import PUBLISHED_A, logged_walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +28,8 @@ class TwoWalks:
 @pytest.fixture(scope="session")
 def walks() -> TwoWalks:
     robot, scenario = load_robot("szabadka2"), find_scenario("normal-fast")
-    values = np.array([list(DESIGN.values())])
-    (walk,) = simulate(scenario, "fuzzy-pi", list(DESIGN), values, log=True).logs
-    assert walk is not None
-    synthetic = synthetic_log(robot, scenario, "fuzzy-pi", DESIGN, seed=7)
+    walk = logged_walk(scenario)
+    synthetic = synthetic_log(robot, scenario, "fuzzy-pi", PUBLISHED_A, seed=7)
     return TwoWalks(
         robot,
         scenario,

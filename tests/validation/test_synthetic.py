@@ -17,10 +17,10 @@ from sim.measurement.synthetic import (
     perturbed,
     synthetic_log,
 )
-from sim.simulate import simulate
 from sim.validation.comparison import compare
 from sim.validation.measures import Tolerance
-from tests.validation.conftest import DESIGN, TwoWalks
+from tests.examples.walks import PUBLISHED_A, logged_walk
+from tests.validation.conftest import TwoWalks
 
 pytestmark = pytest.mark.slow
 
@@ -46,10 +46,8 @@ def test_a_simulated_walk_has_every_quantity_in_its_unit(walks: TwoWalks) -> Non
 
 def test_backlash_shows_between_encoder_and_potentiometer(walks: TwoWalks) -> None:
     robot = perturbed(walks.robot, NO_CHANGE.model_copy(update={"backlash": 0.04}))
-    values = np.array([list(DESIGN.values())])
     one = walks.scenario.model_copy(update={"cycles": 1.0})
-    (walk,) = simulate(one, "fuzzy-pi", list(DESIGN), values, robot=robot, log=True).logs
-    assert walk is not None
+    walk = logged_walk(one, robot=robot)
     log = simulated_log(robot, walk)
     assert log.potentiometer is not None
     assert 0.015 < np.abs(log.joint_angle - log.potentiometer).max() < 0.05
@@ -98,7 +96,7 @@ def test_a_synthetic_log_says_so_in_its_file(walks: TwoWalks) -> None:
 
 
 def test_another_seed_changes_the_noise_alone(walks: TwoWalks) -> None:
-    other = synthetic_log(walks.robot, walks.scenario, "fuzzy-pi", DESIGN, seed=8)
+    other = synthetic_log(walks.robot, walks.scenario, "fuzzy-pi", PUBLISHED_A, seed=8)
     for quantity in Quantity:
         differs = bool((other.values(quantity) != walks.synthetic.values(quantity)).any())
         # What the robot computes and what its encoders count has no noise.
@@ -120,7 +118,7 @@ def test_an_unperturbed_twin_with_perfect_instruments_agrees_but_for_the_convert
         walks.robot,
         walks.scenario,
         "fuzzy-pi",
-        DESIGN,
+        PUBLISHED_A,
         seed=1,
         perturbation=NO_CHANGE,
         instruments=PERFECT,
@@ -178,6 +176,6 @@ def test_currents_pass_a_converter_of_12_bits(walks: TwoWalks) -> None:
 def test_a_twin_that_falls_has_no_log(walks: TwoWalks) -> None:
     crushed = walks.scenario.model_copy(update={"load": 50.0})
     with pytest.raises(SimulationInputError, match="did not walk to the end"):
-        synthetic_log(walks.robot, crushed, "fuzzy-pi", DESIGN, seed=1)
+        synthetic_log(walks.robot, crushed, "fuzzy-pi", PUBLISHED_A, seed=1)
     with pytest.raises(SimulationInputError, match="seed"):
-        synthetic_log(walks.robot, walks.scenario, "fuzzy-pi", DESIGN, seed=-1)
+        synthetic_log(walks.robot, walks.scenario, "fuzzy-pi", PUBLISHED_A, seed=-1)

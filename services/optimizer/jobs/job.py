@@ -186,7 +186,7 @@ class Job:
     Attributes:
         id: twelve letters and digits.
         stored_spec: resolved, as `Spec.resolved` has it; its `iterations` are the present budget.
-            None if this version cannot read it.
+            An `UnreadableSpec` if this version cannot read it.
         state: where it is in its life.
         created_at: when it was submitted.
         updated_at: when its state or progress last changed.

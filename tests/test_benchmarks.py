@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.examples.processes import python
 
 
 @pytest.mark.slow
 def test_the_physics_benchmark_tells_ratios() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.physics", "--rounds", "1", "--json"],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = python("-m", "benchmarks.physics", "--rounds", "1", "--json")
     assert done.returncode == 0, done.stderr
     rows = json.loads(done.stdout)
     assert len(rows) == 3
@@ -38,15 +26,7 @@ def test_the_physics_benchmark_tells_ratios() -> None:
 @pytest.mark.slow
 def test_the_history_benchmark_reads_a_store_of_its_own() -> None:
     options = ["--jobs", "8", "--iterations", "20", "--repeats", "1", "--json"]
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.history", *options],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = python("-m", "benchmarks.history", *options)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["evaluations"] == 500

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.examples.paths import ROOT
 
 PROGRAM = """
 import importlib, json, pkgutil, sys, threading

@@ -6,7 +6,6 @@ import ast
 import inspect
 import json
 import re
-import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -18,8 +17,8 @@ from typing import Any
 import pytest
 
 import gaitswarm
-
-ROOT = Path(__file__).parents[2]
+from tests.examples.paths import ROOT
+from tests.examples.processes import python
 
 
 def declared() -> dict[str, str]:
@@ -50,9 +49,7 @@ def test_importing_it_imports_nothing_else_of_size() -> None:
         "import json, sys; before = set(sys.modules); import gaitswarm; import gaitswarm.jobs;"
         "print(json.dumps(sorted({m.split('.')[0] for m in set(sys.modules) - before})))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
-    )
+    done = python("-c", program)
     assert set(json.loads(done.stdout)) - sys.stdlib_module_names == {"gaitswarm"}
 
 

@@ -12,6 +12,7 @@ import pytest
 import gaitswarm
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
 from sim.outcome import OBJECTIVE_NAMES
+from tests.examples.paths import QUADRUPED
 
 pytestmark = pytest.mark.slow
 
@@ -103,9 +104,10 @@ def test_a_scenario_of_ones_own_walks_as_object_and_as_document() -> None:
 
 
 def test_a_robot_is_a_name_a_variant_or_a_folder() -> None:
-    folder = Path(__file__).parents[2] / "examples" / "quadruped"
-    crawl = json.loads((folder / "crawl.json").read_text(encoding="utf-8"))
-    by_path, by_name = (simulate(robot=robot, scenarios=crawl) for robot in (folder, str(folder)))
+    crawl = json.loads((QUADRUPED / "crawl.json").read_text(encoding="utf-8"))
+    by_path, by_name = (
+        simulate(robot=robot, scenarios=crawl) for robot in (QUADRUPED, str(QUADRUPED))
+    )
     assert by_path.objectives.tolist() == by_name.objectives.tolist()
     variant = simulate(robot=gaitswarm.RobotVariant(contact_law="karnopp"))
     assert variant.objectives.tolist() != simulate().objectives.tolist()

@@ -19,14 +19,15 @@ from sim.robot import RobotVariant
 from sim.scenario import Scenario
 from sim.simulate import Simulation, simulate
 from sim.variables import Variable
+from tests.examples.walks import SHORT_WALK
 from tests.optimizer.formula import job
 
 SPEC = JobSpec.model_validate(
     {
         "controller": "pi",
         "scenarios": [
-            {"name": "one", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 2.0},
-            {"name": "two", "cycle_time": 1.0, "radius": 0.16, "hip_height": 0.15, "cycles": 1.0},
+            SHORT_WALK | {"name": "one", "cycle_time": 1.5, "cycles": 2},
+            SHORT_WALK | {"name": "two"},
         ],
         "optimizer": {"particles": 10},
         "iterations": 5,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -22,17 +20,10 @@ from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
 from services.optimizer.store.base import Store
-from services.optimizer.store.sql_store import open_store
+from tests.examples.jobs import Bits, history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
 
 BUDGET = SPEC.iterations
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = open_store(f"sqlite:///{tmp_path}/jobs.db")
-    yield opened
-    opened.close()
 
 
 class CrashError(Exception):
@@ -67,12 +58,7 @@ def finished(store: Store) -> str:
     return job_id
 
 
-def history(store: Store, job_id: str) -> list[tuple[int, bytes, bytes, float]]:
-    found = store.evaluations_between(job_id, 0, 1000)
-    return [(e.iteration, e.design.tobytes(), e.objectives.tobytes(), e.fitness) for e in found]
-
-
-def until(found: list[tuple[int, bytes, bytes, float]], iterations: int) -> list[object]:
+def until(found: list[Bits], iterations: int) -> list[Bits]:
     return [row for row in found if row[0] < iterations]
 
 

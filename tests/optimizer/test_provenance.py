@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -24,7 +24,6 @@ from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
 from services.optimizer.search.pso import ParticleSwarm
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
-from services.optimizer.store.sql_store import open_store
 from sim.errors import RobotFileError
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
 
@@ -48,13 +47,6 @@ CHANGES = [
         "other code of search and judgement",
     ),
 ]
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = open_store(f"sqlite:///{tmp_path}/jobs.db")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

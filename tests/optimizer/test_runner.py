@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partialmethod
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,30 +19,17 @@ from services.optimizer.run.coordinator import Backoff
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.runner import Runner, Surroundings, run_claim
 from services.optimizer.store.base import Store
-from services.optimizer.store.sql_store import open_store
 from services.runtime import run_embedded
 from sim.errors import SimulationInputError
 from sim.outcome import Outcome
+from tests.examples.jobs import history
+from tests.examples.processes import eventually
 from tests.optimizer.formula import SPEC, FormulaEvaluator
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = open_store(f"sqlite:///{tmp_path}/jobs.db")
-    yield opened
-    opened.close()
 
 
 def queue(store: Store, spec: JobSpec = SPEC) -> str:
     job, _ = store.create_job(spec)
     return job.id
-
-
-def eventually(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen within 20 s"
-        time.sleep(0.01)
 
 
 def run(
@@ -53,11 +39,6 @@ def run(
     assert claim is not None
     around = replace(Surroundings(store, evaluator, lease_seconds=0.3), **given)  # type: ignore[arg-type]
     return run_claim(claim, around, stop)
-
-
-def history(store: Store, job_id: str) -> list[tuple[bytes, bytes, float]]:
-    found = store.evaluations_between(job_id, 0, 1000)
-    return [(e.design.tobytes(), e.objectives.tobytes(), e.fitness) for e in found]
 
 
 def test_a_claimed_job_runs_to_its_end(store: Store) -> None:

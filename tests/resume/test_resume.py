@@ -6,7 +6,6 @@ import os
 import random
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -19,25 +18,19 @@ from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
 from services.optimizer.store.base import Store
-from services.runtime import open_evaluator, open_store, run_embedded
+from services.runtime import open_evaluator, run_embedded
+from tests.examples.jobs import history
+from tests.examples.processes import output, start_python
+from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 
 pytestmark = pytest.mark.slow
-
-ROOT = Path(__file__).resolve().parents[2]
 
 SPEC = JobSpec.model_validate(
     {
         "controller": "fuzzy-pi",
         "scenarios": [
-            {"name": "level", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "cycles": 2},
-            {
-                "name": "uphill",
-                "cycle_time": 1.5,
-                "radius": 0.2,
-                "hip_height": 0.14,
-                "slope": 10.0,
-                "cycles": 2,
-            },
+            SHORT_WALK | {"name": "level", "cycle_time": 1.5, "cycles": 2},
+            UPHILL_WALK | {"cycles": 2},
         ],
         "optimizer": {"name": "pso", "particles": 5},
         "iterations": 12,
@@ -54,35 +47,13 @@ def evaluator() -> Iterator[Evaluator]:
 
 
 @pytest.fixture
-def url(tmp_path: Path) -> str:
-    return f"sqlite:///{tmp_path}/jobs.db"
-
-
-@pytest.fixture
-def store(url: str) -> Iterator[Store]:
-    opened = open_store(url)
-    yield opened
-    opened.close()
+def url(database: Path) -> str:
+    return f"sqlite:///{database}"
 
 
 def queue(store: Store, spec: JobSpec = SPEC) -> str:
     job, _ = store.create_job(spec)
     return job.id
-
-
-def history(store: Store, job_id: str) -> list[tuple[int, int, bytes, bytes, bytes, float]]:
-    """All that is remembered of every evaluation, to the bit, and nothing that is measured."""
-    return [
-        (
-            e.iteration,
-            e.particle,
-            e.design.tobytes(),
-            e.objectives.tobytes(),
-            e.statuses.tobytes(),
-            e.fitness,
-        )
-        for e in store.evaluations_between(job_id, 0, 1_000_000)
-    ]
 
 
 def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
@@ -92,20 +63,14 @@ def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
 
 
 def start(url: str, job_id: str, kind: str = "in-process") -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, str(ROOT / "tests/resume/job_process.py"), url, job_id, kind],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    arguments = ("-m", "tests.resume.job_process", url, job_id, kind)
+    return start_python(*arguments, stderr=None, start_new_session=True)
 
 
 def kill_group(process: subprocess.Popen[str]) -> None:
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    assert process.stdout is not None
-    process.stdout.close()
+    output(process.stdout).close()
 
 
 def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: Evaluator) -> None:
@@ -120,8 +85,7 @@ def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: 
     while len(progress) < 5 and (not progress or progress[-1] < SPEC.iterations - 4):
         process = start(url, job_id)
         # A life begins at its first commit, so that start-up is not all that is killed.
-        assert process.stdout is not None
-        process.stdout.readline()
+        output(process.stdout).readline()
         time.sleep(chance.uniform(0.0, 1.5 * one_iteration))
         kill_group(process)
         progress.append(store.job(job_id).progress.iterations)
@@ -141,8 +105,7 @@ def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
     for job_id in (whole, killed):
         store.extend(job_id, SPEC.iterations + 3)
     process = start(url, killed)
-    assert process.stdout is not None
-    process.stdout.readline()
+    output(process.stdout).readline()
     kill_group(process)
     assert store.job(killed).progress.iterations > SPEC.iterations
     last = start(url, killed)
@@ -160,8 +123,7 @@ def test_a_job_resumed_on_ray_equals_one_run_in_threads(
     whole = run_alone(store, evaluator)
     job_id = queue(store)
     killed = start(url, job_id, "ray")
-    assert killed.stdout is not None
-    killed.stdout.readline()
+    output(killed.stdout).readline()
     kill_group(killed)
     resumed = start(url, job_id, "ray")
     resumed.communicate(timeout=120)

@@ -21,8 +21,8 @@ import yaml
 from api.app import create_app
 from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
+from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
-from tests.setup.documents import ROOT
 
 COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text(encoding="utf-8"))
 SERVICES: dict[str, Any] = COMPOSE["services"]

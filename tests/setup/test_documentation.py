@@ -13,8 +13,9 @@ from gaitswarm.settings import Settings
 from services.optimizer.jobs.documents import SPECS
 from services.optimizer.service import JobService
 from sim.scenario import SCENARIOS
+from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
-from tests.setup.documents import ROOT, blocks, documentation, shell_commands
+from tests.setup.documents import blocks, documentation, shell_commands
 
 
 def test_every_gaitswarm_command_that_is_written_exists_with_its_options() -> None:

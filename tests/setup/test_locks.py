@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.setup.documents import ROOT
+from tests.examples.paths import ROOT
 
 LOCKS = sorted((ROOT / "requirements").glob("*.lock"))
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

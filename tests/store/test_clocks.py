@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from services.optimizer.store.sql_store import open_store
+from tests.examples.processes import python
 from tests.store.examples import LEASE, spec
 from tests.store.postgres_server import postgres_binaries
 
@@ -47,23 +46,19 @@ Claimed = Callable[[int], list[str]]
 
 
 @pytest.fixture
-def claimed_by_a_clock(database_url: str, tmp_path: Path, pytestconfig: pytest.Config) -> Claimed:
+def claimed_by_a_clock(database_url: str, tmp_path: Path) -> Claimed:
     """Ids that a process claims whose clock is so many seconds ahead."""
     source, library = tmp_path / "clock.c", tmp_path / "clock.so"
     source.write_text(SHIFTED_CLOCK)
     subprocess.run([str(COMPILER), "-shared", "-fPIC", source, "-o", library, "-ldl"], check=True)
 
     def run(seconds: int) -> list[str]:
-        done = subprocess.run(
-            [sys.executable, "-m", "tests.store.worker_process", "claim", database_url],
-            cwd=pytestconfig.rootpath,
-            env=os.environ | {"LD_PRELOAD": str(library), "CLOCK_SHIFT": str(seconds)},
+        done = python(
+            *("-m", "tests.store.worker_process", "claim", database_url),
+            environment={"LD_PRELOAD": str(library), "CLOCK_SHIFT": str(seconds)},
             input="go\n",
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=60,
         )
+        assert done.returncode == 0, done.stderr
         return done.stdout.removeprefix("ready\n").split()
 
     return run

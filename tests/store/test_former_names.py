@@ -11,12 +11,13 @@ from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from services.optimizer.store.tables import jobs, recordings
+from tests.examples.walks import SHORT_WALK
 from tests.store.test_recordings import recording
 
 SPEC: dict[str, Any] = {
     "controller": "pi",
     "robot": {"backlash": [2.5, 1.0, 1.0]},
-    "scenarios": [{"name": "own", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15}],
+    "scenarios": [SHORT_WALK],
     "optimizer": {"particles": 2},
     "iterations": 3,
 }

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import random
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import islice
-from typing import IO
 
 import pytest
 from sqlalchemy import text
@@ -19,6 +17,7 @@ from services.optimizer.errors import Conflict
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.examples.processes import output, start_python
 from tests.store.examples import LEASE, Clock, ask, spec
 from tests.store.worker_process import PARTICLES
 
@@ -45,27 +44,20 @@ def at_once(n: int, act: Callable[[int], None]) -> None:
 
 
 @contextmanager
-def worker(what: str, url: str, root: object) -> Iterator[subprocess.Popen[str]]:
+def worker(what: str, url: str) -> Iterator[subprocess.Popen[str]]:
     """A worker process that is ready and waits for a line; killed in the end."""
-    command = [sys.executable, "-m", "tests.store.worker_process", what, url]
-    with subprocess.Popen(
-        command, cwd=str(root), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as process:
+    arguments = ("-m", "tests.store.worker_process", what, url)
+    with start_python(*arguments, stdin=subprocess.PIPE, stderr=None) as process:
         try:
-            assert pipe(process.stdout).readline() == "ready\n"
+            assert output(process.stdout).readline() == "ready\n"
             yield process
         finally:
             process.kill()
 
 
-def pipe(stream: IO[str] | None) -> IO[str]:
-    assert stream is not None
-    return stream
-
-
 def say_go(process: subprocess.Popen[str]) -> None:
-    pipe(process.stdin).write("go\n")
-    pipe(process.stdin).flush()
+    output(process.stdin).write("go\n")
+    output(process.stdin).flush()
 
 
 def test_every_job_is_claimed_by_exactly_one_of_many_threads(
@@ -92,12 +84,12 @@ def test_every_job_is_claimed_by_exactly_one_of_several_processes(
 ) -> None:
     made = {store.create_job(spec())[0].id for _ in range(40)}
     with (
-        worker("claim", database_url, pytestconfig.rootpath) as a,
-        worker("claim", database_url, pytestconfig.rootpath) as b,
+        worker("claim", database_url) as a,
+        worker("claim", database_url) as b,
     ):
         say_go(a)
         say_go(b)
-        claimed = [line.strip() for p in (a, b) for line in pipe(p.stdout)]
+        claimed = [line.strip() for p in (a, b) for line in output(p.stdout)]
     assert len(claimed) == len(set(claimed))
     # One that finds every candidate locked for a moment may stop early; none is ever lost.
     while (claim := store.claim("last", lease_seconds=LEASE)) is not None:
@@ -135,12 +127,12 @@ def test_a_runner_killed_in_the_midst_of_commits_loses_nothing_that_was_acknowle
     generator = random.Random(7)
     for _ in range(3):
         before = store.job(job.id).progress.iterations
-        with worker("commit", database_url, pytestconfig.rootpath) as process:
+        with worker("commit", database_url) as process:
             say_go(process)
-            acknowledged = len(list(islice(pipe(process.stdout), generator.randint(1, 20))))
+            acknowledged = len(list(islice(output(process.stdout), generator.randint(1, 20))))
             time.sleep(generator.uniform(0.0, 0.01))
             process.kill()
-            acknowledged += len(pipe(process.stdout).readlines())
+            acknowledged += len(output(process.stdout).readlines())
         # Claiming waits for what the database had begun when the runner died.
         after = store.claim("inspector", lease_seconds=0.0, job_id=job.id)
         assert after is not None

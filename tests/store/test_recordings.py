@@ -9,20 +9,17 @@ from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
-from sim.controllers import CONTROLLERS
 from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
-from sim.scenario import Scenario
-
-SCENARIO = Scenario(name="brief", cycle_time=0.6, radius=0.16, hip_height=0.15, cycles=1.0)
+from tests.examples.walks import PUBLISHED_A, SHORT_WALK
 
 
 def recording(**changes: object) -> RecordedWalk:
     rng = np.random.default_rng(1)
     document = {
-        "scenario": SCENARIO,
+        "scenario": SHORT_WALK,
         "controller": "fuzzy-pi",
-        "design": dict(CONTROLLERS["fuzzy-pi"].published["A"]),
+        "design": PUBLISHED_A,
         "first_tick": 20,
         "joints": load_robot("szabadka2").joint_names,
         "current": rng.uniform(0.0, 0.3, (10, 18)).tolist(),

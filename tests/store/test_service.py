@@ -14,6 +14,7 @@ from services.optimizer.jobs.job import Job, JobState, Progress, TimeLeft, time_
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
+from tests.examples.walks import SHORT_WALK
 from tests.store.examples import spec
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)
@@ -65,14 +66,14 @@ def test_before_anything_was_measured_nothing_is_estimated(iterations: int, seco
     assert time_left(running, NOW) == TimeLeft(None, None, None)
 
 
-HIGH_LEGS = {"name": "mine", "cycle_time": 1.5, "radius": 0.16, "hip_height": 0.15, "stride": 0.5}
+LONG_STEPS = SHORT_WALK | {"name": "mine", "stride": 0.5}
 
 
 @pytest.mark.parametrize(
     ("asked", "field", "message"),
     [
         ({"fixed": {"stride": 0.9}}, "scenarios.0", "right_front"),
-        ({"scenarios": ["1", HIGH_LEGS]}, "scenarios.1", "'mine'.*reduce stride"),
+        ({"scenarios": ["1", LONG_STEPS]}, "scenarios.1", "'mine'.*reduce stride"),
         ({"fixed": {"I": -5.0}}, "fixed", "I: -5"),
         ({"variables": ["P", {"name": "I", "low": -5.0, "high": 1.0}]}, "variables", "I: -5"),
         ({"variables": ["P", {"name": "I", "low": 0.0, "high": 500.0}]}, "variables", "I: 500"),
@@ -97,7 +98,7 @@ def test_a_job_that_cannot_be_simulated_is_refused_and_not_stored(
 
 def test_a_scenario_is_fine_if_a_searched_gait_can_stay_within_reach(tmp_path: Path) -> None:
     store = open_store(str(tmp_path / "jobs.db"))
-    asked = {"controller": "pi", "scenarios": [HIGH_LEGS], "variables": ["P", "I", "stride"]}
+    asked = {"controller": "pi", "scenarios": [LONG_STEPS], "variables": ["P", "I", "stride"]}
     job, new = JobService(store).submit(JobSpec.model_validate(asked))
     assert new and JobService(store).job(job.id) == job
     store.close()

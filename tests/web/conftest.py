@@ -12,19 +12,18 @@ import pytest
 from playwright.sync_api import Browser, sync_playwright
 
 from api.page import is_built
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.servers import ServerProcess
+from tests.examples.walks import SHORT_WALK
 from tests.web.chromium import ARGUMENTS, find_chromium
-from tests.web.server import ServerProcess
 from tests.web.visit import Visit
 
 # Read here: the tests themselves see none of the user's settings.
 REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_PAGE"))
 SCREENSHOTS = os.environ.get("GAITSWARM_SCREENSHOTS", "")
 
-SHORT_WALK = {"name": "short", "cycle_time": 1.0, "radius": 0.16, "hip_height": 0.15, "cycles": 1}
-
-SMALL_JOB: dict[str, Any] = {
-    "name": "small",
-    "scenarios": [SHORT_WALK, {**SHORT_WALK, "name": "loaded", "load": 5.0}],
+SMALL_JOB: dict[str, Any] = SMALL_SPEC | {
+    "scenarios": [SHORT_WALK, SHORT_WALK | {"name": "loaded", "load": 5.0}],
     "optimizer": {"particles": 8},
     "iterations": 6,
     "seed": 5,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
+from tests.examples.servers import ServerProcess
 from tests.web.pixels import colours, pixels
-from tests.web.server import ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow

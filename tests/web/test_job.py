@@ -8,6 +8,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.examples.servers import ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import (
     expect_state,
@@ -15,7 +16,6 @@ from tests.web.job_page import (
     shown_iteration,
     wait_for_iteration,
 )
-from tests.web.server import ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow

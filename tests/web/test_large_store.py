@@ -11,8 +11,8 @@ from playwright.sync_api import expect
 
 from benchmarks.large_store import PARTICLES, fill
 from services.runtime import open_store
+from tests.examples.servers import ServerProcess
 from tests.web.job_page import wait_for_iteration
-from tests.web.server import ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow

@@ -13,9 +13,9 @@ import matplotlib.image
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
+from tests.examples.servers import ServerProcess
 from tests.web.conftest import SCREENSHOTS
 from tests.web.pixels import colours
-from tests.web.server import ServerProcess
 from tests.web.views import open_view
 from tests.web.visit import Visit
 

@@ -11,10 +11,10 @@ from playwright.sync_api import expect
 
 from services.optimizer.jobs.job import JobState
 from services.runtime import open_store
+from tests.examples.servers import ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import expect_state, job_element, shown_iteration, wait_for_iteration
 from tests.web.proxy import CuttableProxy
-from tests.web.server import ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from tests.web.server import ROOT, ServerProcess
+from tests.examples.paths import ROOT
+from tests.examples.servers import ServerProcess
 from tests.web.views import VIEWS, open_view
 from tests.web.visit import Visit
 

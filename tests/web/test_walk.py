@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Locator, Page, expect
 
+from tests.examples.servers import ServerProcess
 from tests.web.pixels import colours, pixels
-from tests.web.server import ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from playwright.sync_api import expect
 
-from tests.web.server import ServerProcess
+from tests.examples.servers import ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow

@@ -10,12 +10,12 @@ import time
 from services.optimizer.errors import EvaluatorUnavailable
 from services.worker.ray_evaluator import RayEvaluator
 from tests.worker.processes import descendants
-from tests.worker.requests import bits, request
+from tests.worker.requests import bits, never, request
 
 
 def main(ending: str) -> None:
     evaluator = RayEvaluator(cpus=1)
-    walked = bits(evaluator.evaluate(request(2), lambda: False))
+    walked = bits(evaluator.evaluate(request(2), never))
     sys.stdout.write("walked\n")
     sys.stdout.flush()
     if ending == "wait":
@@ -25,7 +25,7 @@ def main(ending: str) -> None:
             if "gcs_server" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
         sys.stdout.write(f"{until_lost(evaluator)}\n")
-        assert bits(evaluator.evaluate(request(2), lambda: False)) == walked
+        assert bits(evaluator.evaluate(request(2), never)) == walked
     sys.stdin.readline()
     evaluator.close()
 
@@ -35,7 +35,7 @@ def until_lost(evaluator: RayEvaluator) -> str:
     deadline = time.monotonic() + 50.0
     while time.monotonic() < deadline:
         try:
-            evaluator.evaluate(request(2), lambda: False)
+            evaluator.evaluate(request(2), never)
         except EvaluatorUnavailable as error:
             return str(error)
         time.sleep(0.2)

@@ -10,11 +10,17 @@ from sim.outcome import Outcome
 from sim.provenance import provenance_of
 from sim.scenario import Scenario
 from sim.simulate import simulate
+from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 
 SCENARIOS = (
-    Scenario(name="level", cycle_time=1.0, radius=0.16, hip_height=0.15, cycles=1),
-    Scenario(name="uphill", cycle_time=1.5, radius=0.2, hip_height=0.14, slope=10.0, cycles=1),
+    Scenario.model_validate(SHORT_WALK),
+    Scenario.model_validate(UPHILL_WALK),
 )
+
+
+def never() -> bool:
+    """Whether to stop."""
+    return False
 
 
 def request(

@@ -14,14 +14,10 @@ from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from services.worker.in_process import InProcessEvaluator
 from sim.errors import SimulationInputError
 from sim.outcome import Outcome
-from sim.scenario import Scenario
-from tests.worker.requests import SCENARIOS, bits, request, walked_at_once
+from tests.examples.walks import short_walk
+from tests.worker.requests import SCENARIOS, bits, never, request, walked_at_once
 
 pytestmark = pytest.mark.slow
-
-
-def never() -> bool:
-    return False
 
 
 @pytest.mark.parametrize("count", [1, 7, 41])
@@ -70,7 +66,7 @@ def test_walks_of_another_provenance_are_refused_in_words(evaluator: Evaluator) 
 
 
 def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
-    long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
+    long = short_walk(cycle_time=2.0, cycles=5)
     stop = threading.Event()
     threading.Timer(0.3, stop.set).start()
     begun = time.monotonic()
@@ -99,7 +95,7 @@ def test_a_small_job_is_served_while_a_big_one_runs(evaluator: Evaluator) -> Non
     big_ended = threading.Event()
     stop = threading.Event()
     # A minute and more of work, in pieces of a second.
-    long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
+    long = short_walk(cycle_time=2.0, cycles=5)
 
     def run_big() -> None:
         try:

@@ -10,8 +10,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,23 +20,10 @@ from services.optimizer.errors import EvaluatorUnavailable
 from services.worker.ray_evaluator import RayEvaluator
 from services.worker.tasks import transportable
 from sim.errors import SimulationError, SimulationInputError, UnreachablePose
+from tests.examples.paths import ROOT
+from tests.examples.processes import output, within
 from tests.worker.processes import Process, descendants, walkers
-from tests.worker.requests import bits, request
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def never() -> bool:
-    return False
-
-
-def within(seconds: float, condition: Callable[[], bool]) -> bool:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.05)
-    return True
+from tests.worker.requests import bits, never, request
 
 
 @pytest.mark.slow
@@ -97,9 +83,8 @@ def driver(ending: str, home: Path) -> Iterator[subprocess.Popen[str]]:
         start_new_session=True,
     ) as started:
         try:
-            assert started.stdout is not None
-            line = started.stdout.readline()
-            assert line == "walked\n", started.stderr.read() if started.stderr else ""
+            line = output(started.stdout).readline()
+            assert line == "walked\n", output(started.stderr).read()
             yield started
         finally:
             if started.poll() is None:

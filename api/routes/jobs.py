@@ -40,7 +40,11 @@ IdempotencyKey = Annotated[
 
 async def request_document(request: Request) -> Any:
     """The body as it was sent, before defaults and presets are filled in."""
-    return await request.json()
+    try:
+        return await request.json()
+    except ValueError:
+        # No body, or none of JSON: it is the spec that is missing, which has an answer of its own.
+        return None
 
 
 @router.post(

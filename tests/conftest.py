@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,6 +70,22 @@ def lasting_server() -> Iterator[Server]:
     server = Server(None)
     yield server
     server.close()
+
+
+@pytest.fixture
+def serve_database(lasting_server: Server) -> Iterator[Callable[[Path], str]]:
+    """Let the lasting server serve the jobs of a database; its URL."""
+    from services.optimizer.service import JobService
+    from services.optimizer.store.sql_store import open_store
+
+    with ExitStack() as stack:
+
+        def serve(db: Path) -> str:
+            store = stack.enter_context(closing(open_store(str(db))))
+            lasting_server.serve(JobService(store))
+            return lasting_server.url
+
+        yield serve
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

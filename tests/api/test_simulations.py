@@ -112,8 +112,8 @@ def test_a_request_that_makes_no_sense_is_refused_by_field(
 
 
 def test_logs_are_limited_more_than_walks(serve) -> None:
-    client = serve(api_max_logged_seconds=1.0).client
+    client = serve(api_max_logged_seconds=0.5).client
 
     assert simulated(client, scenarios=[SHORT_WALK])["scenarios"]["short"]["status"] == "ok"
     problem = refused(client, scenarios=[SHORT_WALK], log=True)
-    assert "1 s allowed with logs" in problem["detail"]
+    assert "0.5 s allowed with logs" in problem["detail"]

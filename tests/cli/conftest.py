@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from services.optimizer.service import JobService
-from services.runtime import open_store
 from tests.examples.commands import Result, run_command
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.servers import Server
 
 Gaitswarm = Callable[..., Result]
 WriteJson = Callable[..., Path]
@@ -68,19 +64,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     )
     assert result.code == 0, result.err
     return Finished(db, result.json)
-
-
-@pytest.fixture
-def serve_database(lasting_server: Server) -> Iterator[Callable[[Path], str]]:
-    """The server, made to serve a database; its URL."""
-    with ExitStack() as stack:
-
-        def serve(db: Path) -> str:
-            store = stack.enter_context(closing(open_store(str(db))))
-            lasting_server.serve(JobService(store))
-            return lasting_server.url
-
-        yield serve
 
 
 @pytest.fixture(params=["database", "server"])

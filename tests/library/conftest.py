@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import inspect
 import shutil
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,15 +13,8 @@ from typing import Any, cast
 
 import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
-from fastapi import FastAPI
 
 import gaitswarm
-from api import dependencies
-from api.app import create_app
-from api.server import ApiServer
-from gaitswarm.settings import Settings
-from services.optimizer.service import JobService
-from services.runtime import open_store
 
 SMALL: dict[str, Any] = {
     "name": "small",
@@ -61,44 +53,16 @@ def finished(finished_once: Finished, tmp_path: Path) -> Finished:
     return Finished(db, finished_once.result)
 
 
-@pytest.fixture(scope="session")
-def empty_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    db = tmp_path_factory.mktemp("empty") / "jobs.db"
-    gaitswarm.open(db).close()
-    return db
+@pytest.fixture
+def db(database: Path) -> Path:
+    """A database without jobs."""
+    return database.rename(database.with_name("new.db"))
 
 
 @pytest.fixture
-def db(empty_once: Path, tmp_path: Path) -> Path:
-    """A database without jobs; making one takes most of a test's time."""
-    return Path(shutil.copy(empty_once, tmp_path / "new.db"))
-
-
-@pytest.fixture(scope="session")
-def lasting_server() -> Iterator[tuple[str, FastAPI]]:
-    """One server for all tests, its URL and its application; starting one takes longer."""
-    app = create_app(cast(JobService, None), settings=Settings(api_event_poll_seconds=0.02))
-    server = ApiServer(app, host="127.0.0.1", port=0, log_level="critical")
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    yield server.url, app
-    server.stop()
-    thread.join(timeout=10.0)
-    assert not thread.is_alive()
-
-
-@pytest.fixture
-def serve(lasting_server: tuple[str, FastAPI]) -> Iterator[Callable[[Path], str]]:
+def serve(serve_database: Callable[[Path], str]) -> Callable[[Path], str]:
     """The server, made to serve a database; its URL."""
-    url, app = lasting_server
-    with ExitStack() as stack:
-
-        def start(db: Path) -> str:
-            service = JobService(stack.enter_context(closing(open_store(str(db)))))
-            app.dependency_overrides[dependencies.service] = lambda: service
-            return url
-
-        yield start
+    return serve_database
 
 
 class Blocking:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from tests.web.server import ServerProcess
 
+from tests.examples.servers import ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.visit import Visit
 

@@ -1,6 +1,7 @@
 """Arguments as a program gives them, made into checked values and requests.
 
-All raise InvalidRequest that names the argument, before anything is asked of a database or server.
+They raise InvalidRequest that names the argument, before anything is asked of a database or server;
+a controller that does not exist is NotFound, as its path on a server is.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def command(text: Command | str) -> Command:
 
 
 def controller(name: str) -> ControllerName:
-    """A controller by name; NotFound for another, as its path is on a server."""
+    """A controller by name. Raises NotFound."""
     if name not in CONTROLLERS:
         raise NotFound(f"no controller {name!r}; known are {', '.join(CONTROLLERS)}")
     return name

@@ -31,10 +31,17 @@ class ReplayRequest(WalkRequest):
 
 
 def run_replay(request: ReplayRequest) -> bytes:
-    """Let the design walk; see `encoded_replay`. A failed walk is shown up to its end.
+    """Let the design walk, to be looked at.
 
-    Raises InvalidRequest that names the field for a design that cannot be compiled or a gait that
-    leaves the legs' reach.
+    Args:
+        request: The design and its walk.
+
+    Returns:
+        The walk as `encoded_replay` writes it; one that failed is shown up to its end.
+
+    Raises:
+        InvalidRequest: The design cannot be compiled, or the gait leaves the legs' reach; names
+            the field.
     """
     scenario = resolved(request.scenario)
     request.check_design()

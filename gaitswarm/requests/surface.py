@@ -38,9 +38,17 @@ class SurfaceRequest(BaseModel):
 
 
 def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceView:
-    """The surface of every output.
+    """Compute the surface of every output.
 
-    Raises InvalidRequest for a controller that is not fuzzy, or a design that it cannot have.
+    Args:
+        controller: Name of the controller.
+        request: The design, and how finely to look at it.
+
+    Returns:
+        Sets, rules and surfaces of every output.
+
+    Raises:
+        InvalidRequest: The controller is not fuzzy, or cannot have the design; names the field.
     """
     surfaces = [
         surface(

@@ -47,7 +47,14 @@ class WalkRequest(BaseModel):
         return self
 
     def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
-        """Length of all walks together [s], the measure of what the request costs."""
+        """How long the robot walks, the measure of what the request costs.
+
+        Args:
+            scenarios: The walks of the request, in full.
+
+        Returns:
+            Length of all walks together [s]; a cycle time of the design goes before a scenario's.
+        """
         cycle_time = self.design.get("cycle_time")
         return sum(
             scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
@@ -55,14 +62,26 @@ class WalkRequest(BaseModel):
         )
 
     def check_design(self) -> None:
-        """Raise InvalidRequest for values that the controller cannot have."""
+        """Check that the controller can have the design's values.
+
+        Raises:
+            InvalidRequest: It cannot; its field is `design`.
+        """
         try:
             CONTROLLERS[self.controller].compile(self.design)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field="design") from error
 
     def check_reach(self, scenario: Scenario, *, field: str) -> None:
-        """Raise InvalidRequest of `field` for a gait that leaves the legs' reach."""
+        """Check that the legs reach the gait's trajectory.
+
+        Args:
+            scenario: The walk, in full.
+            field: Field of the request that is to blame if they do not.
+
+        Raises:
+            InvalidRequest: They do not; names scenario, leg and distance.
+        """
         names, values = tuple(self.design), tuple(self.design.values())
         try:
             check_reach(scenario, names, values, robot=self.robot)
@@ -71,7 +90,15 @@ class WalkRequest(BaseModel):
 
 
 def check_names(controller: ControllerName, design: Mapping[str, float]) -> None:
-    """Raise ValueError for a variable that the controller and the gait don't know, or lack."""
+    """Check that a design has all variables of a controller, and no others but the gait's.
+
+    Args:
+        controller: Name of the controller.
+        design: Values by variable.
+
+    Raises:
+        ValueError: A variable is unknown or missing; names it.
+    """
     needed = [variable.name for variable in CONTROLLERS[controller].variables]
     for name in design:
         if name not in needed and name not in GAIT_VARIABLE_NAMES:
@@ -83,7 +110,14 @@ def check_names(controller: ControllerName, design: Mapping[str, float]) -> None
 
 
 def resolved(entry: str | Scenario) -> Scenario:
-    """The scenario in full, a preset looked up."""
+    """A scenario in full.
+
+    Args:
+        entry: The scenario, or name or number of a preset.
+
+    Returns:
+        The scenario itself, a preset looked up.
+    """
     return find_scenario(entry) if isinstance(entry, str) else entry
 
 
@@ -135,8 +169,17 @@ class SimulationRequest(WalkRequest):
 def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> SimulationView:
     """Let the design walk in every scenario.
 
-    Raises InvalidRequest that names the field for a design that cannot be compiled or a gait that
-    leaves the legs' reach.
+    Args:
+        request: The design and its walks.
+        backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
+            first that works on this machine.
+
+    Returns:
+        Status and objectives of every walk, with logs if the request asks for them.
+
+    Raises:
+        InvalidRequest: The design cannot be compiled, or a gait leaves the legs' reach; names the
+            field.
     """
     request.check_walks()
     scenarios = request.resolved_scenarios()

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         ProvenanceChanged,
         StoreUnavailable,
         Unavailable,
+        Unreadable,
     )
     from gaitswarm.jobs.async_database import AsyncDatabaseJobs
     from gaitswarm.jobs.async_port import AsyncJobs
@@ -122,6 +123,7 @@ __all__ = [
     "SurfaceView",
     "Table",
     "Unavailable",
+    "Unreadable",
     "Variable",
     "WalkLog",
     "WalkReplay",
@@ -138,7 +140,7 @@ _MODULES: Final = {
     "gaitswarm.errors": (
         "Conflict", "EvaluatorUnavailable", "GaitswarmError", "IdempotencyConflict", "Interrupted",
         "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged",
-        "StoreUnavailable", "Unavailable",
+        "StoreUnavailable", "Unavailable", "Unreadable",
     ),
     "gaitswarm.jobs.async_database": ("AsyncDatabaseJobs",),
     "gaitswarm.jobs.async_port": ("AsyncJobs",),

@@ -5,6 +5,7 @@ GaitswarmError              everything that gaitswarm raises on purpose
 ├── NotFound                no job, iteration, recording or result of that id
 ├── Conflict                not possible in the job's present state
 │   ├── ProvenanceChanged   its numbers would depend on something else than those it has
+│   ├── Unreadable          this version cannot read what is stored of the job; it stays as it is
 │   └── IdempotencyConflict the key was used before for another job
 ├── JobEnded                the job that was waited for did not succeed; `job` says why
 ├── LeaseLost               another process, or a cancellation, has taken the job
@@ -33,6 +34,7 @@ from services.optimizer.errors import (
     ProvenanceChanged,
     StoreUnavailable,
     Unavailable,
+    Unreadable,
 )
 from sim.errors import SimulationError, SimulationInputError
 
@@ -118,6 +120,7 @@ __all__ = [
     "ProvenanceChanged",
     "StoreUnavailable",
     "Unavailable",
+    "Unreadable",
     "invalid_request",
     "simulation_errors",
 ]

@@ -5,6 +5,7 @@ do not.
 from __future__ import annotations
 
 import io
+import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import fields
@@ -201,6 +202,26 @@ def test_consent_to_changes_is_kept_with_the_job(reach: Reach, db: Path) -> None
 def test_a_job_that_succeeded_is_extended(reach: Reach, finished: Finished) -> None:
     extended = reach(finished.db).extend(finished.id, 4)
     assert (extended.state, extended.iterations, extended.iterations_planned) == ("queued", 2, 4)
+
+
+def test_a_job_of_another_version_is_listed_and_what_needs_its_spec_is_refused(
+    reach: Reach, finished: Finished
+) -> None:
+    with closing(sqlite3.connect(finished.db)) as connection, connection:
+        connection.execute("UPDATE jobs SET spec = json_set(spec, '$.schema_version', 99)")
+    jobs = reach(finished.db)
+    assert [job.id for job in jobs.jobs()] == [finished.id]
+    job = jobs.job(finished.id)
+    asks: tuple[Callable[[], Any], ...] = (
+        lambda: job.spec,
+        lambda: jobs.evaluations(job.id),
+        lambda: list(jobs.history(job.id)),
+        lambda: list(jobs.export(job.id)),
+        lambda: jobs.ranking(job.id, "B"),
+    )
+    for ask in asks:
+        with pytest.raises(gaitswarm.Conflict, match="schema_version"):
+            ask()
 
 
 def test_a_job_without_a_design_that_walks_has_no_best(reach: Reach, db: Path) -> None:

@@ -1,1 +1,1 @@
-"""Jobs as commands see them, wherever they are."""
+"""Jobs in a database or behind a server, by the same methods."""

@@ -402,5 +402,12 @@ def test_surfaces_of_a_fuzzy_controller_are_computed(reach: Reach, db: Path) -> 
     assert np.shape(output.table) == (5, 3)
 
 
+def test_closing_twice_does_no_harm(reach: Reach, finished: Finished) -> None:
+    jobs = reach(finished.db)
+    assert jobs.job(finished.id).id == finished.id
+    jobs.close()
+    jobs.close()
+
+
 def test_it_says_where_the_jobs_are(reach: Reach, db: Path, serve: Callable[[Path], str]) -> None:
     assert reach(db).url in (str(db), serve(db))

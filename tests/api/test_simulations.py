@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from typing import Any
 
 import httpx2
 import numpy as np
 import pytest
 
+from api.dependencies import check_length
+from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.views import SimulationView
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.scenario import find_scenario
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
@@ -117,3 +124,80 @@ def test_logs_are_limited_more_than_walks(serve) -> None:
     assert simulated(client, scenarios=[SHORT_WALK])["scenarios"]["short"]["status"] == "ok"
     problem = refused(client, scenarios=[SHORT_WALK], log=True)
     assert "0.5 s allowed with logs" in problem["detail"]
+
+
+@dataclass
+class Gate:
+    """Walks on request arrive, begin when it is their turn, and end only when it is open."""
+
+    arrived: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
+    begun: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
+    opened: threading.Event = field(default_factory=threading.Event)
+
+
+@pytest.fixture
+def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
+    gate = Gate()
+
+    def held(request: SimulationRequest) -> SimulationView:
+        gate.begun.release()
+        assert gate.opened.wait(20.0)
+        return run_simulation(request)
+
+    def arriving(*arguments: Any, **options: Any) -> None:
+        check_length(*arguments, **options)
+        gate.arrived.release()
+
+    monkeypatch.setattr("api.routes.simulations.check_length", arriving)
+    monkeypatch.setattr("api.routes.simulations.run_simulation", held)
+    yield gate
+    gate.opened.set()
+
+
+def test_only_so_many_walks_compute_at_once_and_the_next_wait(serve, gate: Gate) -> None:
+    client = serve(api_simulation_workers=1).client
+    with ThreadPoolExecutor(2) as pool:
+        answers = [pool.submit(simulated, client, scenarios=[SHORT_WALK]) for _ in range(2)]
+        for _ in answers:
+            assert gate.arrived.acquire(timeout=20.0)
+        assert gate.begun.acquire(timeout=20.0)
+        assert not gate.begun.acquire(timeout=0.3)
+        gate.opened.set()
+
+    assert [a.result()["scenarios"]["short"]["status"] for a in answers] == ["ok", "ok"]
+
+
+def test_when_too_many_walks_wait_the_next_is_told_to_come_later(serve, gate: Gate) -> None:
+    client = serve(api_simulation_workers=1, api_simulation_queue=0).client
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(simulated, client, scenarios=[SHORT_WALK])
+        assert gate.begun.acquire(timeout=20.0)
+        answer = client.post("/v1/simulations", json={**REQUEST, "scenarios": [SHORT_WALK]})
+        gate.opened.set()
+
+    assert answer.status_code == 503
+    assert "Retry-After" in answer.headers
+    assert first.result()["scenarios"]["short"]["status"] == "ok"
+
+
+def test_a_stopping_server_answers_what_was_asked_before(serve, gate: Gate) -> None:
+    server = serve(api_simulation_workers=1, api_shutdown_seconds=60)
+    with ThreadPoolExecutor(2) as pool:
+        answers = [pool.submit(simulated, server.client, scenarios=[SHORT_WALK]) for _ in range(2)]
+        for _ in answers:
+            assert gate.arrived.acquire(timeout=20.0)
+        server.stop()
+        wait_until_refused(str(server.client.base_url))
+        assert not wait(answers, timeout=0.5).done
+        gate.opened.set()
+
+    assert [a.result()["scenarios"]["short"]["status"] for a in answers] == ["ok", "ok"]
+
+
+def wait_until_refused(url: str) -> None:
+    """Until nobody listens there any more."""
+    try:
+        while True:
+            httpx2.get(f"{url}/v1/healthz")
+    except httpx2.TransportError:
+        return

@@ -30,7 +30,7 @@ OUT_OF_REACH = """() => [
     .map((e) => e.outerHTML.slice(0, 120))"""
 
 CHARTS_WITHOUT_TABLE = """() => [...document.querySelectorAll('canvas')]
-    .filter((e) => e.checkVisibility() && !e.closest('.chart-frame, .scene'))
+    .filter((e) => e.checkVisibility() && !e.closest('.chart-frame, .player-stage'))
     .map((e) => e.parentElement.outerHTML.slice(0, 120))"""
 
 BACKGROUND = "getComputedStyle(document.body).backgroundColor"

@@ -108,8 +108,8 @@ async def _events(
 ) -> AsyncGenerator[ServerSentEvent, None]:
     """Poll the store: what is committed first, then the state if it is another.
 
-    Nothing is held between polls, neither a connection nor a transaction. Ends after a terminal
-    state, after `limit` iterations, with the server, or when caught up unless `follow`.
+    No transaction is held between polls. Ends after a terminal state, after `limit` iterations,
+    with the server, or when caught up unless `follow`.
     """
     told: JobState | None = None
     sent = 0

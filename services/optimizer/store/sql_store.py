@@ -10,15 +10,12 @@ from typing import Any, Final
 from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.errors import InvalidRequest, NotFound, Unreadable
-from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.errors import InvalidRequest, Unreadable
 from services.optimizer.jobs.job import (
     Ask,
     Claim,
     Command,
     CompletedIteration,
-    Evaluation,
-    Iteration,
     Job,
     JobOrder,
     JobState,
@@ -28,8 +25,8 @@ from services.optimizer.jobs.job import (
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.base import Page
-from services.optimizer.store.columns import select_columns
 from services.optimizer.store.engine import Clock, Database, connect, database_time, parse_url
+from services.optimizer.store.history import SqlHistory, checked_limit
 from services.optimizer.store.job_list import cursor_of, from_cursor, job_rows, sort_jobs, to_cursor
 from services.optimizer.store.migrate import check_revision, migrate
 from services.optimizer.store.recordings import (
@@ -60,18 +57,13 @@ from services.optimizer.store.records import (
     update_job,
 )
 from services.optimizer.store.rows import (
-    LISTED,
     request_digest,
     storable,
-    to_evaluation,
-    to_iteration,
     to_job,
 )
-from services.optimizer.store.tables import evaluations, iterations, jobs
+from services.optimizer.store.tables import jobs
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
-_LARGEST_INDEX: Final = 2**31 - 1
-_LARGEST_PAGE: Final = 10_000
 _LONGEST_KEY: Final = 200
 
 _log = logging.getLogger(__name__)
@@ -96,11 +88,11 @@ def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
     return SqlStore(connect(parsed), clock=clock)
 
 
-class SqlStore:
+class SqlStore(SqlHistory):
     """`Store` on a database that has the newest schema. See `open_store`."""
 
     def __init__(self, database: Database, *, clock: Clock = database_time) -> None:
-        self._database = database
+        super().__init__(database)
         self._clock = clock
 
     # jobs, as their users see them
@@ -149,7 +141,7 @@ class SqlStore:
             return take_job(connection, job_row(connection, job.id), runner, lease_seconds, now)
 
     def job(self, job_id: str) -> Job:
-        """See `Store.job`."""
+        """Read a job with its progress."""
         with self._database.transaction(write=False) as connection:
             return to_job(job_row(connection, job_id))
 
@@ -162,8 +154,8 @@ class SqlStore:
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]:
-        """See `Store.jobs`."""
-        limit = _checked_limit(limit)
+        """Read a page of jobs."""
+        limit = checked_limit(limit)
         if not search and order is JobOrder.CREATED:
             return self._newest_jobs(state, after, limit)
         with self._database.transaction(write=False) as connection:
@@ -190,7 +182,7 @@ class SqlStore:
         return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
 
     def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
-        """See `Store.command`."""
+        """Apply a command of a user, or refuse it."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
             now = self._clock(connection)
@@ -207,7 +199,7 @@ class SqlStore:
             return to_job(update_job(connection, row, changes))
 
     def extend(self, job_id: str, iterations: int) -> Job:
-        """See `Store.extend`."""
+        """Change the budget of a job, and queue it again if it had ended."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
             require_readable(row)
@@ -220,7 +212,7 @@ class SqlStore:
     # recorded walks
 
     def add_recording(self, walk: RecordedWalk) -> str:
-        """See `Store.add_recording`."""
+        """Keep a recorded walk, once."""
         try:
             with self._database.transaction(write=True) as connection:
                 return insert_recording(connection, walk, self._clock(connection))
@@ -229,7 +221,7 @@ class SqlStore:
             return recording_id(walk)
 
     def recordings(self, ids: Sequence[str]) -> Recordings:
-        """See `Store.recordings`."""
+        """Read recorded walks."""
         with self._database.transaction(write=False) as connection:
             return load_recordings(connection, ids)
 
@@ -238,7 +230,7 @@ class SqlStore:
     def claim(
         self, runner: str, *, lease_seconds: float, job_id: str | None = None
     ) -> Claim | None:
-        """See `Store.claim`."""
+        """Take a job that waits for a runner, for as long as the lease lasts."""
         with self._database.transaction(write=True) as connection:
             if job_id is not None:
                 job_row(connection, job_id)
@@ -258,7 +250,7 @@ class SqlStore:
         return None
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
-        """See `Store.renew`."""
+        """Prolong a lease."""
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             expires = self._clock(connection) + timedelta(seconds=lease_seconds)
@@ -266,13 +258,13 @@ class SqlStore:
             return JobState(row["state"])
 
     def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
-        """See `Store.record_provenance`."""
+        """Record what the numbers depend on from the next iteration on."""
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             update_job(connection, row, provenance_columns(row, provenance))
 
     def begin(self, claim: Claim, ask: Ask) -> None:
-        """See `Store.begin`."""
+        """Store an ask where there is none."""
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             if outstanding_ask(connection, row) is None:
@@ -281,7 +273,7 @@ class SqlStore:
                 insert_ask(connection, row, ask, expected=row["iterations"], now=now)
 
     def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
-        """See `Store.commit`."""
+        """Store an iteration, the ask that follows, and what becomes of the job."""
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             now = self._clock(connection)
@@ -296,7 +288,7 @@ class SqlStore:
             return state
 
     def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
-        """See `Store.release`."""
+        """Give a job back, or let it fail."""
         if state not in (JobState.FAILED, JobState.PAUSED, JobState.QUEUED):
             raise ValueError(f"a runner cannot release a job as {state}")
         with self._database.transaction(write=True) as connection:
@@ -306,87 +298,13 @@ class SqlStore:
             changes = entering(after, self._clock(connection)) | {"error": text}
             update_job(connection, row, changes)
 
-    # history
-
-    def iterations(
-        self, job_id: str, *, after: int | None = None, limit: int = 100
-    ) -> Page[Iteration]:
-        """See `Store.iterations`."""
-        limit = _checked_limit(limit)
-        query = (
-            select(*LISTED)
-            .where(iterations.c.job_id == job_id, iterations.c.committed_at.is_not(None))
-            .order_by(iterations.c.iteration)
-            .limit(limit + 1)
-        )
-        if after is not None:
-            query = query.where(iterations.c.iteration > _bounded(after))
-        with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
-            rows = connection.execute(query).mappings().all()
-        found = tuple(to_iteration(row) for row in rows[:limit])
-        return Page(found, str(found[-1].index) if len(rows) > limit else None)
-
-    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """See `Store.evaluations`."""
-        found = self.evaluations_between(job_id, iteration, iteration + 1)
-        if not found:
-            raise NotFound(f"job {job_id} has no committed iteration {iteration}")
-        return found
-
-    def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
-        """See `Store.evaluations_between`."""
-        query = (
-            select(evaluations)
-            .where(
-                evaluations.c.job_id == job_id,
-                evaluations.c.iteration >= _bounded(first),
-                evaluations.c.iteration < _bounded(last),
-            )
-            .order_by(evaluations.c.iteration, evaluations.c.particle)
-        )
-        with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
-            rows = connection.execute(query).mappings().all()
-        return tuple(to_evaluation(row) for row in rows)
-
-    def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
-        """See `Store.evaluation_columns`."""
-        with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
-            return select_columns(connection, job_id, _bounded(first), _bounded(last))
-
-    def best(self, job_id: str) -> Evaluation | None:
-        """See `Store.best`."""
-        with self._database.transaction(write=False) as connection:
-            job = job_row(connection, job_id)
-            if job["best_iteration"] is None:
-                return None
-            query = select(evaluations).where(
-                evaluations.c.job_id == job_id,
-                evaluations.c.iteration == job["best_iteration"],
-                evaluations.c.particle == job["best_particle"],
-            )
-            return to_evaluation(connection.execute(query).mappings().one())
-
     def ping(self) -> None:
-        """See `Store.ping`."""
+        """Ask the database for its schema revision."""
         check_revision(self._database)
 
     def close(self) -> None:
-        """See `Store.close`."""
+        """Close the pooled connections."""
         self._database.close()
-
-
-def _checked_limit(limit: int) -> int:
-    if limit < 1:
-        raise InvalidRequest("a page holds at least one item", field="limit")
-    return min(limit, _LARGEST_PAGE)
-
-
-def _bounded(index: int) -> int:
-    """An index that both databases can compare; no iteration lies beyond."""
-    return max(-1, min(index, _LARGEST_INDEX))
 
 
 def _check_key(key: str | None) -> None:

@@ -1,0 +1,110 @@
+"""What jobs have committed, which never changes: the reading half of the store."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sqlalchemy import select
+
+from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Evaluation, Iteration
+from services.optimizer.store.base import Page
+from services.optimizer.store.columns import select_columns
+from services.optimizer.store.engine import Database
+from services.optimizer.store.records import job_row
+from services.optimizer.store.rows import LISTED, to_evaluation, to_iteration
+from services.optimizer.store.tables import evaluations, iterations
+
+_LARGEST_INDEX: Final = 2**31 - 1
+_LARGEST_PAGE: Final = 10_000
+
+
+class SqlHistory:
+    """Those methods of `Store` that read committed iterations."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def iterations(
+        self, job_id: str, *, after: int | None = None, limit: int = 100
+    ) -> Page[Iteration]:
+        """Read a page of committed iterations."""
+        limit = checked_limit(limit)
+        query = (
+            select(*LISTED)
+            .where(iterations.c.job_id == job_id, iterations.c.committed_at.is_not(None))
+            .order_by(iterations.c.iteration)
+            .limit(limit + 1)
+        )
+        if after is not None:
+            query = query.where(iterations.c.iteration > _bounded(after))
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            rows = connection.execute(query).mappings().all()
+        found = tuple(to_iteration(row) for row in rows[:limit])
+        return Page(found, str(found[-1].index) if len(rows) > limit else None)
+
+    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
+        """Read the particles of a committed iteration."""
+        found = self.evaluations_between(job_id, iteration, iteration + 1)
+        if not found:
+            raise NotFound(f"job {job_id} has no committed iteration {iteration}")
+        return found
+
+    def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
+        """Read the particles of a range of committed iterations."""
+        query = (
+            select(evaluations)
+            .where(
+                evaluations.c.job_id == job_id,
+                evaluations.c.iteration >= _bounded(first),
+                evaluations.c.iteration < _bounded(last),
+            )
+            .order_by(evaluations.c.iteration, evaluations.c.particle)
+        )
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            rows = connection.execute(query).mappings().all()
+        return tuple(to_evaluation(row) for row in rows)
+
+    def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
+        """Read the particles of a range of committed iterations as columns."""
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            return select_columns(connection, job_id, _bounded(first), _bounded(last))
+
+    def best(self, job_id: str) -> Evaluation | None:
+        """Read the design of least fitness."""
+        with self._database.transaction(write=False) as connection:
+            job = job_row(connection, job_id)
+            if job["best_iteration"] is None:
+                return None
+            query = select(evaluations).where(
+                evaluations.c.job_id == job_id,
+                evaluations.c.iteration == job["best_iteration"],
+                evaluations.c.particle == job["best_particle"],
+            )
+            return to_evaluation(connection.execute(query).mappings().one())
+
+
+def checked_limit(limit: int) -> int:
+    """Items of a page: as many as are asked for, within reason.
+
+    Args:
+        limit: As asked for.
+
+    Returns:
+        The same, or the largest that there is.
+
+    Raises:
+        InvalidRequest: It is less than one; names the field `limit`.
+    """
+    if limit < 1:
+        raise InvalidRequest("a page holds at least one item", field="limit")
+    return min(limit, _LARGEST_PAGE)
+
+
+def _bounded(index: int) -> int:
+    """An index that both databases can compare; no iteration lies beyond."""
+    return max(-1, min(index, _LARGEST_INDEX))

@@ -87,22 +87,38 @@ def lifespan(
 
 
 async def service(request: Request) -> JobService:
-    """The application's service; tests may override it."""
+    """The application's service; tests may override it.
+
+    Args:
+        request: under way.
+    """
     return cast(JobService, request.state.service)
 
 
 async def settings(request: Request) -> Settings:
-    """The application's settings."""
+    """The application's settings.
+
+    Args:
+        request: under way.
+    """
     return cast(Settings, request.state.settings)
 
 
 async def slots(request: Request) -> SimulationSlots:
-    """The application's room for walks on request."""
+    """The application's room for walks on request.
+
+    Args:
+        request: under way.
+    """
     return cast(SimulationSlots, request.state.slots)
 
 
 async def stopping(request: Request) -> asyncio.Event:
-    """Set when the server begins to stop."""
+    """Set when the server begins to stop.
+
+    Args:
+        request: under way.
+    """
     return cast(asyncio.Event, request.state.stopping)
 
 
@@ -129,7 +145,15 @@ JobId = Annotated[
 
 
 def existing_job(job_id: JobId, service: Service) -> Job:
-    """The job of the path, or NotFound before any answer has begun."""
+    """The job of the path, read before any answer has begun.
+
+    Args:
+        job_id: as the path has it.
+        service: where it is.
+
+    Raises:
+        NotFound: no job of that id.
+    """
     return service.job(job_id)
 
 

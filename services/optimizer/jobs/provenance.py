@@ -116,7 +116,14 @@ def changes_since(
 
 
 def first_record(provenance: JobProvenance | None) -> ProvenanceRecords:
-    """Records of a job that is submitted; none if its first claim is to make the first."""
+    """Records of a job that is submitted.
+
+    Args:
+        provenance: what its numbers are to depend on; None leaves that to its first claim.
+
+    Returns:
+        One record from the first iteration on, or none.
+    """
     return () if provenance is None else with_record((), 0, provenance)
 
 

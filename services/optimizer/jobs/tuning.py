@@ -131,7 +131,14 @@ class JobSpec(Spec):
         return tuple(scenario.name for scenario in self.resolved_scenarios())
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
-        """One walk in each scenario; needs no recordings."""
+        """One walk in each scenario.
+
+        Args:
+            recordings: none are needed.
+
+        Returns:
+            The walks, in the order of `case_names`.
+        """
         names = self.design_space().names
         return tuple(
             Walk(self.robot, self.controller, scenario, names)

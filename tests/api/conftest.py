@@ -96,7 +96,8 @@ def _ask(job: Job, index: int) -> Ask:
 
 def _completed(job: Job, index: int, *, failed: bool) -> CompletedIteration:
     """The first particle falls in the second scenario; the others are the better, the later."""
-    objectives = np.full((PARTICLES, N_OBJECTIVES), 10.0) + np.arange(PARTICLES)[:, None]
+    number = np.arange(PARTICLES, dtype=np.float64)
+    objectives = np.full((PARTICLES, N_OBJECTIVES), 10.0) + number[:, None]
     statuses = np.full(PARTICLES, Status.FELL if failed else Status.OK, dtype=np.uint8)
     second = statuses.copy()
     second[0] = Status.FELL

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
 from typing import Any
 
 import httpx2
@@ -17,7 +15,8 @@ from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
-from tests.api.conftest import PARTICLES
+from tests.api.conftest import PARTICLES, Commit
+from tests.examples.frames import unframed
 
 pytestmark = pytest.mark.slow
 
@@ -40,16 +39,13 @@ def particles(
     answer = client.get(f"/v1/jobs/{job.id}/particles", params=parameters)
     assert answer.status_code == 200, answer.text
     assert answer.headers["content-type"] == "application/octet-stream"
-    (length,) = struct.unpack_from("<I", answer.content)
-    assert length % 4 == 0
-    header = json.loads(answer.content[4 : 4 + length])
-    numbers = np.frombuffer(answer.content, "<f4", offset=4 + length)
+    header, numbers = unframed(answer.content)
     names = [column["name"] for column in header["columns"]]
     return header, dict(zip(names, numbers.reshape(len(names), header["rows"]), strict=True))
 
 
 def test_the_distribution_leaves_out_designs_that_failed(
-    client: httpx2.Client, store: SqlStore, job: Job, commit
+    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
 ) -> None:
     commit(job, 2)
     found = distribution(client, job)
@@ -64,7 +60,7 @@ def test_the_distribution_leaves_out_designs_that_failed(
     assert found["next"] is None
 
 
-def test_the_distribution_comes_in_pages(client: httpx2.Client, job: Job, commit) -> None:
+def test_the_distribution_comes_in_pages(client: httpx2.Client, job: Job, commit: Commit) -> None:
     commit(job, 3)
     first = distribution(client, job, limit=2)
     second = distribution(client, job, limit=2, after=first["next"])
@@ -72,14 +68,18 @@ def test_the_distribution_comes_in_pages(client: httpx2.Client, job: Job, commit
     assert (first["next"], second["next"]) == ("1", None)
 
 
-def test_a_swarm_that_failed_wholly_has_nulls(client: httpx2.Client, job: Job, commit) -> None:
+def test_a_swarm_that_failed_wholly_has_nulls(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
     commit(job, 1, failed=True)
     (item,) = distribution(client, job)["items"]
     assert item["fitness"] == [None] * 7
     assert (item["mean"], item["failed"]) == (None, PARTICLES)
 
 
-def test_the_distribution_follows_a_running_job(client: httpx2.Client, job: Job, commit) -> None:
+def test_the_distribution_follows_a_running_job(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
     def indices(**parameters: int) -> list[int]:
         return [item["index"] for item in distribution(client, job, **parameters)["items"]]
 
@@ -92,7 +92,7 @@ def test_the_distribution_follows_a_running_job(client: httpx2.Client, job: Job,
 
 
 def test_particles_are_columns_of_floats_with_units_and_bounds(
-    client: httpx2.Client, store: SqlStore, job: Job, commit
+    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     header, columns = particles(client, job)
@@ -129,7 +129,7 @@ def test_particles_are_columns_of_floats_with_units_and_bounds(
 
 
 def test_particles_after_an_iteration_are_the_later_ones(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     assert particles(client, job)[0]["iterations"] is None
     commit(job, 3)
@@ -139,7 +139,7 @@ def test_particles_after_an_iteration_are_the_later_ones(
 
 
 def test_too_many_particles_are_thinned_and_the_best_is_kept(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     header, columns = particles(client, job, max_points=6)
@@ -148,7 +148,7 @@ def test_too_many_particles_are_thinned_and_the_best_is_kept(
 
 
 def test_a_ranking_by_another_preference_lists_both_places(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     found = ranking(client, job, preference="B", top=3)
@@ -176,7 +176,7 @@ def test_a_ranking_by_another_preference_lists_both_places(
 
 
 def test_a_preference_of_ones_own_is_taken_and_given_back(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 1)
     own = {"bias": [0.0] * 5, "exponent": [1.0, 0.0, 0.0, 0.0, 0.0]}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import httpx2
 
 from services.optimizer.jobs.preference import PREFERENCES
@@ -9,7 +11,7 @@ from sim.controllers import CONTROLLERS
 from sim.scenario import GAIT_VARIABLES, SCENARIOS
 
 
-def items(client: httpx2.Client, what: str) -> list[dict]:
+def items(client: httpx2.Client, what: str) -> list[dict[str, Any]]:
     answer = client.get(f"/v1/{what}")
     assert answer.status_code == 200
     return answer.json()["items"]

@@ -9,13 +9,14 @@ import httpx2
 import pytest
 
 from api.documentation import TAGS
+from tests.examples.servers import Server
 
 Document = dict[str, Any]
 Operation = tuple[str, Document]
 
 
 @pytest.fixture(scope="module")
-def document(lasting_server) -> Document:
+def document(lasting_server: Server) -> Document:
     return lasting_server.client.get("/openapi.json").json()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from typing import Any
 
 import httpx2
 import pytest
@@ -24,7 +25,7 @@ def runner(store: SqlStore) -> Iterator[Runner]:
     evaluator.close()
 
 
-def streamed(client: httpx2.Client, job_id: str) -> list[dict]:
+def streamed(client: httpx2.Client, job_id: str) -> list[dict[str, Any]]:
     """Data of every iteration until the stream ends with the job."""
     answer = client.get(f"/v1/jobs/{job_id}/events", timeout=60.0)
     blocks = [

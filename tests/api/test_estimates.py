@@ -5,8 +5,10 @@ from __future__ import annotations
 import httpx2
 import pytest
 
+from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Commit
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.walks import SHORT_WALK
 
@@ -26,7 +28,9 @@ def test_an_estimate_counts_walks_and_stores_nothing(
     assert store.jobs().items == ()
 
 
-def test_earlier_jobs_tell_the_rate(client: httpx2.Client, job, commit, spec: JobSpec) -> None:
+def test_earlier_jobs_tell_the_rate(
+    client: httpx2.Client, job: Job, commit: Commit, spec: JobSpec
+) -> None:
     commit(job, 2)
     found = client.post("/v1/estimates", json=spec.model_dump(mode="json")).json()
     # Two iterations took a second together, and the same job has three.

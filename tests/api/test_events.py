@@ -15,7 +15,9 @@ import httpx2
 import pytest
 
 from services.optimizer.jobs.job import Command, Job
+from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Commit, Serve
 
 pytestmark = pytest.mark.slow
 
@@ -53,7 +55,7 @@ def states(events: list[Event]) -> list[str]:
 
 
 def test_a_finished_jobs_stream_has_all_iterations_then_the_state_and_ends(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
 
@@ -67,7 +69,7 @@ def test_a_finished_jobs_stream_has_all_iterations_then_the_state_and_ends(
 
 
 def test_iterations_are_streamed_as_they_are_committed(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     claim = commit(job, 1)
 
@@ -89,7 +91,7 @@ def test_iterations_are_streamed_as_they_are_committed(
 
 
 def test_a_broken_stream_goes_on_without_gap_or_repeat(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     claim = commit(job, 2)
     received = []
@@ -105,7 +107,7 @@ def test_a_broken_stream_goes_on_without_gap_or_repeat(
 
 
 def test_no_iteration_is_missed_however_the_stream_races_with_the_runner(
-    client: httpx2.Client, store: SqlStore, spec, commit
+    client: httpx2.Client, store: SqlStore, spec: JobSpec, commit: Commit
 ) -> None:
     job = store.create_job(spec.model_copy(update={"iterations": 40}))[0]
     runner = threading.Thread(target=commit, args=(job, 40))
@@ -122,7 +124,7 @@ def test_no_iteration_is_missed_however_the_stream_races_with_the_runner(
 
 
 def test_resuming_after_the_end_gives_the_final_state_alone(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
 
@@ -144,7 +146,7 @@ def test_changes_of_state_are_events_and_a_cancellation_ends_the_stream(
 
 
 def test_a_stream_that_does_not_follow_ends_when_it_has_caught_up(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 2)
 
@@ -154,7 +156,7 @@ def test_a_stream_that_does_not_follow_ends_when_it_has_caught_up(
     assert states(events) == ["running"]
 
 
-def test_limit_and_after_bound_a_stream(client: httpx2.Client, job: Job, commit) -> None:
+def test_limit_and_after_bound_a_stream(client: httpx2.Client, job: Job, commit: Commit) -> None:
     commit(job, 3)
 
     assert ids(events_of(client, job, params={"limit": 2})) == ["0", "1"]
@@ -178,7 +180,7 @@ def test_an_idle_stream_is_kept_alive_by_comments(
         assert any(line.startswith(":") for line in answer.iter_lines())
 
 
-def test_a_waiting_stream_holds_no_transaction(serve, database: Path, job: Job) -> None:
+def test_a_waiting_stream_holds_no_transaction(serve: Serve, database: Path, job: Job) -> None:
     server = serve(api_event_poll_seconds=30.0)
 
     with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
@@ -191,7 +193,7 @@ def test_a_waiting_stream_holds_no_transaction(serve, database: Path, job: Job) 
     assert busy == 0
 
 
-def test_a_stopping_server_ends_open_streams(serve, job: Job) -> None:
+def test_a_stopping_server_ends_open_streams(serve: Serve, job: Job) -> None:
     server = serve(api_event_poll_seconds=60.0, api_shutdown_seconds=60)
 
     with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:

@@ -15,7 +15,7 @@ from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import OBJECTIVE_NAMES
-from tests.api.conftest import PARTICLES
+from tests.api.conftest import PARTICLES, Commit
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +29,7 @@ def export(client: httpx2.Client, job: Job, file_format: str) -> httpx2.Response
 
 
 @pytest.fixture
-def expected(client: httpx2.Client, job: Job, commit) -> list[dict[str, Any]]:
+def expected(client: httpx2.Client, job: Job, commit: Commit) -> list[dict[str, Any]]:
     """Rows of the table, from the evaluations one by one."""
     commit(job, 3)
     rows = []
@@ -81,7 +81,7 @@ def test_a_job_that_has_committed_nothing_has_a_table_without_rows(
         assert pq.read_table(io.BytesIO(content)).num_rows == 0
 
 
-def test_the_file_is_written_as_it_is_read(store: SqlStore, job: Job, commit) -> None:
+def test_the_file_is_written_as_it_is_read(store: SqlStore, job: Job, commit: Commit) -> None:
     commit(job, 3)
     committed = store.job(job.id)
     for file_format in ("csv", "parquet"):

@@ -10,12 +10,13 @@ import pytest
 from services.optimizer.jobs.job import Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import OBJECTIVE_NAMES
+from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow
 
 
 def test_iterations_come_in_pages_without_gap_or_repeat(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     where = f"/v1/jobs/{job.id}/iterations"
@@ -27,7 +28,7 @@ def test_iterations_come_in_pages_without_gap_or_repeat(
     assert second["next"] is None
 
 
-def test_an_iteration_summarizes_the_swarm(client: httpx2.Client, job: Job, commit) -> None:
+def test_an_iteration_summarizes_the_swarm(client: httpx2.Client, job: Job, commit: Commit) -> None:
     commit(job, 2)
 
     (item,) = client.get(f"/v1/jobs/{job.id}/iterations", params={"after": 0}).json()["items"]
@@ -41,7 +42,7 @@ def test_an_iteration_summarizes_the_swarm(client: httpx2.Client, job: Job, comm
 
 
 def test_evaluations_give_every_particle_in_full_precision(
-    client: httpx2.Client, store: SqlStore, job: Job, commit
+    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
 ) -> None:
     commit(job, 1)
 
@@ -56,7 +57,9 @@ def test_evaluations_give_every_particle_in_full_precision(
         assert set(item["scenarios"]) == {"normal-fast", "turn-right-fast"}
 
 
-def test_a_walk_that_failed_has_a_status_and_nulls(client: httpx2.Client, job: Job, commit) -> None:
+def test_a_walk_that_failed_has_a_status_and_nulls(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
     commit(job, 1)
 
     fallen = client.get(f"/v1/jobs/{job.id}/iterations/0/evaluations").json()["items"][0]
@@ -70,7 +73,9 @@ def test_a_walk_that_failed_has_a_status_and_nulls(client: httpx2.Client, job: J
     assert result["objectives"] == dict.fromkeys(OBJECTIVE_NAMES)
 
 
-def test_the_utility_is_the_bias_weighted_product(client: httpx2.Client, job: Job, commit) -> None:
+def test_the_utility_is_the_bias_weighted_product(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
     commit(job, 1)
 
     second = client.get(f"/v1/jobs/{job.id}/iterations/0/evaluations").json()["items"][1]
@@ -80,7 +85,9 @@ def test_the_utility_is_the_bias_weighted_product(client: httpx2.Client, job: Jo
     assert second["scenarios"]["normal-fast"]["utility"] == pytest.approx(expected, rel=1e-12)
 
 
-def test_an_iteration_not_committed_is_not_found(client: httpx2.Client, job: Job, commit) -> None:
+def test_an_iteration_not_committed_is_not_found(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
     commit(job, 1)
 
     answer = client.get(f"/v1/jobs/{job.id}/iterations/1/evaluations")
@@ -90,7 +97,7 @@ def test_an_iteration_not_committed_is_not_found(client: httpx2.Client, job: Job
 
 
 def test_the_best_is_the_evaluation_of_least_fitness(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
 
@@ -102,7 +109,9 @@ def test_the_best_is_the_evaluation_of_least_fitness(
     assert client.get(f"/v1/jobs/{job.id}").json()["best"] == best
 
 
-def test_there_is_no_best_while_every_design_fails(client: httpx2.Client, job: Job, commit) -> None:
+def test_there_is_no_best_while_every_design_fails(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
     commit(job, 1, failed=True)
 
     answer = client.get(f"/v1/jobs/{job.id}/best")

@@ -13,6 +13,7 @@ from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow
 
@@ -83,7 +84,7 @@ def test_the_same_key_with_another_body_is_a_conflict(
 
 
 def test_progress_rates_and_estimate_follow_from_committed_iterations(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 2)
 
@@ -110,6 +111,7 @@ def test_a_job_that_has_not_begun_has_no_estimate_and_no_best(
 
 def test_a_failed_job_says_why(client: httpx2.Client, store: SqlStore, job: Job) -> None:
     claim = store.claim("test", lease_seconds=60.0)
+    assert claim is not None
     store.release(claim, JobState.FAILED, error="the robot's legs came off")
 
     view = client.get(f"/v1/jobs/{job.id}").json()
@@ -163,7 +165,7 @@ def statements() -> Iterator[list[str]]:
     """First words of what is sent to any database while a test runs."""
     sent: list[str] = []
 
-    def note(connection, cursor, statement: str, *_: object) -> None:
+    def note(connection: object, cursor: object, statement: str, *_: object) -> None:
         sent.append(statement.split(maxsplit=1)[0])
 
     event.listen(Engine, "before_cursor_execute", note)
@@ -192,7 +194,7 @@ def test_pausing_and_resuming_a_queued_job(client: httpx2.Client, job: Job) -> N
 
 
 def test_a_running_job_is_pausing_until_its_iteration_is_committed(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     claim = commit(job, 1)
 
@@ -290,7 +292,7 @@ def test_the_list_is_searched_and_sorted(client: httpx2.Client) -> None:
 
 
 def test_a_job_that_succeeded_is_extended_and_queued_again(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     link = client.get(f"/v1/jobs/{job.id}").json()["links"]["extend"]
@@ -305,7 +307,7 @@ def test_a_job_that_succeeded_is_extended_and_queued_again(
 
 @pytest.mark.parametrize("iterations", [0, 3, 1_000_001, "many"])
 def test_a_budget_that_makes_no_sense_is_refused_by_name(
-    client: httpx2.Client, job: Job, commit, iterations: object
+    client: httpx2.Client, job: Job, commit: Commit, iterations: object
 ) -> None:
     commit(job, 3)
 

@@ -14,7 +14,7 @@ import pytest
 
 from api.page import is_built
 from services.optimizer.jobs.job import Job
-from tests.api.conftest import Serve
+from tests.api.conftest import Commit, Serve
 from tests.examples.processes import python
 from tests.examples.servers import Server
 
@@ -158,7 +158,7 @@ def test_a_page_that_is_built_while_the_server_runs_is_served(serve: Serve, tmp_
 
 
 def test_an_event_stream_is_not_compressed_and_not_held_back(
-    client: httpx2.Client, job: Job, commit
+    client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     claim = commit(job, 1)
     headers = {"Accept-Encoding": "gzip"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import struct
 from typing import Any
 
 import httpx2
@@ -14,6 +13,7 @@ import pytest
 from sim.outcome import OBJECTIVE_NAMES
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
+from tests.examples.frames import unframed
 from tests.examples.paths import QUADRUPED
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, quadruped_files
 
@@ -29,10 +29,7 @@ def replayed(client: httpx2.Client, **body: Any) -> tuple[dict[str, Any], dict[s
     assert answer.status_code == 200, answer.text
     assert answer.headers["Content-Type"] == "application/octet-stream"
     assert answer.headers["Cache-Control"] == "no-store"
-    (length,) = struct.unpack_from("<I", answer.content)
-    assert length % 4 == 0
-    header = json.loads(answer.content[4 : 4 + length])
-    numbers = np.frombuffer(answer.content, dtype="<f4", offset=4 + length)
+    header, numbers = unframed(answer.content)
     frames = numbers.reshape(header["frames"], -1)
     channels = {}
     for channel in header["channels"]:

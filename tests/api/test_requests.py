@@ -9,6 +9,7 @@ from services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnav
 from services.optimizer.jobs.job import Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.errors import KernelBuildError
+from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow
 
@@ -114,7 +115,11 @@ def test_short_paths_lead_to_the_real_ones(client: httpx2.Client, path: str, tar
 
 
 def test_a_stream_outlives_an_absence_of_the_database(
-    client: httpx2.Client, store: SqlStore, job: Job, commit, monkeypatch: pytest.MonkeyPatch
+    client: httpx2.Client,
+    store: SqlStore,
+    job: Job,
+    commit: Commit,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     commit(job, 3)
     answers = iter([None, StoreUnavailable("away"), StoreUnavailable("away")])

@@ -18,6 +18,7 @@ from gaitswarm.requests.walk import SimulationRequest, run_simulation
 from gaitswarm.views import SimulationView
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.scenario import find_scenario
+from tests.api.conftest import Serve
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
 
 pytestmark = pytest.mark.slow
@@ -118,7 +119,7 @@ def test_a_request_that_makes_no_sense_is_refused_by_field(
     assert hint in problem["detail"]
 
 
-def test_logs_are_limited_more_than_walks(serve) -> None:
+def test_logs_are_limited_more_than_walks(serve: Serve) -> None:
     client = serve(api_max_logged_seconds=0.5).client
 
     assert simulated(client, scenarios=[SHORT_WALK])["scenarios"]["short"]["status"] == "ok"
@@ -154,7 +155,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
     gate.opened.set()
 
 
-def test_only_so_many_walks_compute_at_once_and_the_next_wait(serve, gate: Gate) -> None:
+def test_only_so_many_walks_compute_at_once_and_the_next_wait(serve: Serve, gate: Gate) -> None:
     client = serve(api_simulation_workers=1).client
     with ThreadPoolExecutor(2) as pool:
         answers = [pool.submit(simulated, client, scenarios=[SHORT_WALK]) for _ in range(2)]
@@ -167,7 +168,7 @@ def test_only_so_many_walks_compute_at_once_and_the_next_wait(serve, gate: Gate)
     assert [a.result()["scenarios"]["short"]["status"] for a in answers] == ["ok", "ok"]
 
 
-def test_when_too_many_walks_wait_the_next_is_told_to_come_later(serve, gate: Gate) -> None:
+def test_when_too_many_walks_wait_the_next_is_told_to_come_later(serve: Serve, gate: Gate) -> None:
     client = serve(api_simulation_workers=1, api_simulation_queue=0).client
     with ThreadPoolExecutor(1) as pool:
         first = pool.submit(simulated, client, scenarios=[SHORT_WALK])
@@ -180,7 +181,7 @@ def test_when_too_many_walks_wait_the_next_is_told_to_come_later(serve, gate: Ga
     assert first.result()["scenarios"]["short"]["status"] == "ok"
 
 
-def test_a_stopping_server_answers_what_was_asked_before(serve, gate: Gate) -> None:
+def test_a_stopping_server_answers_what_was_asked_before(serve: Serve, gate: Gate) -> None:
     server = serve(api_simulation_workers=1, api_shutdown_seconds=60)
     with ThreadPoolExecutor(2) as pool:
         answers = [pool.submit(simulated, server.client, scenarios=[SHORT_WALK]) for _ in range(2)]

@@ -12,13 +12,15 @@ import pytest
 from gaitswarm.views import JobView
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def unreadable(store: SqlStore, database: Path, job: Job, commit) -> Job:
+def unreadable(store: SqlStore, database: Path, job: Job, commit: Commit) -> Job:
     """A job that has committed two iterations, and was then set aside."""
     commit(job, 2)
     with closing(sqlite3.connect(database)) as connection, connection:
@@ -32,7 +34,7 @@ def unreadable(store: SqlStore, database: Path, job: Job, commit) -> Job:
 
 
 def test_it_is_listed_with_what_is_known_of_it(
-    client: httpx2.Client, unreadable: Job, store: SqlStore, spec
+    client: httpx2.Client, unreadable: Job, store: SqlStore, spec: JobSpec
 ) -> None:
     sound, _ = store.create_job(spec)
     for query in ({}, {"order": "name"}, {"search": "small"}):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -22,10 +22,11 @@ from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
 from sim.kernel.observation import WalkLog
 from sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
+from tests.api.conftest import Commit
 from tests.examples.processes import loaded_by
 
 
-def strict(text: str) -> object:
+def strict(text: str) -> Any:
     """Parsed as the standard has it: Python's own parser also takes NaN and Infinity."""
 
     def refuse(literal: str) -> None:
@@ -83,7 +84,7 @@ def test_a_design_that_was_never_walked_has_no_log() -> None:
 
 
 def test_a_history_keeps_every_bit_of_designs_and_objectives(
-    store: SqlStore, job: Job, commit
+    store: SqlStore, job: Job, commit: Commit
 ) -> None:
     commit(job, 1)
     (iteration,) = store.iterations(job.id).items
@@ -100,7 +101,7 @@ def test_a_history_keeps_every_bit_of_designs_and_objectives(
 
 
 def test_a_job_view_is_read_from_json_with_every_bit_of_the_best_design(
-    store: SqlStore, job: Job, commit
+    store: SqlStore, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     stored, best = store.job(job.id), store.best(job.id)

@@ -62,7 +62,8 @@ def no_compiler(folder: Path) -> dict[str, str]:
     """Neither a compiler, on the path or as a wheel, nor a kernel that one has left."""
     (folder / "ziglang.py").write_text("raise SystemExit(1)\n", encoding="utf-8")
     path = os.pathsep.join([str(folder), str(ROOT)])
-    return {"PYTHONPATH": path, "PATH": str(folder), "CC": "", "XDG_CACHE_HOME": str(folder)}
+    nowhere = dict.fromkeys(("PATH", "XDG_CACHE_HOME", "TMPDIR"), str(folder))
+    return {"PYTHONPATH": path, "CC": ""} | nowhere
 
 
 def history(job: Finished, gaitswarm: Gaitswarm) -> Any:

@@ -17,6 +17,18 @@ CRAWL = str(QUADRUPED / "crawl.json")
 SIMULATE = ["simulate", "--controller", "pi", "--design", "published:validation", "--json"]
 
 
+def edited(tmp_path: Path, file: str, old: str, new: str) -> Path:
+    """The quadruped's folder, copied, with a text replaced in one of its files."""
+    folder = tmp_path / "robot"
+    if not folder.exists():
+        shutil.copytree(QUADRUPED, folder)
+    path = folder / file
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return folder
+
+
 def test_a_quadruped_crawls(capsys: pytest.CaptureFixture[str]) -> None:
     assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", CRAWL]) == 0
     walked = json.loads(capsys.readouterr().out)["scenarios"]["crawl"]
@@ -28,15 +40,11 @@ def test_a_quadruped_crawls(capsys: pytest.CaptureFixture[str]) -> None:
 def test_files_with_former_names_walk_as_well(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    folder, crawl = tmp_path / "robot", tmp_path / "crawl.json"
-    shutil.copytree(QUADRUPED, folder)
-    toml = (folder / "robot.toml").read_text(encoding="utf-8").replace("actuators", "drives")
-    (folder / "robot.toml").write_text(toml, encoding="utf-8")
-    former = Path(CRAWL).read_text(encoding="utf-8").replace("hip_height", "withers")
-    crawl.write_text(former, encoding="utf-8")
+    former = edited(tmp_path, "robot.toml", "actuators", "drives")
+    edited(tmp_path, "crawl.json", "hip_height", "withers")
     assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", CRAWL]) == 0
     walked = json.loads(capsys.readouterr().out)["scenarios"]
-    assert run([*SIMULATE, "--robot", str(folder), "--scenario", str(crawl)]) == 0
+    assert run([*SIMULATE, "--robot", str(former), "--scenario", str(former / "crawl.json")]) == 0
     assert json.loads(capsys.readouterr().out)["scenarios"] == walked
 
 
@@ -81,12 +89,7 @@ def test_an_error_in_a_robot_file_names_field_line_and_unit(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    folder = tmp_path / "robot"
-    shutil.copytree(QUADRUPED, folder)
-    text = (folder / "robot.toml").read_text(encoding="utf-8")
-    assert line in text
-    changed = text.replace(line, broken, 1)
-    (folder / "robot.toml").write_text(changed, encoding="utf-8")
+    folder = edited(tmp_path, "robot.toml", line, broken)
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
     told = capsys.readouterr().err
     for part in said:
@@ -112,10 +115,7 @@ def test_a_robot_that_is_none_is_named(
 def test_a_leg_without_its_joints_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = tmp_path / "robot"
-    shutil.copytree(QUADRUPED, folder)
-    text = (folder / "robot.toml").read_text(encoding="utf-8")
-    (folder / "robot.toml").write_text(text.replace("left_rear", "tail"), encoding="utf-8")
+    folder = edited(tmp_path, "robot.toml", "left_rear", "tail")
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
     assert "leg 'tail' has no joint or frame 'tail_coxa'" in capsys.readouterr().err
 
@@ -123,10 +123,7 @@ def test_a_leg_without_its_joints_is_named(
 def test_a_leg_joint_with_a_turned_frame_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = tmp_path / "robot"
-    shutil.copytree(QUADRUPED, folder)
-    text = (folder / "robot.urdf").read_text(encoding="utf-8")
-    turned = text.replace("<origin xyz=", '<origin rpy="0 0 0.5" xyz=')
-    (folder / "robot.urdf").write_text(turned, encoding="utf-8")
+    turned = '<origin rpy="0 0 0.5" xyz='
+    folder = edited(tmp_path, "robot.urdf", "<origin xyz=", turned)
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
     assert "rpy '0 0 0.5' turns its frame" in capsys.readouterr().err

@@ -37,9 +37,12 @@ def test_list_and_status_show_it_and_other_commands_say_why_they_cannot(
     assert "schema_version" in status.out
     assert gaitswarm("status", unreadable, *where, "--json").json["spec"] is None
     for command in ("history", "export", "extend"):
-        options = {"export": ["--output", db.with_suffix(".csv")], "extend": ["--iterations", "9"]}
+        options = {
+            "export": ("--output", str(db.with_suffix(".csv"))),
+            "extend": ("--iterations", "9"),
+        }
         json = ["--json"] if command == "history" else []
-        refused = gaitswarm(command, unreadable, *options.get(command, []), *where, *json)
+        refused = gaitswarm(command, unreadable, *options.get(command, ()), *where, *json)
         assert refused.code == 4, (command, refused.err)
         assert "schema_version" in refused.err and "Traceback" not in refused.err
 

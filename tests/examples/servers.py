@@ -63,7 +63,8 @@ class ServerProcess:
     def __init__(self, database: Path, *options: str) -> None:
         chosen = options or ("--evaluator", "in-process")
         self.process = start_python(
-            *(*COMMAND_LINE, "serve", "--db", database, "--port", "0", *chosen),
+            *COMMAND_LINE,
+            *("serve", "--db", str(database), "--port", "0", *chosen),
             environment={"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"},
             stdout=None,
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,6 @@ def test_a_single_run_cannot_tell() -> None:
 
 def test_a_run_without_a_good_design_is_refused() -> None:
     bad = run(7.0, seed=1)
-    failed = EvaluationColumns(*bad.arrays[:5], np.full(400, np.inf))  # type: ignore[arg-type]
+    failed = replace(bad, fitness=np.full(400, np.inf))
     with pytest.raises(ValueError, match="every run needs a design"):
         identifiability(VARIABLES, [bad, failed])

@@ -8,7 +8,7 @@ from contextlib import aclosing
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import anyio
 import httpx2
@@ -340,7 +340,7 @@ def follow(request: pytest.FixtureRequest) -> Follow:
             async def following() -> list[gaitswarm.JobEvent]:
                 async with (
                     gaitswarm.AsyncServerJobs(URL, transport=way, **options) as jobs,
-                    aclosing(jobs.follow("k2q7zr5dm9xw", after=after)) as events,
+                    aclosing(cast(Any, jobs.follow("k2q7zr5dm9xw", after=after))) as events,
                 ):
                     return [event async for event in events]
 

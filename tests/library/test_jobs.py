@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -121,13 +121,13 @@ REFUSED: dict[str, tuple[Callable[[gaitswarm.Jobs, str], Any], str]] = {
     "unknown state": (lambda jobs, _: list(jobs.jobs(state="flying")), "state"),
     "unknown order": (lambda jobs, _: list(jobs.jobs(order="age")), "order"),
     "unknown command": (lambda jobs, job: jobs.command(job, "fly"), "command"),
-    "unknown format": (lambda jobs, job: list(jobs.export(job, "xlsx")), "file_format"),
-    "unknown preference": (lambda jobs, job: jobs.ranking(job, "Z"), "preference"),
+    "unknown format": (lambda jobs, job: list(jobs.export(job, cast(Any, "xlsx"))), "file_format"),
+    "unknown preference": (lambda jobs, job: jobs.ranking(job, cast(Any, "Z")), "preference"),
     "rank nothing": (lambda jobs, job: jobs.ranking(job, "A", top=0), "top"),
     "spent budget": (lambda jobs, job: jobs.extend(job, 1), "iterations"),
     "compare nothing": (lambda jobs, _: jobs.parameters([]), "job_ids"),
     "one id as text": (lambda jobs, job: jobs.parameters(job), "job_ids"),
-    "no design": (lambda jobs, _: jobs.simulate(3), "design"),
+    "no design": (lambda jobs, _: jobs.simulate(cast(Any, 3)), "design"),
     "half a design": (lambda jobs, _: jobs.simulate({"P": 0.4}, controller="pi"), "design"),
     "gait out of reach": (
         lambda jobs, _: jobs.simulate({**PUBLISHED, "stride": 0.9}),
@@ -165,7 +165,7 @@ MISSING: tuple[Callable[[gaitswarm.Jobs], Any], ...] = (
     lambda jobs: jobs.parameters(["nosuchjob"]),
     lambda jobs: list(jobs.export("nosuchjob")),
     lambda jobs: jobs.recording("0" * 32),
-    lambda jobs: jobs.surface(PUBLISHED, controller="bang-bang"),
+    lambda jobs: jobs.surface(PUBLISHED, controller=cast(Any, "bang-bang")),
 )
 
 
@@ -355,7 +355,8 @@ def test_a_recorded_walk_is_kept_and_taken_back(reach: Reach, db: Path) -> None:
     )
     jobs = reach(db)
     kept = jobs.record(walk)
-    assert (kept.rows, kept.mean_current) == (2, pytest.approx(0.15))
+    assert kept.rows == 2
+    assert kept.mean_current == pytest.approx(0.15)
     assert jobs.recording(kept.id) == walk
     assert jobs.record(walk).id == kept.id
 

@@ -67,9 +67,10 @@ def test_a_log_has_the_walk_at_500_hz_and_changes_no_number() -> None:
     assert np.array_equal(result.objectives, simulate({"P": GAINS, "I": 0.1}).objectives)
     logs = result[FAST].logs
     assert len(logs) == 3
-    assert logs[1].time[1] == 0.002
-    assert logs[1].joint_angle.shape == (len(logs[1].time), 18)
-    walked = logs[1].base_position[-1, 0] - logs[1].base_position[0, 0]
+    log = logs[1]
+    assert log is not None and log.time[1] == 0.002
+    assert log.joint_angle.shape == (len(log.time), 18)
+    walked = log.base_position[-1, 0] - log.base_position[0, 0]
     reciprocal_speed = result[FAST].objectives["reciprocal_speed"][1]
     assert walked / 4.5 == pytest.approx(1.0 / reciprocal_speed, rel=0.02)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,4 +42,4 @@ def fitness_only(*swarms: tuple[float, ...]) -> EvaluationColumns:
     """One iteration for every swarm's fitness."""
     fitness = np.array(swarms, dtype=np.float64)
     found = columns_of(np.ones((fitness.size, 1, 6)), particles=fitness.shape[1])
-    return EvaluationColumns(*found.arrays[:5], fitness.reshape(-1))  # type: ignore[arg-type]
+    return replace(found, fitness=fitness.reshape(-1))

@@ -8,10 +8,12 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.provenance import JobProvenance, with_record
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from sim.case import Walk
 from sim.outcome import Outcome, Status
 from sim.provenance import Provenance
 
@@ -40,7 +42,7 @@ HERE = JobProvenance(
 )
 
 
-def job(spec: JobSpec = SPEC, state: JobState = JobState.RUNNING) -> Job:
+def job(spec: AnySpec = SPEC, state: JobState = JobState.RUNNING) -> Job:
     now = datetime(2026, 1, 1, tzinfo=UTC)
     return Job("a-job", spec, state, now, now, provenance=with_record((), 0, HERE))
 
@@ -49,6 +51,7 @@ def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:
     """Objectives that depend on every variable and scenario; one design in seven falls."""
     outcomes = []
     for case in request.cases:
+        assert isinstance(case, Walk)
         scenario = case.scenario
         scale = scenario.cycle_time + scenario.slope + np.arange(1.0, 7.0)
         objectives = np.abs(request.designs.sum(axis=1, keepdims=True) - 0.7) * scale + 0.01

@@ -154,6 +154,7 @@ def test_a_pause_takes_effect_when_the_iteration_is_committed() -> None:
 def test_workers_out_of_reach_are_tried_again_after_growing_delays_and_then_given_up() -> None:
     state, _ = begin()
     delays = []
+    action: Action | None = None
     while state.phase is not Phase.ENDED:
         state, (action,) = handle(state, EvaluatorLost("no route to host"))
         if isinstance(action, Wait):

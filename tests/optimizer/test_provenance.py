@@ -7,6 +7,7 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,7 +62,7 @@ def forget_provenance(store: Store, tmp_path: Path) -> Callable[[], None]:
 
 
 def run(
-    store: Store, provenance: JobProvenance, on_commit: OnCommit | None = None, **given: bool
+    store: Store, provenance: JobProvenance, on_commit: OnCommit | None = None, **given: Any
 ) -> Job:
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partialmethod
+from typing import cast
 
 import numpy as np
 import pytest
@@ -100,6 +101,11 @@ def test_a_job_longer_than_its_lease_is_kept_by_its_heartbeat(store: Store) -> N
     assert store.job(job_id).state is JobState.SUCCEEDED
 
 
+def set_after(awaited: threading.Event, following: threading.Event) -> None:
+    awaited.wait()
+    following.set()
+
+
 def test_a_stopped_run_gives_its_job_back_for_another_to_finish(store: Store) -> None:
     whole = queue(store)
     run(store, FormulaEvaluator())
@@ -107,7 +113,7 @@ def test_a_stopped_run_gives_its_job_back_for_another_to_finish(store: Store) ->
     evaluator = FormulaEvaluator()
     evaluator.hold.set()
     stop = threading.Event()
-    threading.Thread(target=lambda: (evaluator.entered.wait(), stop.set())).start()
+    threading.Thread(target=set_after, args=(evaluator.entered, stop)).start()
     assert run(store, evaluator, stop).state is JobState.QUEUED
     assert run(store, FormulaEvaluator()).state is JobState.SUCCEEDED
     assert history(store, job_id) == history(store, whole)
@@ -189,7 +195,7 @@ def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(stor
     job_id = queue(store)
     evaluator = FormulaEvaluator()
     absent = AbsentStore(store, lambda: evaluator.calls == 3 and absent.refused.count("commit") < 3)
-    job = run(absent, evaluator, lease_seconds=60.0)
+    job = run(cast(Store, absent), evaluator, lease_seconds=60.0)
     assert job.state is JobState.SUCCEEDED
     assert absent.refused.count("commit") == 3
     assert evaluator.calls == SPEC.iterations
@@ -200,7 +206,7 @@ def test_a_store_that_stays_away_is_waited_for_no_longer_than_the_lease(store: S
     queue(store)
     evaluator = FormulaEvaluator()
     absent = AbsentStore(store, lambda: evaluator.calls > 0)
-    job = run(absent, evaluator, lease_seconds=0.3)
+    job = run(cast(Store, absent), evaluator, lease_seconds=0.3)
     assert evaluator.calls == 1
     assert (job.state, job.progress.iterations) == (JobState.RUNNING, 0)
     assert store.claim("another", lease_seconds=60.0) is not None
@@ -211,9 +217,9 @@ def test_a_process_that_is_to_end_does_not_wait_for_a_store_that_is_away(store: 
     evaluator = FormulaEvaluator()
     absent = AbsentStore(store, lambda: evaluator.calls > 0)
     stop = threading.Event()
-    threading.Thread(target=lambda: (absent.refusal.wait(), stop.set())).start()
+    threading.Thread(target=set_after, args=(absent.refusal, stop)).start()
     begun = time.monotonic()
-    assert run(absent, evaluator, stop, lease_seconds=600.0).progress.iterations == 0
+    assert run(cast(Store, absent), evaluator, stop, lease_seconds=600.0).progress.iterations == 0
     assert time.monotonic() - begun < 2.0
 
 

@@ -80,7 +80,7 @@ def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: 
 
     job_id = queue(store)
     chance = random.Random(7)
-    progress = []
+    progress: list[int] = []
     # Five lives, or fewer where the machine becomes so fast that they would reach the end.
     while len(progress) < 5 and (not progress or progress[-1] < SPEC.iterations - 4):
         process = start(url, job_id)

@@ -70,8 +70,9 @@ def undocumented(function: Function, *, is_method: bool, is_algebra: bool) -> li
 def test_every_argument_of_a_public_function_is_documented() -> None:
     silent = []
     for path, tree in TREES.items():
-        owners = [node for node in classes(tree) if not node.name.startswith("_")]
-        for owner in (tree, *owners):
+        owners: list[ast.Module | ast.ClassDef] = [tree]
+        owners += [node for node in classes(tree) if not node.name.startswith("_")]
+        for owner in owners:
             for function in functions(owner):
                 missing = undocumented(
                     function, is_method=owner is not tree, is_algebra=path == ALGEBRA

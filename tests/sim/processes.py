@@ -11,7 +11,7 @@ __all__ = ["ROOT", "run_python"]
 
 
 def run_python(
-    code: str, *, timeout: float = 120.0, **environment: str
+    code: str, timeout: float = 120.0, /, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     """Statements, with all warnings shown."""
     return python("-P", "-W", "default", "-c", code, environment=environment, timeout=timeout)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -55,7 +56,7 @@ def test_narrower_kernels_compile_without_a_warning(wanted: Target) -> None:
     source = kernel_source(robot)
     for name, text in (("kernel-narrow", source), ("inference", inference_source())):
         library = build_library(
-            name, text.encode(), lambda text=text: text, wanted=aim, extra_flags=STRICT
+            name, text.encode(), partial(str, text), wanted=aim, extra_flags=STRICT
         )
         assert library is not None
 

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.controllers import CONTROLLERS
+from sim.controllers.base import LookupTable
 from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
 from sim.controllers.fuzzy_pi_3 import integral_system
 from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape, output_points
@@ -123,14 +124,14 @@ def test_table_memory_follows_equation_5_1() -> None:
     assert table_bytes((8, 8), 8) == 64 * 1024
     assert table_bytes((6, 6, 6), 8, outputs=2) == 512 * 1024
     law = CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A)
-    assert law.direct is not None
+    assert isinstance(law.direct, LookupTable)
     assert law.direct.values.nbytes == table_bytes((10, 6), 8)
 
 
 def test_the_laws_scales_are_those_of_the_ranges() -> None:
     law = CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A)
     table = law.direct
-    assert table is not None
+    assert isinstance(table, LookupTable)
     assert (5837 * table.error_gain + (1 << 15)) >> 16 == 511
     assert (20111 * table.current_gain + (1 << 15)) >> 16 == 63
     assert (127 * table.output_gain + (1 << 15)) >> 16 == 781
@@ -155,8 +156,7 @@ def test_a_table_of_three_inputs_is_its_inference() -> None:
 
 def test_chapter_3s_rules_follow_error_and_velocity_and_yield_to_current() -> None:
     law = CONTROLLERS["fuzzy-pi-3"].compile(CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"])
-    assert law.direct is not None
-    assert law.integrated is not None
+    assert isinstance(law.direct, LookupTable) and isinstance(law.integrated, LookupTable)
     voltage, rate = law.direct.values[:, :, 0].astype(int), law.integrated.values.astype(int)
     assert voltage[900, 0] > 0 > voltage[120, 0]
     assert voltage[900, 63] < 0 < voltage[120, 63]

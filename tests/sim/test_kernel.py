@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -130,7 +131,7 @@ def test_a_fallen_walkers_log_is_the_same_alone_and_in_company(robot: Robot) -> 
     assert alone.states is not None and company[1].states is not None
     assert readable.states is not None
     assert company[1].states.tobytes() == alone.states.tobytes()
-    rows = np.isfinite(alone.states).all(axis=1)
+    rows = np.asarray(np.isfinite(alone.states).all(axis=1))
     fell_at = int(rows.sum())
     assert 0 < fell_at < falling.ticks
     assert rows[:fell_at].all()
@@ -180,7 +181,8 @@ def test_an_array_of_another_shape_is_refused_by_name(kind: str, name: str) -> N
     good = dataclasses.replace(setup, disturbance=np.zeros(setup.desired.shape))
     right = getattr(good, name)
     for wrong in (right[..., :-1], np.repeat(right, 2, axis=-1), right[:0], right[np.newaxis]):
-        bad = dataclasses.replace(good, **{name: wrong})
+        change: dict[str, Any] = {name: wrong}
+        bad = dataclasses.replace(good, **change)
         with pytest.raises(ValueError, match=rf"^{name}: .*shape"):
             kernel.walk([good, bad], Coding.of(machine, 40), log=True)
 

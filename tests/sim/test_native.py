@@ -81,6 +81,8 @@ def test_without_a_compiler_the_interpreter_serves_and_says_so(tmp_path: Path) -
         PATH="",
         CC="",
         XDG_CACHE_HOME=str(tmp_path),
+        # Where a private cache would be, which may hold a kernel.
+        TMPDIR=str(tmp_path),
     )
     assert done.stdout.strip() == "reference", done.stderr
     assert "no C compiler found" in done.stderr
@@ -180,7 +182,7 @@ def test_a_kernel_loads_while_another_one_is_compiled(tmp_path: Path) -> None:
     os.mkfifo(gate)
     held_open = os.open(gate, os.O_RDWR)
     try:
-        done = run_python(COMPILE_ANOTHER + LOAD_QUADRUPED + GO_ON, timeout=60, **environment)
+        done = run_python(COMPILE_ANOTHER + LOAD_QUADRUPED + GO_ON, 60.0, **environment)
     finally:
         os.write(held_open, b"the compiler may end\n")
         os.close(held_open)

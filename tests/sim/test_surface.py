@@ -91,4 +91,4 @@ def test_the_integrated_output_is_per_second_at_the_velocity_held(integral: Surf
 
 def test_controllers_without_rules_have_no_inference() -> None:
     for name in ("p", "pi", "pid"):
-        assert CONTROLLERS[name].inferences({}) == ()  # type: ignore[index]  # a literal's name
+        assert CONTROLLERS[name].inferences({}) == ()

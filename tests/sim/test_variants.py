@@ -136,7 +136,7 @@ def test_backlash_shakes_the_body() -> None:
 @pytest.mark.parametrize("link", [1, 2, 3])
 def test_noise_on_a_link_costs_torque(link: int) -> None:
     calm_walk = SCENARIOS[0].model_copy(update={"cycles": 1.0})
-    noise = LinkNoise(link=link, deviation=10.0)  # type: ignore[arg-type]
+    noise = LinkNoise(link=link, deviation=10.0)
     noisy = simulate(calm_walk, "pi", ["P", "I"], PI, noise=noise).outcome.objectives[0]
     calm = simulate(calm_walk, "pi", ["P", "I"], PI).outcome.objectives[0]
     assert noisy[0] > 1.1 * calm[0]

@@ -8,9 +8,10 @@ import shutil
 import socket
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 def postgres_binaries() -> Path | None:
@@ -38,7 +39,15 @@ def postgres_server(binaries: Path) -> Iterator[str]:
             user,
         )
         options = f"-c listen_addresses=127.0.0.1 -c port={port} -k {folder} -c fsync=off"
-        start = [binaries / "pg_ctl", "start", "-w", "-D", data, "-l", folder / "log"]
+        start: list[Path | str] = [
+            binaries / "pg_ctl",
+            "start",
+            "-w",
+            "-D",
+            data,
+            "-l",
+            folder / "log",
+        ]
         _run([*start, "-o", options], user)
         try:
             yield f"postgresql://gaitswarm@127.0.0.1:{port}"
@@ -48,8 +57,10 @@ def postgres_server(binaries: Path) -> Iterator[str]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _run(command: list[Path | str], user: pwd.struct_passwd | None) -> None:
-    identity = {} if user is None else {"user": user.pw_uid, "group": user.pw_gid}
+def _run(command: Sequence[Path | str], user: pwd.struct_passwd | None) -> None:
+    identity: dict[str, Any] = (
+        {} if user is None else {"user": user.pw_uid, "group": user.pw_gid, "extra_groups": []}
+    )
     subprocess.run(
         command,
         check=True,
@@ -58,7 +69,6 @@ def _run(command: list[Path | str], user: pwd.struct_passwd | None) -> None:
         stderr=subprocess.DEVNULL,
         cwd="/",
         timeout=60,
-        extra_groups=[] if user is not None else None,
         **identity,
     )
 

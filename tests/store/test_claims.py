@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -118,6 +120,9 @@ def test_a_pausing_job_whose_runner_died_is_paused_and_not_claimed(
     assert store.job(claim.job.id).state is JobState.PAUSED
 
 
+Lose = Callable[[SqlStore, Clock, Claim], None]
+
+
 def overtaken(store: SqlStore, clock: Clock, claim: Claim) -> None:
     clock.advance(LEASE)
     taken(store)
@@ -145,7 +150,7 @@ def finished(store: SqlStore, clock: Clock, claim: Claim) -> None:
     [overtaken, overtaken_by_itself, cancelled, released, finished],
     ids=lambda f: f.__name__,
 )
-def test_a_stale_claim_can_write_nothing(store: SqlStore, clock: Clock, lose) -> None:
+def test_a_stale_claim_can_write_nothing(store: SqlStore, clock: Clock, lose: Lose) -> None:
     claim = begun(store)
     lose(store, clock, claim)
     before = store.job(claim.job.id), store.iterations(claim.job.id)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from sqlalchemy import text
 
@@ -33,7 +35,7 @@ def another_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("change", [another_preference, another_scenario], ids=lambda f: f.__name__)
 def test_a_request_is_the_same_when_the_presets_that_it_names_have_changed(
-    store: SqlStore, monkeypatch: pytest.MonkeyPatch, change
+    store: SqlStore, monkeypatch: pytest.MonkeyPatch, change: Callable[[pytest.MonkeyPatch], None]
 ) -> None:
     first, _ = store.create_job(asked(), idempotency_key="k")
     change(monkeypatch)

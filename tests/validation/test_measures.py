@@ -65,7 +65,7 @@ def test_measures_scale_with_the_unit_and_relative_ones_do_not(
     pair: tuple[np.ndarray, np.ndarray], factor: float
 ) -> None:
     x, y = pair
-    close = {"rel": 1e-9, "abs": 1e-9}
+    close: Any = {"rel": 1e-9, "abs": 1e-9}
     for measure in (
         measures.root_mean_square_error,
         measures.mean_absolute_error,
@@ -103,7 +103,7 @@ def test_intensity_grows_with_the_square_of_the_signal_and_the_root_of_its_speed
     signal: np.ndarray, factor: float
 ) -> None:
     intensity = measures.intensity(signal, 0.002)
-    close = {"rel": 1e-6, "abs": 1e-6}
+    close: Any = {"rel": 1e-6, "abs": 1e-6}
     assert measures.intensity(signal * factor, 0.002) == pytest.approx(
         factor**2 * intensity, **close
     )

@@ -31,7 +31,8 @@ def test_both_logs_are_trimmed_to_the_last_whole_cycles_that_they_share() -> Non
     simulated = walking_log(szabadka())
     measured = walking_log(szabadka(), rows=3 * CYCLE + 100, standing=180)
     pair = synchronise(measured, simulated, CYCLE_TIME)
-    assert (pair.lag, pair.lag_seconds, pair.cycles) == (180, pytest.approx(0.36), 2)
+    assert (pair.lag, pair.cycles) == (180, 2)
+    assert pair.lag_seconds == pytest.approx(0.36)
     assert len(pair.measured.time) == len(pair.simulated.time) == 2 * CYCLE
     assert pair.measured.time[-1] == measured.time[-1]
     np.testing.assert_allclose(

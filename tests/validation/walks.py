@@ -38,7 +38,7 @@ def walking_log(robot: Robot, *, rows: int = 3 * CYCLE, standing: int = 0) -> Me
     return MeasuredLog(
         joints=robot.joint_names,
         legs=tuple(leg.name for leg in robot.legs),
-        time=0.5 + np.arange(rows) * 0.002,
+        time=0.5 + np.arange(rows, dtype=np.float64) * 0.002,
         desired_angle=swing,
         control_voltage=5.0 * swing,
         joint_angle=0.9 * swing,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Locator, Page, expect
 
+from tests.examples.frames import unframed
 from tests.examples.servers import ServerProcess
 from tests.web.pixels import colours, pixels
 from tests.web.visit import Visit
@@ -36,10 +36,8 @@ class Recording:
 
 def replay(client: httpx2.Client, **request: Any) -> Recording:
     content = client.post("/v1/replays", json=request | {"rate": 100}).content
-    length = int.from_bytes(content[:4], "little")
-    header = json.loads(content[4 : 4 + length])
-    frames = np.frombuffer(content, dtype="<f4", offset=4 + length)
-    return Recording(header, frames.reshape(header["frames"], -1))
+    header, numbers = unframed(content)
+    return Recording(header, numbers.reshape(header["frames"], -1))
 
 
 def player(page: Page) -> Locator:

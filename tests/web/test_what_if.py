@@ -72,6 +72,7 @@ def test_brushing_an_axis_selects_designs(
     expect(selected).to_have_attribute("data-selected", every)
 
     axis = page.locator(".axis").last.bounding_box()
+    assert axis is not None
     x, bottom = axis["x"] + axis["width"] / 2, axis["y"] + axis["height"]
     page.mouse.move(x, bottom - 1)
     page.mouse.down()

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cli.exit_codes import JobEnded
 from cli.output import note, print_json, stdout_console
 from cli.progress import show_progress
-from services.optimizer.errors import Conflict
-from services.optimizer.jobs.job import Command, Job, JobState
-from services.runtime import EvaluatorKind, open_evaluator, run_embedded, stop_on_signals
+from gaitswarm.jobs.embedded import check_same, taken_up
+from services.optimizer.jobs.job import JobState
+from services.runtime import open_evaluator, run_embedded, stop_on_signals
 
 if TYPE_CHECKING:
+    from cli.progress import Progress
     from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.settings import Settings
     from gaitswarm.views import JobView
-    from services.optimizer.jobs.job import CompletedIteration
+    from services.optimizer.jobs.job import Claim, CompletedIteration, Iteration, Job
     from services.optimizer.jobs.spec import Spec
+    from services.optimizer.run.evaluator import Evaluator
     from services.optimizer.service import JobService
     from services.optimizer.store.base import Store
-
-_TAKEN_UP = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
-"""States in which going on with a job needs the command to."""
 
 
 def resumed_job(
@@ -34,79 +33,90 @@ def resumed_job(
     was cancelled, is another than asked, or would go on with something else than it was begun with
     and that is not accepted.
     """
-    job = service.job(job_id)
     if asked is not None:
-        _check_same(job, asked)
-    if job.state is JobState.CANCELLED:
-        raise Conflict(f"job {job_id} was cancelled, which is for good; start a new one")
-    if job.state is not JobState.SUCCEEDED and not accept_changes:
-        service.check_unchanged(job)
-    return service.command(job_id, Command.RESUME) if job.state in _TAKEN_UP else job
+        check_same(service.job(job_id).spec, asked, job_id)
+    return taken_up(service, job_id, accept_changes=accept_changes)
 
 
-def _check_same(job: Job, asked: Spec) -> None:
-    stored, wanted = job.spec.model_dump(), asked.resolved().model_dump()
-    changed = [field for field in stored if field != "name" and stored[field] != wanted[field]]
-    if changed:
-        raise Conflict(
-            f"job {job.id} was submitted with another {', '.join(changed)}, and a job stays what"
-            " it is; resume it without --spec and options of the job, or start a new one"
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Embedded:
-    """Workers that a process runs its own job on.
+    """Workers that a process runs its own jobs on; opened when a job needs them.
 
     accepts_changes: whether a job goes on although what its numbers depend on has changed.
     """
 
-    kind: EvaluatorKind
-    ray_address: str | None = None
-    cpus: int | None = None
-    accepts_changes: bool = False
+    def __init__(self, settings: Settings, *, accepts_changes: bool = False) -> None:
+        self._settings = settings
+        self._accepts_changes = accepts_changes
+        self._evaluator: Evaluator | None = None
 
-    def run(self, store: Store, job: Job) -> bool:
-        """Until the job ends, or a signal comes: true if one did."""
-        if job.state.terminal:
-            return False
-        spec = job.spec
-        best = job.progress.best_fitness
+    def run(self, jobs: DatabaseJobs, store: Store, job: Job, claim: Claim | None = None) -> bool:
+        """Run a job, or follow it where another process runs it, until it ends or a signal comes.
+
+        Args:
+            jobs: The jobs of the store, for messages.
+            store: Where the job is kept.
+            job: The job.
+            claim: That of this process, if it has submitted the job for itself.
+
+        Returns:
+            Whether a signal came.
+
+        Raises:
+            GaitswarmError: With a note that says how to go on.
+        """
         stop = threading.Event()
         with (
             stop_on_signals(stop),
             show_progress(
-                iterations=spec.iterations,
-                particles=spec.optimizer.particles,
+                iterations=job.spec.iterations,
+                particles=job.spec.optimizer.particles,
                 done=job.progress.iterations,
             ) as progress,
         ):
-            if self.kind == "ray":
-                progress.remark("connecting to Ray" if self.ray_address else "starting Ray")
-            evaluator = open_evaluator(self.kind, address=self.ray_address, cpus=self.cpus)
+            best = job.progress.best_fitness
 
             def committed(done: CompletedIteration, _state: JobState) -> None:
                 nonlocal best
-                finite = [f for f in (best, *done.fitness.tolist()) if f is not None]
-                best = min(finite)
+                best = min(f for f in (best, *done.fitness.tolist()) if f is not None)
                 progress.iteration(done.iteration, best, done.evaluate_seconds)
+
+            def followed(iteration: Iteration) -> None:
+                nonlocal best
+                best = iteration.best_so_far
+                progress.iteration(iteration.index, best, iteration.evaluate_seconds)
 
             try:
                 run_embedded(
                     store,
-                    evaluator,
-                    job.id,
+                    lambda: self._opened(progress),
+                    job.id if claim is None else claim,
                     on_commit=committed,
                     on_retry=lambda seconds, why: progress.remark(
                         f"{why}; trying again in {seconds:.0f} s"
                     ),
-                    on_wait=lambda why: progress.remark(f"{why}; waiting for it"),
+                    on_follow=followed,
+                    on_news=progress.remark,
                     stop=stop,
-                    accepts_changes=self.accepts_changes,
+                    accepts_changes=self._accepts_changes,
                 )
-            finally:
-                evaluator.close()
+            except Exception as error:
+                error.add_note(_how_to_go_on(job.id, jobs.place))
+                raise
         return stop.is_set()
+
+    def close(self) -> None:
+        """End the workers, if any were opened. Idempotent."""
+        if self._evaluator is not None:
+            self._evaluator.close()
+            self._evaluator = None
+
+    def _opened(self, progress: Progress) -> Evaluator:
+        if self._evaluator is None:
+            kind, address = self._settings.evaluator, self._settings.ray_address
+            if kind == "ray":
+                progress.remark("connecting to Ray" if address else "starting Ray")
+            self._evaluator = open_evaluator(kind, address=address, cpus=self._settings.cpus)
+        return self._evaluator
 
 
 def finish(
@@ -115,17 +125,40 @@ def finish(
     """Print the result. Raises KeyboardInterrupt if interrupted, JobEnded unless it succeeded."""
     job = jobs.job(job_id)
     if interrupted and not job.state.terminal:
-        note(
-            f"stopped after {job.iterations} of {job.iterations_planned} iterations; go on with\n"
-            f"  gaitswarm optimize --resume {job_id}{jobs.place}"
-        )
+        _explain_interruption(job, jobs.place)
         raise KeyboardInterrupt
     if as_json:
         print_json(job)
     else:
         _report(job, jobs.place, compare=compare)
     if job.state is not JobState.SUCCEEDED:
-        raise JobEnded(f"job {job_id} is {job.state}" + (f": {job.error}" if job.error else ""))
+        raise ended(job, jobs.place)
+
+
+def ended(job: JobView, place: str) -> JobEnded:
+    """What to say of a job that did not succeed, and what can be done."""
+    because = f": {job.error}" if job.error else ""
+    error = JobEnded(f"job {job.id} is {job.state}{because}")
+    if job.state is JobState.CANCELLED:
+        error.add_note(f"what it has committed stays: gaitswarm history {job.id}{place}")
+    else:
+        error.add_note(_how_to_go_on(job.id, place))
+    return error
+
+
+def _explain_interruption(job: JobView, place: str) -> None:
+    done = f"after {job.iterations} of {job.iterations_planned} iterations"
+    if job.state is JobState.RUNNING:
+        note(
+            f"job {job.id} goes on in another process, {done}; follow it with\n"
+            f"  gaitswarm watch {job.id}{place}"
+        )
+    else:
+        note(f"stopped {done}; {_how_to_go_on(job.id, place)}")
+
+
+def _how_to_go_on(job_id: str, place: str) -> str:
+    return f"go on with\n  gaitswarm optimize --resume {job_id}{place}"
 
 
 def _report(job: JobView, place: str, *, compare: bool) -> None:

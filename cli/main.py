@@ -6,7 +6,10 @@ Commands import what they need when they run, so that `gaitswarm --help` answers
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
+from typing import TextIO, cast
 
 import typer
 
@@ -26,14 +29,15 @@ from cli.commands import (
     synthesize,
     validate,
 )
-from cli.exit_codes import ExitCode, exit_code
-from cli.output import discard_stdout, note, warnings_as_notes
+from cli.exit_codes import ExitCode, exit_code, explanation
+from cli.output import OutputClosed, Stdout, note, replace_closed_streams, warnings_as_notes
 
 app = typer.Typer(
     name="gaitswarm",
     help="Find robust drive controllers for walking robots.",
     epilog="Exit codes: 0 done, 1 job failed or cancelled, 2 bad input, 3 not found, 4 not possible"
-    " in the job's state, 5 server, database or workers unavailable, 130 interrupted.",
+    " in the job's state, 5 server, database, workers or output unavailable, 70 a bug, 130"
+    " interrupted.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     # Rich takes longer to import than all the rest of a help text takes.
@@ -61,14 +65,24 @@ for _module in (
 
 def main() -> None:
     """Entry point of the console script."""
+    replace_closed_streams()
     warnings_as_notes()
     sys.exit(run(sys.argv[1:]))
 
 
 def run(arguments: Sequence[str]) -> int:
     """One command; returns its exit code. Messages about what went wrong are on stderr."""
+    stdout = Stdout(sys.stdout)
+    with redirect_stdout(cast(TextIO, stdout)):
+        code = _exit_code_of(lambda: app(list(arguments), prog_name="gaitswarm"))
+        # Not left to the interpreter, which could only complain.
+        flushed = _exit_code_of(stdout.flush)
+    return code or flushed
+
+
+def _exit_code_of(step: Callable[[], object]) -> int:
     try:
-        app(list(arguments), prog_name="gaitswarm")
+        step()
     except SystemExit as ended:
         if isinstance(ended.__context__, BrokenPipeError):
             # Typer has caught it, and ends in 1, which here is a job that failed.
@@ -76,13 +90,15 @@ def run(arguments: Sequence[str]) -> int:
         return ended.code if isinstance(ended.code, int) else int(bool(ended.code))
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        discard_stdout()
+    except OutputClosed:
         return ExitCode.OK
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - whatever it is, it has an exit code
         code = exit_code(error)
         if code is None:
-            raise
-        note(f"gaitswarm: {error}")
+            note(
+                f"{traceback.format_exc()}gaitswarm: this is a bug; please report it with the above"
+            )
+            return ExitCode.BUG
+        note(f"gaitswarm: {explanation(error)}")
         return code
     return ExitCode.OK

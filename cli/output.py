@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 import warnings
-from collections.abc import Iterable
-from contextlib import suppress
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from cli.exit_codes import OutputFailed
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
     from rich.console import Console
+
+
+class OutputClosed(Exception):
+    """Whoever read standard output has seen enough, as `head` has."""
 
 
 def stdout_console() -> Console:
@@ -29,9 +37,12 @@ def stderr_console() -> Console:
 
 
 def note(message: str) -> None:
-    """One line for the user that is no part of the result."""
-    sys.stderr.write(f"{message}\n")
-    sys.stderr.flush()
+    """One line for the user that is no part of the result; lost where stderr cannot be written."""
+    try:
+        sys.stderr.write(f"{message}\n")
+        sys.stderr.flush()
+    except OSError:
+        discard(sys.stderr)
 
 
 def print_text(text: str) -> None:
@@ -79,9 +90,50 @@ def log_to_stderr(level: str) -> None:
     logging.getLogger("alembic").setLevel(logging.WARNING)
 
 
-def discard_stdout() -> None:
-    """After the reader of a pipe has gone: let the interpreter's last flush not fail."""
-    import os
+class Stdout:
+    """Standard output whose failures are not mistaken for those of any other file."""
 
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """As of a text stream. Raises OutputFailed, OutputClosed."""
+        with self._telling_failures():
+            return self._stream.write(text)
+
+    def flush(self) -> None:
+        """As of a text stream. Raises OutputFailed, OutputClosed."""
+        with self._telling_failures():
+            self._stream.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    @contextmanager
+    def _telling_failures(self) -> Iterator[None]:
+        try:
+            yield
+        except BrokenPipeError as error:
+            discard(self._stream)
+            raise OutputClosed from error
+        except OSError as error:
+            discard(self._stream)
+            raise OutputFailed(f"standard output cannot be written: {error.strerror}") from error
+
+
+def replace_closed_streams() -> None:
+    """Give a process that was started without some standard streams, as by `>&-`, empty ones.
+
+    Their numbers would go to the next files that are opened.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
+
+
+def discard(stream: TextIO) -> None:
+    """Let a stream that cannot be written swallow all: the interpreter flushes it at its end."""
     with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, stream.fileno())
+        os.close(null)

@@ -59,15 +59,18 @@ class JobEnded(GaitswarmError):
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C while a job was run. What it had committed is stored, and it is queued again.
 
+    One that was only followed goes on in the process that runs it.
+
     Attributes:
-        job: The job as it was given back.
+        job: The job as it was then.
     """
 
     def __init__(self, job: JobView, db: str) -> None:
         self.job = job
+        left = "goes on elsewhere" if job.state == "running" else "was given back"
         super().__init__(
-            f"job {job.id} was given back after {job.iterations} of {job.iterations_planned}"
-            f" iterations; go on with gaitswarm.optimize(resume={job.id!r}, db={db!r})"
+            f"job {job.id} {left} after {job.iterations} of {job.iterations_planned} iterations;"
+            f" go on with gaitswarm.optimize(resume={job.id!r}, db={db!r})"
         )
 
 

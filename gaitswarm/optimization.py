@@ -128,8 +128,7 @@ def optimize(
         InvalidRequest: The job makes no sense or cannot be simulated; names the field. Nothing is
             stored then.
         NotFound: There is no job to resume.
-        Conflict: The job to resume is another than asked for, was cancelled, or is being run by
-            another process.
+        Conflict: The job to resume is another than asked for, or was cancelled.
         ProvenanceChanged: What the numbers of the job to resume depend on has changed, and that is
             not accepted.
         JobEnded: The job failed, or was paused or cancelled by somebody else.
@@ -143,14 +142,10 @@ def optimize(
         asked = _checked(chosen_spec(spec, options))
     workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
     with open_database(db, create=resume is None) as jobs:
-        if asked is not None and resume is None:
-            job_id = jobs.submit(asked).id
-        else:
-            job_id = resume or ""
-            if asked is not None:
-                check_same(jobs.job(job_id).spec, asked, job_id)
+        if asked is not None and resume is not None:
+            check_same(jobs.job(resume).spec, asked, resume)
         job = jobs.run(
-            job_id,
+            jobs.submit_embedded(asked) if resume is None else resume,
             evaluator=workers.evaluator,
             cpus=cpus,
             ray_address=ray_address,
@@ -159,7 +154,7 @@ def optimize(
         )
         if job.state is not JobState.SUCCEEDED:
             raise JobEnded(job)
-        return OptimizationResult(job, tuple(jobs.iterations(job_id)), jobs.url)
+        return OptimizationResult(job, tuple(jobs.iterations(job.id)), jobs.url)
 
 
 def _checked(spec: AnySpec) -> AnySpec:

@@ -127,21 +127,28 @@ def identify(
     }
     specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
     settings = read_settings(db=db, evaluator=evaluator, ray_address=ray_address, cpus=cpus)
-    workers = Embedded(settings.evaluator, settings.ray_address, settings.cpus)
     url = database_to_write(settings)
-    with closing(open_store(url)) as store:
+    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
         service = JobService(store)
+        jobs = DatabaseJobs(service, url)
         submitted = [service.submit(spec)[0] for spec in specs]
         for number, job in enumerate(submitted, start=1):
             note(f"run {number} of {runs}: job {job.id} in database {url}")
-            if workers.run(store, job):
-                note(f"stopped; go on with gaitswarm optimize --resume {job.id}")
+            if embedded.run(jobs, store, job):
+                note(_how_to_go_on([job.id for job in submitted], number, jobs.place))
                 raise KeyboardInterrupt
             ended = store.job(job.id)
             if ended.state is not JobState.SUCCEEDED:
                 note(f"job {job.id} is {ended.state}: {ended.error or 'no reason was given'}")
-        jobs = DatabaseJobs(service, url)
         show_parameters(jobs.parameters([job.id for job in submitted]), known, as_json=as_json)
+
+
+def _how_to_go_on(ids: list[str], number: int, place: str) -> str:
+    """After the run of that number, from 1, was interrupted."""
+    rest = "".join(
+        f"  gaitswarm optimize --resume {job_id}{place}\n" for job_id in ids[number - 1 :]
+    )
+    return f"stopped; go on with\n{rest}  gaitswarm parameters {' '.join(ids)}{place}"
 
 
 def parameters(

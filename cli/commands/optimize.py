@@ -78,7 +78,6 @@ def optimize(
     if accept_changes and resume is None:
         raise InvalidRequest("a new job has nothing to go on from", field="accept-changes")
     settings = read_settings(db=db, evaluator=evaluator, ray_address=ray_address, cpus=cpus)
-    workers = Embedded(settings.evaluator, settings.ray_address, settings.cpus, accept_changes)
     overrides = Overrides(
         iterations, particles, seed, preference, scenarios, controller, name, robot
     )
@@ -86,13 +85,18 @@ def optimize(
     if resume is None or spec is not None or overrides.any:
         asked = build_spec(spec, overrides)
     url = database_to_write(settings)
-    with closing(open_store(url)) as store:
+    with (
+        closing(open_store(url)) as store,
+        closing(Embedded(settings, accepts_changes=accept_changes)) as embedded,
+    ):
         service = JobService(store)
         jobs = DatabaseJobs(service, url)
+        claim = None
         if asked is not None and resume is None:
-            job, _ = service.submit(asked)
+            claim = service.submit_embedded(asked)
+            job = claim.job
         else:
             job = resumed_job(service, resume or "", asked, accept_changes=accept_changes)
         note(f"job {job.id} in database {url}")
-        interrupted = workers.run(store, job)
+        interrupted = embedded.run(jobs, store, job, claim)
         finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published)

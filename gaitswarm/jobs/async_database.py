@@ -108,7 +108,7 @@ class AsyncDatabaseJobs(AsyncJobs):
             The job as it is then: ended or paused.
 
         Raises:
-            Conflict: The job was cancelled, or another process runs it.
+            Conflict: The job was cancelled.
             ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
             EvaluatorUnavailable: Ray cannot be started or reached.
         """

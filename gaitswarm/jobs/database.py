@@ -40,7 +40,7 @@ from gaitswarm.views import (
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.surface import SurfaceView
-from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
 from services.runtime import EvaluatorKind
@@ -101,9 +101,25 @@ class DatabaseJobs(Jobs):
         with simulation_errors("spec"):
             return EstimateView.from_estimate(self._service.estimate(wanted))
 
+    def submit_embedded(self, spec: SpecInput | None) -> Claim:
+        """Store a job that this process alone is to run: no runner can take it in between.
+
+        Args:
+            spec: As for `submit`.
+
+        Returns:
+            A claim on the job, to be given to `run` at once: it lasts some seconds.
+
+        Raises:
+            InvalidRequest: The job makes no sense or cannot be simulated; names the field.
+        """
+        wanted = chosen_spec(spec, {})
+        with simulation_errors("spec"):
+            return self._service.submit_embedded(wanted)
+
     def run(
         self,
-        job_id: str,
+        job: str | Claim,
         *,
         evaluator: EvaluatorKind | Evaluator = "in-process",
         cpus: int | None = None,
@@ -114,11 +130,12 @@ class DatabaseJobs(Jobs):
     ) -> JobView:
         """Run a job here and now, from its last committed iteration to its end.
 
-        A paused or failed job is resumed. Ctrl-C gives the job back to the queue, as does an
-        exception of `on_iteration`, which is passed on.
+        A paused or failed job is resumed. One that another process runs is followed, and goes on
+        here when that process gives it back or is not heard of any more. Ctrl-C gives the job back
+        to the queue, as does an exception of `on_iteration`, which is passed on.
 
         Args:
-            job_id: Identifier of the job.
+            job: Identifier of the job; or what `submit_embedded` answered.
             evaluator: "in-process": threads of this process; "ray": a Ray cluster; or an evaluator
                 that is open already and stays so.
             cpus: Walks to compute at once on this machine; default all processors.
@@ -134,11 +151,12 @@ class DatabaseJobs(Jobs):
 
         Raises:
             Interrupted: Ctrl-C; says how to go on.
-            Conflict: The job was cancelled, or another process runs it.
+            Conflict: The job was cancelled.
             ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
             EvaluatorUnavailable: Ray cannot be started or reached.
         """
         workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
+        job_id = job if isinstance(job, str) else job.job.id
 
         def committed(index: int) -> None:
             if on_iteration is not None:
@@ -148,9 +166,9 @@ class DatabaseJobs(Jobs):
         ended = run_here(
             self._service,
             self._url,
-            job_id,
+            job,
             workers=workers,
-            on_commit=committed,
+            on_iteration=committed,
             stop=stop,
             accept_changes=accept_changes,
         )
@@ -367,4 +385,6 @@ class JobNews:
         if job.state is not self._told:
             self._told = job.state
             yield StateView.from_job(job)
-        self.ended = job.state.terminal
+        if job.state.terminal:
+            self._service.store.verify()
+            self.ended = True

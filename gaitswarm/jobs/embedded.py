@@ -11,7 +11,7 @@ from typing import Any, Final, get_args
 
 from gaitswarm.errors import Conflict, Interrupted, InvalidRequest
 from gaitswarm.views import JobView
-from services.optimizer.jobs.job import Command, CompletedIteration, Job, JobState
+from services.optimizer.jobs.job import Claim, Command, CompletedIteration, Job, JobState
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
@@ -42,16 +42,23 @@ class Workers:
             raise InvalidRequest("must be at least 1", field="cpus")
 
     @contextmanager
-    def opened(self) -> Iterator[Evaluator]:
-        """The workers; those that are opened here are closed again."""
+    def when_needed(self) -> Iterator[Evaluator | Callable[[], Evaluator]]:
+        """Workers that are open already, or a function that opens them: these are closed again."""
         if not isinstance(self.evaluator, str):
             yield self.evaluator
             return
-        evaluator = open_evaluator(self.evaluator, address=self.ray_address, cpus=self.cpus)
+        kind, opened = self.evaluator, list[Evaluator]()
+
+        def open_once() -> Evaluator:
+            if not opened:
+                opened.append(open_evaluator(kind, address=self.ray_address, cpus=self.cpus))
+            return opened[0]
+
         try:
-            yield evaluator
+            yield open_once
         finally:
-            evaluator.close()
+            for evaluator in opened:
+                evaluator.close()
 
 
 def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
@@ -77,21 +84,22 @@ def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
 def run_here(
     service: JobService,
     url: str,
-    job_id: str,
+    job: str | Claim,
     *,
     workers: Workers,
-    on_commit: Callable[[int], None],
+    on_iteration: Callable[[int], None],
     stop: threading.Event | None,
-    accept_changes: bool,
+    accept_changes: bool = False,
 ) -> Job:
     """Run a job until it ends, is paused, or `stop` is set.
 
     Args:
         service: Of the database that the job is in.
         url: Of the database, for messages.
-        job_id: Identifier of the job.
+        job: Identifier of the job, or the claim of this process, which has submitted it.
         workers: What walks run on.
-        on_commit: Called with the index of every iteration that was committed.
+        on_iteration: Called with the index of every iteration that is committed, here or by another
+            process that runs the job meanwhile.
         stop: When set, the job is given back to the queue.
         accept_changes: Whether it goes on although what its numbers depend on has changed.
 
@@ -100,36 +108,51 @@ def run_here(
 
     Raises:
         Interrupted: Ctrl-C, unless the job has ended meanwhile.
-        Conflict: The job was cancelled, or another process runs it.
+        Conflict: The job was cancelled.
         ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
     """
-    job = _taken_up(service, job_id, accept_changes=accept_changes)
-    if job.state.terminal:
-        return job
+    job_id = job if isinstance(job, str) else job.job.id
+    if isinstance(job, str):
+        taken_up(service, job, accept_changes=accept_changes)
 
     def committed(done: CompletedIteration, _state: JobState) -> None:
-        on_commit(done.iteration)
+        on_iteration(done.iteration)
 
     stop = stop or threading.Event()
     try:
-        with _ctrl_c(stop) as interrupted, workers.opened() as evaluator:
-            job = run_embedded(
+        with _ctrl_c(stop) as interrupted, workers.when_needed() as evaluator:
+            ended = run_embedded(
                 service.store,
                 evaluator,
-                job_id,
+                job,
                 on_commit=committed,
+                on_follow=lambda iteration: on_iteration(iteration.index),
                 stop=stop,
                 accepts_changes=accept_changes,
             )
     except KeyboardInterrupt as error:
         raise _interrupted(service.job(job_id), url) from error
-    if interrupted.is_set() and not job.state.terminal:
-        raise _interrupted(job, url)
-    return job
+    if interrupted.is_set() and not ended.state.terminal:
+        raise _interrupted(ended, url)
+    return ended
 
 
-def _taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
-    """An earlier job, ready to be run on. Raises NotFound, Conflict."""
+def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
+    """An earlier job, ready to be gone on with.
+
+    Args:
+        service: Of the database that the job is in.
+        job_id: Identifier of the job.
+        accept_changes: Whether it may go on although what its numbers depend on has changed.
+
+    Returns:
+        The job, queued again if it was paused or had failed.
+
+    Raises:
+        NotFound: There is no such job.
+        Conflict: It was cancelled.
+        ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
+    """
     job = service.job(job_id)
     if job.state is JobState.CANCELLED:
         raise Conflict(f"job {job_id} was cancelled, which is for good; start a new one")

@@ -18,6 +18,7 @@ from services.optimizer.errors import InvalidRequest, NotFound, ProvenanceChange
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
 from services.optimizer.jobs.job import (
+    Claim,
     Command,
     Evaluation,
     Iteration,
@@ -30,6 +31,8 @@ from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
+from services.optimizer.run.runner import runner_name
 from services.optimizer.store.base import Page, Store
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk
@@ -83,6 +86,27 @@ class JobService:
             provenance=self.provenance(spec),
             idempotency_key=idempotency_key,
             request=request,
+        )
+
+    def submit_embedded(self, spec: Spec) -> Claim:
+        """Check that the job can be simulated and store it for this process alone to run.
+
+        Args:
+            spec: What the job is to do.
+
+        Returns:
+            The job with a claim on it, which no other runner can take; to be run by `run_embedded`
+            before its lease of `EMBEDDED_LEASE_SECONDS` runs out.
+
+        Raises:
+            InvalidRequest: It cannot be simulated; names the field.
+        """
+        self._check(spec)
+        return self.store.create_claimed_job(
+            spec,
+            runner_name(),
+            lease_seconds=EMBEDDED_LEASE_SECONDS,
+            provenance=self.provenance(spec),
         )
 
     def record(self, walk: RecordedWalk) -> str:

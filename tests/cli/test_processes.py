@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import time
 from collections.abc import Iterator
@@ -87,6 +88,21 @@ def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_neve
 def _bits(gaitswarm: Gaitswarm, job_id: str, db: Path) -> Any:
     history = gaitswarm("history", job_id, "--db", db, "--json").json
     return [iteration["evaluations"] for iteration in history["iterations"]]
+
+
+def test_an_optimization_whose_database_is_overwritten_with_garbage_does_not_end_well(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path
+) -> None:
+    spec = write_json(SMALL_SPEC | {"iterations": 100})
+    assert gaitswarm("submit", "--spec", spec, "--db", db).code == 0
+    process = start_python(
+        *COMMAND_LINE, "optimize", "--spec", spec, "--db", db, "--evaluator", "in-process"
+    )
+    line_with(process.stderr, r"^iteration \d+/100")
+    db.write_bytes(os.urandom(db.stat().st_size))
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, out) == (5, "")
+    assert f"gaitswarm: database {db}" in err
 
 
 def test_an_optimization_on_embedded_ray_gives_the_same_bits_and_ends_quietly(

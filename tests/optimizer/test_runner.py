@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.errors import Conflict, EvaluatorUnavailable, StoreUnavailable
+from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
 from services.optimizer.jobs.job import Command, CompletedIteration, Job, JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.coordinator import Backoff
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.runner import Runner, Surroundings, run_claim
 from services.optimizer.store.base import Store
-from services.runtime import run_embedded
 from sim.errors import SimulationInputError
 from sim.outcome import Outcome
 from tests.examples.jobs import history
@@ -281,33 +280,6 @@ def test_a_runner_that_stops_gives_its_jobs_back_at_once(store: Store) -> None:
     assert time.monotonic() - begun < 2.0
     assert not runner.running
     assert {store.job(job_id).state for job_id in jobs} == {JobState.QUEUED}
-
-
-def test_an_embedded_run_takes_over_from_a_process_that_was_killed(store: Store) -> None:
-    job_id = queue(store)
-    assert store.claim("killed", lease_seconds=0.4) is not None
-    reasons: list[str] = []
-    job = run_embedded(store, FormulaEvaluator(), job_id, on_wait=reasons.append)
-    assert job.state is JobState.SUCCEEDED
-    assert len(reasons) == 1 and "killed" in reasons[0]
-
-
-def test_an_embedded_run_refuses_a_job_that_has_ended(store: Store) -> None:
-    job_id = queue(store)
-    run(store, FormulaEvaluator())
-    with pytest.raises(Conflict, match="succeeded"):
-        run_embedded(store, FormulaEvaluator(), job_id)
-
-
-def test_an_embedded_run_that_is_told_to_stop_leaves_the_job_queued(store: Store) -> None:
-    job_id = queue(store)
-    stop = threading.Event()
-
-    def interrupt(done: CompletedIteration, state: JobState) -> None:
-        stop.set()
-
-    job = run_embedded(store, FormulaEvaluator(), job_id, on_commit=interrupt, stop=stop)
-    assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
 
 
 class NotingEvaluator(FormulaEvaluator):

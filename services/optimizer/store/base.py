@@ -203,5 +203,12 @@ class Store(Protocol):
     def ping(self) -> None:
         """Raise StoreUnavailable unless the database answers and has this version's schema."""
 
+    def verify(self) -> None:
+        """Read anew what is stored, for a few seconds at most, before it is said to be safe.
+
+        Raises:
+            StoreUnavailable: It is damaged or gone, though earlier reads and writes succeeded.
+        """
+
     def close(self) -> None:
         """Release connections. Idempotent."""

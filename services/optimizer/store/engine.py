@@ -6,7 +6,7 @@ import json
 import sqlite3
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,6 +30,9 @@ from services.optimizer.errors import StoreUnavailable
 
 BUSY_SECONDS: Final = 15.0
 """How long a transaction waits for another's lock before the store counts as unavailable."""
+
+CHECK_SECONDS: Final = 5.0
+"""How long the reading of a whole file may take; a gigabyte takes some 2 s."""
 
 _WRITE: Final = "gaitswarm_write"
 
@@ -199,6 +202,34 @@ def _strict_json(value: object) -> str:
     Raises ValueError for a value that is not finite.
     """
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
+def check_file(database: Database) -> None:
+    """Read an SQLite file anew, for about `CHECK_SECONDS` at most; do nothing for a server.
+
+    Open connections have pages in memory, and the journal others, that the file may have lost.
+
+    Raises:
+        StoreUnavailable: The file is damaged, or gone.
+    """
+    if database.engine.url.get_backend_name() != "sqlite":
+        return
+    path = Path(database.engine.url.database or "").absolute()
+    deadline = time.monotonic() + CHECK_SECONDS
+    try:
+        with closing(sqlite3.connect(f"{path.as_uri()}?mode=rw", uri=True)) as connection:
+            connection.execute(f"PRAGMA busy_timeout = {round(BUSY_SECONDS * 1000)}")
+            connection.set_progress_handler(lambda: time.monotonic() > deadline, 1000)
+            (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    except sqlite3.DatabaseError as error:
+        if "interrupted" in str(error):
+            return
+        found = str(error)
+    if found != "ok":
+        raise StoreUnavailable(
+            f"database {database.name} was damaged while it was in use: {' '.join(found.split())};"
+            " jobs may be lost: put a copy of it in its place"
+        )
 
 
 def _is_infrastructure(error: DatabaseError | InterfaceError | PoolTimeout) -> bool:

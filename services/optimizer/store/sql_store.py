@@ -25,7 +25,14 @@ from services.optimizer.jobs.job import (
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.base import Page
-from services.optimizer.store.engine import Clock, Database, connect, database_time, parse_url
+from services.optimizer.store.engine import (
+    Clock,
+    Database,
+    check_file,
+    connect,
+    database_time,
+    parse_url,
+)
 from services.optimizer.store.history import SqlHistory, checked_limit
 from services.optimizer.store.job_list import cursor_of, from_cursor, job_rows, sort_jobs, to_cursor
 from services.optimizer.store.migrate import check_revision, migrate
@@ -301,6 +308,10 @@ class SqlStore(SqlHistory):
     def ping(self) -> None:
         """Ask the database for its schema revision."""
         check_revision(self._database)
+
+    def verify(self) -> None:
+        """Read an SQLite file anew; a PostgreSQL server watches over its own."""
+        check_file(self._database)
 
     def close(self) -> None:
         """Close the pooled connections."""

@@ -1,0 +1,191 @@
+"""One job for the process that asked for it: run here, or followed where another one runs it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Final
+
+from services.optimizer.errors import GaitswarmError
+from services.optimizer.jobs.job import Claim, CompletedIteration, Iteration, Job, JobState
+from services.optimizer.run.coordinator import Backoff
+from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.run.heartbeat import Heartbeat
+from services.optimizer.run.runner import OnCommit, OnRetry, Surroundings, run_claim, runner_name
+from services.optimizer.store.base import Store
+
+EMBEDDED_LEASE_SECONDS: Final = 5.0
+"""Short, because a person waits for it when the process before was killed."""
+
+OnFollow = Callable[[Iteration], None]
+"""Called for an iteration that another process has stored."""
+
+OnNews = Callable[[str], None]
+"""Called with a sentence for people when the job changes hands."""
+
+_POLL_SECONDS: Final = 0.5
+"""Between looks at a job that another process holds."""
+
+_UNDER_WAY: Final = (JobState.QUEUED, JobState.RUNNING, JobState.PAUSING)
+
+_HELD: Final = "another process runs this job, or was killed while it did; following it"
+
+_TAKEN: Final = (
+    f"this process was not heard of for {EMBEDDED_LEASE_SECONDS:g} s, and another one has taken the"
+    " job over; following it there"
+)
+
+_FREE: Final = "no other process holds the job any more; it goes on here"
+
+
+def run_embedded(
+    store: Store,
+    evaluator: Evaluator | Callable[[], Evaluator],
+    job: str | Claim,
+    *,
+    on_commit: OnCommit | None = None,
+    on_retry: OnRetry | None = None,
+    on_follow: OnFollow | None = None,
+    on_news: OnNews | None = None,
+    stop: threading.Event | None = None,
+    backoff: Backoff | None = None,
+    accepts_changes: bool = False,
+) -> Job:
+    """Run one job here and now, until it ends or is paused; nothing is done if it has or is.
+
+    While another process holds the job, it is followed instead. As soon as that one gives it back,
+    or is not heard of for the time of its lease, the job goes on here.
+
+    Args:
+        store: Where the job is kept.
+        evaluator: Where its walks run; or what opens that, called when the job is this process's.
+        job: Its id; or the claim of a process that has submitted it for itself.
+        on_commit: Called after an iteration that this process has stored.
+        on_retry: Called before a wait for the workers.
+        on_follow: Called for every iteration that another process stores meanwhile, in order.
+        on_news: Told when the job turns out to be another process's, and when it no longer is.
+        stop: When set, the function returns soon, and a job that this process holds goes back to
+            the queue.
+        backoff: How to wait for workers that cannot be reached.
+        accepts_changes: Whether the job goes on here although what its numbers depend on has
+            changed, which is then recorded with it; else it fails.
+
+    Returns:
+        The job as it is then.
+
+    Raises:
+        NotFound: There is no such job.
+        EvaluatorUnavailable: The workers cannot be opened; the job is queued again.
+        StoreUnavailable: Nothing can be stored or read, and the job stays as last committed; or it
+            has ended, but what is stored is damaged.
+    """
+    claim = None if isinstance(job, str) else job
+    begun = store.job(job) if isinstance(job, str) else job.job
+    run = _EmbeddedRun(
+        store,
+        evaluator,
+        begun,
+        on_commit or (lambda *_: None),
+        on_retry,
+        on_follow or (lambda _: None),
+        on_news or (lambda _: None),
+        stop or threading.Event(),
+        backoff or Backoff(),
+        accepts_changes,
+        runner=runner_name() if claim is None else claim.runner,
+        seen=begun.progress.iterations - 1,
+    )
+    return run.to_the_end(claim)
+
+
+@dataclass(slots=True)
+class _EmbeddedRun:
+    """job: as it was last read; seen: index of the last iteration that a callback was told of."""
+
+    store: Store
+    evaluator: Evaluator | Callable[[], Evaluator]
+    job: Job
+    on_commit: OnCommit
+    on_retry: OnRetry | None
+    on_follow: OnFollow
+    on_news: OnNews
+    stop: threading.Event
+    backoff: Backoff
+    accepts_changes: bool
+    runner: str
+    seen: int
+    news: str = field(default=_HELD, init=False)
+    following: bool = field(default=False, init=False)
+
+    def to_the_end(self, claim: Claim | None) -> Job:
+        while self.job.state in _UNDER_WAY and not self.stop.is_set():
+            if claim is None:
+                claim = self.store.claim(
+                    self.runner, lease_seconds=EMBEDDED_LEASE_SECONDS, job_id=self.job.id
+                )
+            if claim is None:
+                self._follow()
+            else:
+                self._run(claim)
+                claim = None
+        if claim is not None:
+            self.store.release(claim, JobState.QUEUED)
+            self.job = self.store.job(self.job.id)
+        if self.job.state.terminal:
+            self.store.verify()
+        return self.job
+
+    def _run(self, claim: Claim) -> None:
+        self._catch_up()
+        if self.following:
+            self.on_news(_FREE)
+        around = Surroundings(
+            self.store,
+            self._opened(claim),
+            lease_seconds=EMBEDDED_LEASE_SECONDS,
+            backoff=self.backoff,
+            on_commit=self._committed,
+            on_retry=self.on_retry,
+            accepts_changes=self.accepts_changes,
+        )
+        self.job = run_claim(claim, around, self.stop)
+        # Whoever has it now has taken it from here.
+        self.news, self.following = _TAKEN, False
+
+    def _opened(self, claim: Claim) -> Evaluator:
+        """The evaluator. The job is kept while it is opened, and queued if it cannot be."""
+        if not callable(self.evaluator):
+            return self.evaluator
+        try:
+            with Heartbeat(self.store, claim, lease_seconds=EMBEDDED_LEASE_SECONDS):
+                return self.evaluator()
+        except BaseException:
+            with suppress(GaitswarmError):
+                self.store.release(claim, JobState.QUEUED)
+            raise
+
+    def _committed(self, done: CompletedIteration, state: JobState) -> None:
+        self.seen = done.iteration
+        self.on_commit(done, state)
+
+    def _follow(self) -> None:
+        # The job first: whatever it counts as committed is then among the iterations.
+        self.job = self.store.job(self.job.id)
+        if self.job.state in _UNDER_WAY and not self.following:
+            self.on_news(self.news)
+            self.following = True
+        self._catch_up()
+        if self.job.state in _UNDER_WAY:
+            self.stop.wait(_POLL_SECONDS)
+
+    def _catch_up(self) -> None:
+        """Tell of the iterations that another process has stored meanwhile."""
+        more = True
+        while more:
+            page = self.store.iterations(self.job.id, after=self.seen)
+            for iteration in page.items:
+                self.seen = iteration.index
+                self.on_follow(iteration)
+            more = page.next is not None

@@ -1,0 +1,127 @@
+"""`optimize` and `identify` beside a server that runs jobs of the same database."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
+from tests.examples.walks import SHORT_WALK
+
+pytestmark = pytest.mark.slow
+
+IN_PROCESS = ("--evaluator", "in-process")
+
+
+@pytest.fixture
+def server(db: Path) -> Iterator[str]:
+    process = start_python(*COMMAND_LINE, "serve", "--port", "0", *IN_PROCESS, "--db", db)
+    yield line_with(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+
+
+def test_an_optimization_beside_a_server_of_its_database_keeps_its_job(
+    small_spec: Path, db: Path, server: str
+) -> None:
+    # Ray takes seconds to start, in which the server looks for queued jobs many times.
+    process = start_python(
+        *COMMAND_LINE, "optimize", "--spec", small_spec, "--db", db, "--cpus", "1", "--json"
+    )
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    assert json.loads(out)["state"] == "succeeded"
+    assert "another process" not in err
+
+
+def test_resuming_a_job_that_a_server_runs_follows_it_to_its_end(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
+) -> None:
+    spec = write_json(SMALL_SPEC | {"iterations": 120})
+    job_id = gaitswarm("submit", "--spec", spec, "--server", server).out.strip()
+    eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > 0)
+    resumed = gaitswarm("optimize", "--resume", job_id, "--db", db, "--json")
+    assert resumed.code == 0, resumed.err
+    assert (resumed.json["state"], resumed.json["iterations"]) == ("succeeded", 120)
+    assert "another process runs this job" in resumed.err
+    assert "iteration 120/120: best" in resumed.err
+
+
+def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
+) -> None:
+    spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
+    job_id = gaitswarm("submit", "--spec", spec, "--server", server).out.strip()
+    eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > 0)
+    process = start_python(*COMMAND_LINE, "optimize", "--resume", job_id, "--db", db)
+    line_with(process.stderr, r"^iteration \d+/")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert "goes on in another process" in err
+    assert f"gaitswarm watch {job_id} --db {db}" in err
+    assert _job(gaitswarm, job_id, db)["state"] == "running"
+
+
+def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
+) -> None:
+    spec = write_json(SMALL_SPEC | {"iterations": 400})
+    process = start_python(
+        *COMMAND_LINE, "optimize", "--spec", spec, "--db", db, *IN_PROCESS, "--json"
+    )
+    job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
+    line_with(process.stderr, r"^iteration \d+/400")
+    process.send_signal(signal.SIGSTOP)
+    before = _job(gaitswarm, job_id, db)["iterations"]
+    eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > before + 1)
+    process.send_signal(signal.SIGCONT)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    assert json.loads(out)["state"] == "succeeded"
+    assert "this process was not heard of" in err and "another one has taken the job over" in err
+
+
+def test_an_optimization_that_is_cancelled_elsewhere_says_so(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
+) -> None:
+    spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
+    process = start_python(
+        *COMMAND_LINE, "optimize", "--spec", spec, "--db", db, *IN_PROCESS, "--json"
+    )
+    job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
+    assert gaitswarm("cancel", job_id, "--server", server).code == 0
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert json.loads(out)["state"] == "cancelled"
+    assert f"job {job_id} is cancelled" in err
+    assert f"gaitswarm history {job_id} --db {db}" in err
+
+
+def test_an_identification_beside_a_server_of_its_database_follows_the_runs_that_that_takes(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, tmp_path: Path, server: str
+) -> None:
+    walk = write_json(SHORT_WALK | {"cycle_time": 0.8, "cycles": 2}, "walk.json")
+    log = tmp_path / "twin.csv"
+    of_walk = ("--design", "published:A", "--scenario", walk)
+    assert gaitswarm("synthesize", *of_walk, "-o", log).code == 0
+    recording = gaitswarm("record", log, *of_walk, "--db", db).out.strip()
+    fitted = gaitswarm(
+        "identify", recording, "--variables", "body_mass", "--runs", "3", "--db", db, *IN_PROCESS,
+        "--particles", "6", "--iterations", "30", "--json",
+    )  # fmt: skip
+    assert fitted.code == 0, fitted.err
+    assert len(fitted.json["jobs"]) == 3
+    assert "another process runs this job" in fitted.err
+
+
+def _job(gaitswarm: Gaitswarm, job_id: str, db: Path) -> Any:
+    return gaitswarm("status", job_id, "--db", db, "--json").json

@@ -1,0 +1,176 @@
+"""What a shell sees when something is wrong that is no bug, and when one is."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import cli.embedded
+import gaitswarm.jobs.open as gaitswarm_open
+from cli.exit_codes import ExitCode
+from gaitswarm.errors import EvaluatorUnavailable, StoreUnavailable
+from tests.cli.conftest import Finished, Gaitswarm
+
+ROOT = Path(__file__).parents[2]
+
+IN_PROCESS = ("--evaluator", "in-process")
+
+
+def run(
+    *arguments: str | Path, environment: dict[str, str] | None = None, **streams: Any
+) -> subprocess.CompletedProcess[str]:
+    """A command as a process of its own, its output buffered as the interpreter does by itself."""
+    inherited = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
+    return subprocess.run(
+        [sys.executable, "-c", "from cli.main import main; main()", *map(str, arguments)],
+        env=inherited | {"PYTHONPATH": str(ROOT)} | (environment or {}),
+        text=True,
+        check=False,
+        timeout=120,
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams,
+    )
+
+
+def writing_commands(finished: Finished) -> dict[str, tuple[str | Path, ...]]:
+    where = ("--db", finished.db)
+    return {
+        "help": ("--help",),
+        "JSON, written as it is read": ("history", finished.id, *where, "--json"),
+        "a table": ("status", finished.id, *where),
+    }
+
+
+WRITING = ["help", "JSON, written as it is read", "a table"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", WRITING)
+def test_a_full_device_is_said_and_exit_code_5(finished: Finished, kind: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = run(*writing_commands(finished)[kind], stdout=full)
+    assert done.returncode == ExitCode.UNAVAILABLE
+    assert done.stderr == "gaitswarm: standard output cannot be written: No space left on device\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", WRITING)
+def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = run(*writing_commands(finished)[kind], stdout=writing)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (ExitCode.OK, "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_streams_that_are_closed_are_no_error(finished: Finished, closed: str) -> None:
+    program = f'"$0" -c "from cli.main import main; main()" "$@" {closed}'
+    done = subprocess.run(
+        ["/bin/sh", "-c", program, sys.executable, "status", finished.id, "--db", finished.db],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (ExitCode.OK, "")
+
+
+@pytest.mark.slow
+def test_messages_that_cannot_be_written_change_no_exit_code(finished: Finished) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = run("status", "nosuchjob", "--db", finished.db, stderr=full)
+        watched = run("watch", finished.id, "--db", finished.db, stderr=full)
+    assert (done.returncode, watched.returncode) == (ExitCode.NOT_FOUND, ExitCode.OK)
+
+
+@pytest.mark.slow
+def test_a_data_directory_that_cannot_be_made_is_exit_code_5_and_what_else_will_do(
+    small_spec: Path,
+) -> None:
+    # A file, so that it cannot be written by root either.
+    done = run(
+        *("optimize", "--spec", small_spec, *IN_PROCESS),
+        environment={"XDG_DATA_HOME": str(small_spec)},
+    )
+    assert done.returncode == ExitCode.UNAVAILABLE
+    assert f"cannot make {small_spec}/gaitswarm for the database" in done.stderr
+    assert "--db" in done.stderr and "XDG_DATA_HOME" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_a_cache_directory_and_a_home_that_cannot_be_written_stop_nothing(
+    small_spec: Path, tmp_path: Path
+) -> None:
+    of_user = {"XDG_CACHE_HOME": str(small_spec), "HOME": str(small_spec), "MPLCONFIGDIR": ""}
+    db = tmp_path / "jobs.db"
+    done = run("optimize", "--spec", small_spec, "--db", db, *IN_PROCESS, environment=of_user)
+    assert done.returncode == ExitCode.OK, done.stderr
+    picture = tmp_path / "surface.png"
+    drawn = run("plot", "surface", "--output", picture, environment=of_user)
+    assert drawn.returncode == ExitCode.OK, drawn.stderr
+    assert picture.exists()
+    assert "Traceback" not in done.stderr + drawn.stderr
+
+
+def test_a_bug_is_exit_code_70_with_its_traceback(
+    gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def with_a_bug(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("of all numbers")
+
+    monkeypatch.setattr(gaitswarm_open, "open_jobs", with_a_bug)
+    result = gaitswarm("list")
+    assert result.code == ExitCode.BUG
+    assert "Traceback" in result.err and "ZeroDivisionError: of all numbers" in result.err
+    assert "this is a bug" in result.err
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(28, "No space left on device", "/data/jobs.db"), "/data/jobs.db: No space left"),
+        (PermissionError(13, "Permission denied", "/data"), "/data: Permission denied"),
+        (StoreUnavailable("the database is away"), "the database is away"),
+    ],
+)
+def test_what_the_machine_refuses_is_no_bug(
+    gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
+) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(gaitswarm_open, "open_jobs", refused)
+    result = gaitswarm("list")
+    assert result.code == ExitCode.UNAVAILABLE
+    assert result.err.startswith(f"gaitswarm: {said}")
+    assert "Traceback" not in result.err
+
+
+@pytest.mark.slow
+def test_an_optimization_without_workers_says_how_to_go_on_with_its_job(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_cluster(*_: object, **__: object) -> None:
+        raise EvaluatorUnavailable("no Ray cluster listens there")
+
+    with monkeypatch.context() as without_workers:
+        without_workers.setattr(cli.embedded, "open_evaluator", no_cluster)
+        stopped = gaitswarm("optimize", "--spec", small_spec, "--db", db)
+    assert stopped.code == ExitCode.UNAVAILABLE
+    said = re.search(
+        r"^gaitswarm: no Ray.*\n.*go on with\n  gaitswarm (.*)$", stopped.err, re.MULTILINE
+    )
+    assert said, stopped.err
+    resumed = gaitswarm(*said[1].split(), *IN_PROCESS, "--json")
+    assert (resumed.code, resumed.json["state"]) == (ExitCode.OK, "succeeded")

@@ -1,0 +1,239 @@
+"""One job run by the process that asked for it, beside others that run jobs of the same store."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.jobs.job import Claim, Command, CompletedIteration, JobState
+from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
+from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.run.runner import Surroundings, run_claim
+from services.optimizer.service import JobService
+from services.optimizer.store.base import Store
+from services.optimizer.store.sql_store import open_store
+from tests.optimizer.formula import SPEC, FormulaEvaluator
+
+ALL = list(range(SPEC.iterations))
+
+
+class Clock:
+    """The machine's, until it is put forward."""
+
+    def __init__(self) -> None:
+        self.ahead = timedelta()
+
+    def __call__(self, connection: object) -> datetime:
+        return datetime.now(UTC) + self.ahead
+
+    def advance(self, seconds: float) -> None:
+        self.ahead += timedelta(seconds=seconds)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def store(tmp_path: Path, clock: Clock) -> Iterator[Store]:
+    opened = open_store(f"sqlite:///{tmp_path}/jobs.db", clock=clock)
+    yield opened
+    opened.close()
+
+
+def submitted(store: Store) -> Claim:
+    return JobService(store).submit_embedded(SPEC)
+
+
+def held_by_another(store: Store, *, lease_seconds: float = 60.0) -> Claim:
+    return store.create_claimed_job(SPEC, "another", lease_seconds=lease_seconds)
+
+
+def no_workers() -> Evaluator:
+    raise AssertionError("a job that another process runs needs no workers")
+
+
+@contextmanager
+def running(store: Store, claim: Claim, *, after: threading.Event) -> Iterator[None]:
+    """Another process, which runs its job to the end once something has happened."""
+
+    def run() -> None:
+        after.wait()
+        run_claim(claim, Surroundings(store, FormulaEvaluator()))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    yield
+    thread.join()
+
+
+class Told:
+    """What the callbacks of an embedded run were told."""
+
+    def __init__(self) -> None:
+        self.committed: list[int] = []
+        self.followed: list[int] = []
+        self.news: list[str] = []
+        self.any_news = threading.Event()
+
+    def callbacks(self) -> dict[str, Any]:
+        def commit(done: CompletedIteration, _: JobState) -> None:
+            self.committed.append(done.iteration)
+
+        def news(sentence: str) -> None:
+            self.news.append(sentence)
+            self.any_news.set()
+
+        return {
+            "on_commit": commit,
+            "on_follow": lambda iteration: self.followed.append(iteration.index),
+            "on_news": news,
+        }
+
+
+@pytest.fixture
+def told() -> Told:
+    return Told()
+
+
+def test_a_job_that_was_submitted_for_itself_runs_to_its_end(store: Store, told: Told) -> None:
+    job = run_embedded(store, FormulaEvaluator(), submitted(store), **told.callbacks())
+    assert job.state is JobState.SUCCEEDED
+    assert (told.committed, told.followed, told.news) == (ALL, [], [])
+
+
+def test_a_job_is_kept_while_its_workers_are_opened_however_long_that_takes(
+    store: Store, clock: Clock
+) -> None:
+    claim = submitted(store)
+    renewed = threading.Event()
+
+    class Watched:
+        def __getattr__(self, name: str) -> Any:
+            return getattr(store, name)
+
+        def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
+            state = store.renew(claim, lease_seconds=lease_seconds)
+            renewed.set()
+            return state
+
+    def opened() -> Evaluator:
+        for _ in range(2):
+            clock.advance(EMBEDDED_LEASE_SECONDS - 2.0)
+            renewed.clear()
+            assert renewed.wait(timeout=10.0)
+            assert store.claim("another", lease_seconds=60.0) is None
+        return FormulaEvaluator()
+
+    assert run_embedded(Watched(), opened, claim).state is JobState.SUCCEEDED
+
+
+def test_a_job_whose_workers_cannot_be_opened_is_queued(store: Store) -> None:
+    def opened() -> Evaluator:
+        raise EvaluatorUnavailable("no cluster there")
+
+    claim = submitted(store)
+    with pytest.raises(EvaluatorUnavailable):
+        run_embedded(store, opened, claim)
+    assert store.job(claim.job.id).state is JobState.QUEUED
+
+
+def test_a_job_that_another_process_runs_is_followed_to_its_end(store: Store, told: Told) -> None:
+    claim = held_by_another(store)
+    with running(store, claim, after=told.any_news):
+        job = run_embedded(store, no_workers, claim.job.id, **told.callbacks())
+    assert job.state is JobState.SUCCEEDED
+    assert (told.committed, told.followed) == ([], ALL)
+    assert len(told.news) == 1 and "another process runs" in told.news[0]
+
+
+def test_a_job_that_another_process_gives_back_goes_on_here(store: Store, told: Told) -> None:
+    claim = held_by_another(store)
+    stop = threading.Event()
+
+    def give_back(done: CompletedIteration, state: JobState) -> None:
+        if done.iteration == 1:
+            stop.set()
+
+    def run() -> None:
+        told.any_news.wait()
+        run_claim(claim, Surroundings(store, FormulaEvaluator(), on_commit=give_back), stop)
+
+    another = threading.Thread(target=run)
+    another.start()
+    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
+    another.join()
+    assert job.state is JobState.SUCCEEDED
+    assert (told.followed, told.committed) == (ALL[:2], ALL[2:])
+    assert "goes on here" in told.news[-1]
+
+
+def test_a_job_whose_process_was_killed_goes_on_here_when_its_lease_has_run_out(
+    store: Store, told: Told
+) -> None:
+    claim = held_by_another(store, lease_seconds=0.4)
+    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
+    assert job.state is JobState.SUCCEEDED
+    assert "killed" in told.news[0] and "goes on here" in told.news[1]
+
+
+def test_a_job_that_is_lost_to_another_process_is_followed_there_and_nothing_is_told_twice(
+    store: Store, clock: Clock, told: Told
+) -> None:
+    mine = submitted(store)
+    evaluator = FormulaEvaluator()
+    evaluator.hold.set()
+    ended = []
+    here = threading.Thread(
+        target=lambda: ended.append(run_embedded(store, evaluator, mine, **told.callbacks()))
+    )
+    here.start()
+    assert evaluator.entered.wait(timeout=10.0)
+    theirs = None
+    while theirs is None:
+        # As after a sleep of the machine. A heartbeat may just have come in between.
+        clock.advance(EMBEDDED_LEASE_SECONDS + 1.0)
+        theirs = store.claim("another", lease_seconds=60.0)
+    with running(store, theirs, after=told.any_news):
+        here.join()
+    assert [job.state for job in ended] == [JobState.SUCCEEDED]
+    assert "not heard of" in told.news[0]
+    assert (told.committed, told.followed) == ([], ALL)
+
+
+def test_a_job_that_is_cancelled_while_it_is_followed_is_returned_cancelled(
+    store: Store, told: Told
+) -> None:
+    claim = held_by_another(store)
+    callbacks = told.callbacks()
+    callbacks["on_news"] = lambda _: store.command(claim.job.id, Command.CANCEL)
+    job = run_embedded(store, no_workers, claim.job.id, **callbacks)
+    assert job.state is JobState.CANCELLED
+
+
+@pytest.mark.parametrize("command", [Command.PAUSE, Command.CANCEL])
+def test_a_job_that_is_not_under_way_is_returned_as_it_is(store: Store, command: Command) -> None:
+    job, _ = store.create_job(SPEC)
+    store.command(job.id, command)
+    assert run_embedded(store, no_workers, job.id) == store.job(job.id)
+
+
+def test_a_run_that_is_told_to_stop_leaves_the_job_queued(store: Store) -> None:
+    stop = threading.Event()
+    claim = submitted(store)
+    job = run_embedded(store, FormulaEvaluator(), claim, on_commit=lambda *_: stop.set(), stop=stop)
+    assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
+
+
+def test_a_run_that_is_told_to_stop_before_it_begins_leaves_the_job_queued(store: Store) -> None:
+    stop = threading.Event()
+    stop.set()
+    assert run_embedded(store, no_workers, submitted(store), stop=stop).state is JobState.QUEUED

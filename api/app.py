@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -43,7 +44,13 @@ _UNCOMPRESSED: Final = (
 )
 
 
-def create_app(service: JobService, *, settings: Settings, page_folder: Path = FOLDER) -> FastAPI:
+def create_app(
+    service: JobService,
+    *,
+    settings: Settings,
+    page_folder: Path = FOLDER,
+    runs_jobs: Callable[[], bool] | None = None,
+) -> FastAPI:
     """The application around a service: routes, problems, limits, documentation, page.
 
     Nothing is opened or started; the service's store stays its owner's to close.
@@ -52,6 +59,7 @@ def create_app(service: JobService, *, settings: Settings, page_folder: Path = F
         service: answers the requests.
         settings: limits and intervals.
         page_folder: of the built page; there need be none.
+        runs_jobs: whether the runner beside it still claims jobs; None if other processes run them.
 
     Returns:
         The application, for `ApiServer` or any other ASGI server with lifespans.
@@ -67,7 +75,7 @@ def create_app(service: JobService, *, settings: Settings, page_folder: Path = F
         description=DESCRIPTION,
         openapi_tags=TAGS,
         separate_input_output_schemas=False,
-        lifespan=lifespan(service, settings),
+        lifespan=lifespan(service, settings, runs_jobs),
     )
     for module in (
         jobs,

@@ -56,23 +56,26 @@ class SimulationSlots:
 class State(TypedDict):
     """`request.state` of every request: what the lifespan of the application yields.
 
-    stopping: set by the server when it begins to stop; event streams end then.
+    stopping: set by the server when it begins to stop; event streams end then. runs_jobs: whether
+    the runner beside it still claims jobs; None if there is none.
     """
 
     service: JobService
     settings: Settings
     slots: SimulationSlots
     stopping: asyncio.Event
+    runs_jobs: Callable[[], bool] | None
 
 
 def lifespan(
-    service: JobService, settings: Settings
+    service: JobService, settings: Settings, runs_jobs: Callable[[], bool] | None = None
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
     """The lifespan of an application around a service.
 
     Args:
         service: answers the requests; its store stays its owner's to close.
         settings: of the application.
+        runs_jobs: whether the runner beside it still claims jobs; None if there is none.
 
     Returns:
         The context manager that FastAPI enters in the server's event loop.
@@ -81,7 +84,13 @@ def lifespan(
     @asynccontextmanager
     async def run(_app: FastAPI) -> AsyncIterator[State]:
         slots = SimulationSlots(settings.api_simulation_workers, settings.api_simulation_queue)
-        yield State(service=service, settings=settings, slots=slots, stopping=asyncio.Event())
+        yield State(
+            service=service,
+            settings=settings,
+            slots=slots,
+            stopping=asyncio.Event(),
+            runs_jobs=runs_jobs,
+        )
 
     return run
 

@@ -12,6 +12,7 @@ from starlette.responses import RedirectResponse
 from api.dependencies import Service
 from api.documentation import problems
 from gaitswarm.views import PREFIX, View
+from services.optimizer.errors import EvaluatorUnavailable
 
 router = APIRouter(prefix=PREFIX, tags=["health"])
 
@@ -31,9 +32,16 @@ async def healthz() -> HealthView:
 
 
 @router.get("/readyz", operation_id="readyz", summary="Can it work?", responses=problems())
-def readyz(service: Service) -> HealthView:
-    """Answers ok if the database does and has this version's schema, else 503."""
+def readyz(service: Service, request: Request) -> HealthView:
+    """Answers ok if the database does and has this version's schema, and a runner that was started
+    with the server still claims jobs; else 503.
+    """
     service.store.ping()
+    runs_jobs: Callable[[], bool] | None = request.state.runs_jobs
+    if runs_jobs is not None and not runs_jobs():
+        raise EvaluatorUnavailable(
+            "this server's runner has ended, and runs no more jobs; restart the server"
+        )
     return HealthView()
 
 

@@ -72,7 +72,9 @@ def serve(
     )
     log_to_stderr(settings.log_level)
     with _runtime(settings, runs_jobs=not no_runner) as opened:
-        app = create_app(opened.service, settings=settings)
+        beside = opened.runner
+        runs_jobs = None if beside is None else lambda: beside.running
+        app = create_app(opened.service, settings=settings, runs_jobs=runs_jobs)
         try:
             server = ApiServer(
                 app,
@@ -84,7 +86,7 @@ def serve(
             raise EvaluatorUnavailable(
                 f"cannot listen: {error.strerror}; choose another --port, or --port 0"
             ) from error
-        doing = "runs no jobs" if opened.runner is None else "runs queued jobs"
+        doing = "runs no jobs" if beside is None else "runs queued jobs"
         if not is_built():
             note("there is no page, only the API: in a checkout, `make page` builds the page")
         note(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")

@@ -9,7 +9,7 @@ from services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnav
 from services.optimizer.jobs.job import Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.errors import KernelBuildError
-from tests.api.conftest import Commit
+from tests.api.conftest import Commit, Serve
 
 pytestmark = pytest.mark.slow
 
@@ -100,6 +100,15 @@ def test_without_a_database_the_server_is_alive_but_not_ready(
     answer = client.get("/v1/readyz")
     assert answer.status_code == 503
     assert "restore it" in answer.json()["detail"]
+
+
+def test_a_server_whose_runner_has_ended_is_alive_but_not_ready(serve: Serve) -> None:
+    lives = [True, False]
+    client = serve(runs_jobs=lives.pop).client
+
+    assert client.get("/v1/readyz").status_code == 503
+    assert client.get("/v1/healthz").status_code == 200
+    assert client.get("/v1/readyz").status_code == 200
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
 
@@ -24,11 +25,18 @@ class Server:
     """
 
     def __init__(
-        self, service: JobService | None, *, page_folder: Path = Path("none"), **settings: Any
+        self,
+        service: JobService | None,
+        *,
+        page_folder: Path = Path("none"),
+        runs_jobs: Callable[[], bool] | None = None,
+        **settings: Any,
     ) -> None:
         assert set(settings) <= set(Settings.model_fields)
         values = Settings(**{"api_event_poll_seconds": 0.02, **settings})
-        self.app = create_app(cast(JobService, service), settings=values, page_folder=page_folder)
+        self.app = create_app(
+            cast(JobService, service), settings=values, page_folder=page_folder, runs_jobs=runs_jobs
+        )
         self._server = ApiServer(
             self.app,
             host="127.0.0.1",

@@ -282,6 +282,28 @@ def test_a_runner_that_stops_gives_its_jobs_back_at_once(store: Store) -> None:
     assert {store.job(job_id).state for job_id in jobs} == {JobState.QUEUED}
 
 
+def test_a_runner_outlives_a_machine_without_threads_to_spare(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job_id = queue(store)
+    refused: list[str] = []
+    start = threading.Thread.start
+
+    def start_unless_it_is_the_first_for_a_job(thread: threading.Thread) -> None:
+        if thread.name == f"job-{job_id}" and not refused:
+            refused.append(thread.name)
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start_unless_it_is_the_first_for_a_job)
+    runner = Runner(store, FormulaEvaluator(), poll_seconds=0.01)
+    runner.start()
+    eventually(lambda: store.job(job_id).state is JobState.SUCCEEDED)
+
+    assert refused and runner.running
+    runner.stop()
+
+
 class NotingEvaluator(FormulaEvaluator):
     """Keeps the designs that it was given."""
 

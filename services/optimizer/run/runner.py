@@ -319,13 +319,22 @@ class Runner:
             if not self._room.acquire(timeout=self._poll_seconds):
                 continue
             claim = self._claim()
-            if claim is None:
+            if claim is None or not self._started(claim):
                 self._room.release()
                 self._stop.wait(self._poll_seconds)
-                continue
-            thread = threading.Thread(target=self._run, args=(claim,), name=f"job-{claim.job.id}")
-            self._jobs = {other for other in self._jobs if other.is_alive()} | {thread}
+
+    def _started(self, claim: Claim) -> bool:
+        """Run a job in a thread of its own; false if this machine has none left for it."""
+        thread = threading.Thread(target=self._run, args=(claim,), name=f"job-{claim.job.id}")
+        try:
             thread.start()
+        except RuntimeError as error:
+            _log.warning("job %s goes back to the queue: %s", claim.job.id, error)
+            with suppress(GaitswarmError):
+                self._around.store.release(claim, JobState.QUEUED)
+            return False
+        self._jobs = {other for other in self._jobs if other.is_alive()} | {thread}
+        return True
 
     def _claim(self) -> Claim | None:
         try:

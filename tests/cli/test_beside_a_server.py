@@ -19,6 +19,8 @@ pytestmark = pytest.mark.slow
 
 IN_PROCESS = ("--evaluator", "in-process")
 
+OPTIMIZE = (*COMMAND_LINE, "optimize")
+
 
 @pytest.fixture
 def server(db: Path) -> Iterator[str]:
@@ -33,9 +35,7 @@ def test_an_optimization_beside_a_server_of_its_database_keeps_its_job(
     small_spec: Path, db: Path, server: str
 ) -> None:
     # Ray takes seconds to start, in which the server looks for queued jobs many times.
-    process = start_python(
-        *COMMAND_LINE, "optimize", "--spec", small_spec, "--db", db, "--cpus", "1", "--json"
-    )
+    process = start_python(*OPTIMIZE, "--spec", small_spec, "--db", db, "--cpus", "1", "--json")
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
     assert json.loads(out)["state"] == "succeeded"
@@ -61,7 +61,7 @@ def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
     job_id = gaitswarm("submit", "--spec", spec, "--server", server).out.strip()
     eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > 0)
-    process = start_python(*COMMAND_LINE, "optimize", "--resume", job_id, "--db", db)
+    process = start_python(*OPTIMIZE, "--resume", job_id, "--db", db)
     line_with(process.stderr, r"^iteration \d+/")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
@@ -75,9 +75,7 @@ def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 400})
-    process = start_python(
-        *COMMAND_LINE, "optimize", "--spec", spec, "--db", db, *IN_PROCESS, "--json"
-    )
+    process = start_python(*OPTIMIZE, "--spec", spec, "--db", db, *IN_PROCESS, "--json")
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
     line_with(process.stderr, r"^iteration \d+/400")
     process.send_signal(signal.SIGSTOP)
@@ -94,9 +92,7 @@ def test_an_optimization_that_is_cancelled_elsewhere_says_so(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
-    process = start_python(
-        *COMMAND_LINE, "optimize", "--spec", spec, "--db", db, *IN_PROCESS, "--json"
-    )
+    process = start_python(*OPTIMIZE, "--spec", spec, "--db", db, *IN_PROCESS, "--json")
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
     assert gaitswarm("cancel", job_id, "--server", server).code == 0
     out, err = process.communicate(timeout=60)

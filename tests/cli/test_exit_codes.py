@@ -16,25 +16,19 @@ import gaitswarm.jobs.open as gaitswarm_open
 from cli.exit_codes import ExitCode
 from gaitswarm.errors import EvaluatorUnavailable, StoreUnavailable
 from tests.cli.conftest import Finished, Gaitswarm
-
-ROOT = Path(__file__).parents[2]
+from tests.examples.paths import ROOT
+from tests.examples.processes import COMMAND_LINE, python
 
 IN_PROCESS = ("--evaluator", "in-process")
 
+BUFFERED = {"PYTHONUNBUFFERED": ""}
+"""As the interpreter is by itself, which writes what is left at its end."""
 
-def run(
-    *arguments: str | Path, environment: dict[str, str] | None = None, **streams: Any
-) -> subprocess.CompletedProcess[str]:
-    """A command as a process of its own, its output buffered as the interpreter does by itself."""
-    inherited = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
-    return subprocess.run(
-        [sys.executable, "-c", "from cli.main import main; main()", *map(str, arguments)],
-        env=inherited | {"PYTHONPATH": str(ROOT)} | (environment or {}),
-        text=True,
-        check=False,
-        timeout=120,
-        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams,
-    )
+
+def run(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    environment = BUFFERED | options.pop("environment", {})
+    pipes = {"capture_output": False, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return python(*COMMAND_LINE[1:], *arguments, environment=environment, **pipes | options)
 
 
 def writing_commands(finished: Finished) -> dict[str, tuple[str | Path, ...]]:
@@ -73,9 +67,10 @@ def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_streams_that_are_closed_are_no_error(finished: Finished, closed: str) -> None:
-    program = f'"$0" -c "from cli.main import main; main()" "$@" {closed}'
+    program = f'"$0" "$@" {closed}'
+    command = (sys.executable, *COMMAND_LINE, "status", finished.id, "--db", str(finished.db))
     done = subprocess.run(
-        ["/bin/sh", "-c", program, sys.executable, "status", finished.id, "--db", finished.db],
+        ["/bin/sh", "-c", program, *command],
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
@@ -112,7 +107,8 @@ def test_a_data_directory_that_cannot_be_made_is_exit_code_5_and_what_else_will_
 def test_a_cache_directory_and_a_home_that_cannot_be_written_stop_nothing(
     small_spec: Path, tmp_path: Path
 ) -> None:
-    of_user = {"XDG_CACHE_HOME": str(small_spec), "HOME": str(small_spec), "MPLCONFIGDIR": ""}
+    no_folder = str(small_spec)
+    of_user = {"XDG_CACHE_HOME": no_folder, "HOME": no_folder, "TMPDIR": str(tmp_path)}
     db = tmp_path / "jobs.db"
     done = run("optimize", "--spec", small_spec, "--db", db, *IN_PROCESS, environment=of_user)
     assert done.returncode == ExitCode.OK, done.stderr

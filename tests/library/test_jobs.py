@@ -5,6 +5,7 @@ do not.
 from __future__ import annotations
 
 import io
+import os
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
@@ -281,6 +282,17 @@ def test_following_leaves_out_what_is_known(reach: Reach, finished: Finished) ->
     iteration, state = reach(finished.db).follow(finished.id, after=0)
     assert iteration == finished.result.iterations[1]
     assert isinstance(state, gaitswarm.StateView)
+
+
+def test_a_job_is_not_followed_to_a_good_end_in_a_database_that_was_overwritten(
+    finished: Finished,
+) -> None:
+    with gaitswarm.open(finished.db) as jobs:
+        events = jobs.follow(finished.id)
+        next(events)
+        finished.db.write_bytes(os.urandom(finished.db.stat().st_size))
+        with pytest.raises(gaitswarm.StoreUnavailable, match="database"):
+            list(events)
 
 
 def test_a_job_is_followed_from_its_submission_to_its_end(reach: Reach, db: Path) -> None:

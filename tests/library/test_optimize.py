@@ -17,6 +17,7 @@ import gaitswarm
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
+from services.optimizer.run.runner import Runner
 from services.optimizer.service import JobService
 from services.runtime import open_evaluator, open_store
 from tests.library.conftest import SMALL, Finished
@@ -267,6 +268,28 @@ def test_a_mistake_names_the_argument_and_leaves_nothing(
         gaitswarm.optimize(db=db, **{**SMALL, **change})
     assert raised.value.field == field
     assert not db.exists()
+
+
+class Greedy:
+    """Workers of another process, which fail whatever they are given."""
+
+    slots = 1
+
+    def evaluate(self, request: EvaluationRequest, should_stop: object) -> Any:
+        raise AssertionError("this job is another process's")
+
+    def close(self) -> None:
+        """Nothing was started."""
+
+
+def test_a_job_is_taken_by_no_runner_that_waits_for_one(db: Path, finished: Finished) -> None:
+    with closing(open_store(str(db))) as store:
+        another = Runner(store, Greedy(), poll_seconds=0.001)
+        another.start()
+        result = gaitswarm.optimize(db=db, **SMALL)
+        another.stop()
+    assert result.job.state == "succeeded"
+    assert same_history(db, result.job.id, finished)
 
 
 def test_resuming_makes_no_database(tmp_path: Path) -> None:

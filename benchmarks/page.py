@@ -23,8 +23,8 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from benchmarks.large_store import fill
 from services.runtime import open_store
+from tests.examples.servers import ServerProcess
 from tests.web.chromium import ARGUMENTS, find_chromium
-from tests.web.server import ServerProcess
 from tests.web.visit import Visit
 
 _COUNT_PICTURES: Final = """() => {

@@ -14,7 +14,7 @@ from services.optimizer.analysis.identifiability import (
     identifiability,
 )
 from services.optimizer.analysis.ranking import RankedJob, rank
-from services.optimizer.errors import InvalidRequest, NotFound, ProvenanceChanged
+from services.optimizer.errors import InvalidRequest, ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
 from services.optimizer.jobs.job import (
@@ -34,9 +34,7 @@ from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from services.optimizer.run.runner import runner_name
 from services.optimizer.store.base import Page, Store
-from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk
-from sim.robot import load_robot
 
 _EARLIER: Final = 50
 """Newest jobs among which one like a new job is looked for."""
@@ -80,7 +78,8 @@ class JobService:
             InvalidRequest: It cannot be simulated; names the field.
             IdempotencyConflict: The key was used before, for another job.
         """
-        self._check(spec)
+        spec.check_can_be_simulated()
+        spec.check_recordings(self.recording)
         return self.store.create_job(
             spec,
             provenance=self.provenance(spec),
@@ -101,7 +100,8 @@ class JobService:
         Raises:
             InvalidRequest: It cannot be simulated; names the field.
         """
-        self._check(spec)
+        spec.check_can_be_simulated()
+        spec.check_recordings(self.recording)
         return self.store.create_claimed_job(
             spec,
             runner_name(),
@@ -146,7 +146,8 @@ class JobService:
         Raises:
             InvalidRequest: it cannot be simulated; names the field.
         """
-        self._check(spec)
+        spec.check_can_be_simulated()
+        spec.check_recordings(self.recording)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
         earlier = [job for job in self.store.jobs(limit=_EARLIER).items if job.readable]
         return estimate(spec, cases, earlier, self._rates)
@@ -396,21 +397,3 @@ class JobService:
         check_comparable(jobs)
         runs = [self.columns(job) for job in jobs]
         return identifiability(jobs[0].spec.design_space().variables, runs)
-
-    def _check(self, spec: Spec) -> None:
-        """Raise InvalidRequest for a job that cannot be run."""
-        spec.check_can_be_simulated()
-        self._check_recordings(spec)
-
-    def _check_recordings(self, spec: Spec) -> None:
-        """Each is there, of the robot's joints, and of a gait within the legs' reach."""
-        joints = load_robot(spec.robot).joint_names
-        for index, name in enumerate(spec.recording_ids):
-            field = f"recordings.{index}"
-            try:
-                walk = self.recording(name)
-                if walk.joints != joints:
-                    raise InvalidRequest("recorded on other joints than the robot's", field=field)
-                walk.check_reach(spec.robot)
-            except (NotFound, SimulationInputError) as error:
-                raise InvalidRequest(str(error), field=field) from error

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
@@ -16,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from sim.case import Case
-from sim.identification.recorded_walk import Recordings
+from sim.errors import SimulationInputError
+from sim.identification.recorded_walk import RecordedWalk, Recordings
 from sim.outcome import Objective, Outcome, Status
-from sim.robot import RobotSource
+from sim.robot import RobotSource, load_robot
 from sim.variables import VariableChoice, VariableName
 
 Floats = NDArray[np.float64]
@@ -111,6 +114,26 @@ class Spec(BaseModel):
         Raises:
             InvalidRequest: bounds or values that nothing can run with; names the field.
         """
+
+    def check_recordings(self, find: Callable[[str], RecordedWalk]) -> None:
+        """Check that each recording is of the robot's joints and of a gait that its legs reach.
+
+        Args:
+            find: A recording's id -> the recorded walk; raises NotFound where there is none.
+
+        Raises:
+            InvalidRequest: A recording that cannot be fitted to; names its place in `recordings`.
+        """
+        joints = load_robot(self.robot).joint_names if self.recording_ids else ()
+        for index, name in enumerate(self.recording_ids):
+            field = f"recordings.{index}"
+            try:
+                walk = find(name)
+                if walk.joints != joints:
+                    raise InvalidRequest("recorded on other joints than the robot's", field=field)
+                walk.check_reach(self.robot)
+            except (NotFound, SimulationInputError) as error:
+                raise InvalidRequest(str(error), field=field) from error
 
     @property
     @abstractmethod

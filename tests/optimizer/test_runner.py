@@ -164,9 +164,9 @@ def test_a_pause_need_not_wait_for_workers_out_of_reach(store: Store) -> None:
 
 
 class AbsentStore:
-    """`Store` whose writes are refused while `away` says so; counts the refusals."""
+    """`Store` that refuses those accesses of a run that `away` says; takes note of them."""
 
-    def __init__(self, store: Store, away: Callable[[], bool]) -> None:
+    def __init__(self, store: Store, away: Callable[[str], bool]) -> None:
         self.store = store
         self.away = away
         self.refused: list[str] = []
@@ -176,12 +176,13 @@ class AbsentStore:
         return getattr(self.store, name)
 
     def _ask(self, name: str, *given: object, **options: object) -> object:
-        if self.away():
+        if self.away(name):
             self.refused.append(name)
             self.refusal.set()
             raise StoreUnavailable("the server is being restarted")
         return getattr(self.store, name)(*given, **options)
 
+    job = partialmethod(_ask, "job")
     begin = partialmethod(_ask, "begin")
     commit = partialmethod(_ask, "commit")
     renew = partialmethod(_ask, "renew")
@@ -193,7 +194,9 @@ def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(stor
     run(store, FormulaEvaluator())
     job_id = queue(store)
     evaluator = FormulaEvaluator()
-    absent = AbsentStore(store, lambda: evaluator.calls == 3 and absent.refused.count("commit") < 3)
+    absent = AbsentStore(
+        store, lambda _: evaluator.calls == 3 and absent.refused.count("commit") < 3
+    )
     job = run(cast(Store, absent), evaluator, lease_seconds=60.0)
     assert job.state is JobState.SUCCEEDED
     assert absent.refused.count("commit") == 3
@@ -204,7 +207,7 @@ def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(stor
 def test_a_store_that_stays_away_is_waited_for_no_longer_than_the_lease(store: Store) -> None:
     queue(store)
     evaluator = FormulaEvaluator()
-    absent = AbsentStore(store, lambda: evaluator.calls > 0)
+    absent = AbsentStore(store, lambda access: access != "job" and evaluator.calls > 0)
     job = run(cast(Store, absent), evaluator, lease_seconds=0.3)
     assert evaluator.calls == 1
     assert (job.state, job.progress.iterations) == (JobState.RUNNING, 0)
@@ -214,12 +217,30 @@ def test_a_store_that_stays_away_is_waited_for_no_longer_than_the_lease(store: S
 def test_a_process_that_is_to_end_does_not_wait_for_a_store_that_is_away(store: Store) -> None:
     queue(store)
     evaluator = FormulaEvaluator()
-    absent = AbsentStore(store, lambda: evaluator.calls > 0)
+    absent = AbsentStore(store, lambda access: access != "job" and evaluator.calls > 0)
     stop = threading.Event()
     threading.Thread(target=set_after, args=(absent.refusal, stop)).start()
     begun = time.monotonic()
     assert run(cast(Store, absent), evaluator, stop, lease_seconds=600.0).progress.iterations == 0
     assert time.monotonic() - begun < 2.0
+
+
+def test_a_process_that_is_to_end_does_not_wait_to_read_a_budget_that_has_changed(
+    store: Store,
+) -> None:
+    job_id = queue(store)
+    stop = threading.Event()
+    evaluator = FormulaEvaluator()
+
+    def extend(done: CompletedIteration, state: JobState) -> None:
+        store.extend(job_id, SPEC.iterations + 1)
+
+    def away(access: str) -> bool:
+        return access == "job" and store.job(job_id).state is JobState.RUNNING
+
+    absent = AbsentStore(store, away)
+    threading.Thread(target=set_after, args=(absent.refusal, stop)).start()
+    assert run(cast(Store, absent), evaluator, stop, on_commit=extend).progress.iterations == 1
 
 
 def test_a_simulation_error_fails_the_job_with_its_reason(store: Store) -> None:

@@ -168,18 +168,22 @@ class _Run:
 
     def execute(self, actions: tuple[Action, ...]) -> Event:
         """Do them in order; the event that answers the last, or the one that broke off."""
+        try:
+            return self._do_all(actions)
+        except LeaseLost:
+            return LeaseWasLost()
+        except EvaluationStopped:
+            return LeaseWasLost() if self.heartbeat.lost else StopRequested()
+
+    def _do_all(self, actions: tuple[Action, ...]) -> Event:
         answer: Event | None = None
         try:
             for action in actions:
                 answer = self._do(action)
-        except LeaseLost:
-            return LeaseWasLost()
         except BudgetChanged:
             job = self._stored(lambda: self.around.store.job(self.claim.job.id))
             self.claim = replace(self.claim, job=job)
-            return Extended(self.claim.job)
-        except EvaluationStopped:
-            return LeaseWasLost() if self.heartbeat.lost else StopRequested()
+            return Extended(job)
         if answer is None:
             raise AssertionError("the last of the coordinator's actions has no answer")
         return answer
@@ -268,7 +272,16 @@ class _Run:
 class Runner:
     """Runs up to `concurrency` jobs, each in a thread of its own, from start() to stop().
 
-    poll_seconds: how often the store is asked for a queued job while there is room for one.
+    Args:
+        store: Where jobs are claimed.
+        evaluator: Where their walks run.
+        concurrency: Jobs to run at once.
+        lease_seconds: After so long without a word from here another runner takes a job over [s].
+        poll_seconds: How often the store is asked for a queued job while there is room for one [s].
+        name: Of this runner, which no other one may have; a random one by default.
+
+    Raises:
+        ValueError: concurrency is less than 1.
     """
 
     def __init__(
@@ -293,7 +306,7 @@ class Runner:
 
     @property
     def running(self) -> bool:
-        """Whether jobs are being claimed."""
+        """Whether jobs are being claimed, as from start() to stop() they should be."""
         return self._scheduler is not None and self._scheduler.is_alive()
 
     def start(self) -> None:

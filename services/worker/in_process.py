@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.dispatch import Dispatcher
+from services.worker.preparation import KernelBuilder
 from sim import simulate
 from sim.outcome import Outcome
 
@@ -24,6 +25,7 @@ class InProcessEvaluator:
         slots = cpus if cpus is not None else available_cpus()
         if slots < 1:
             raise ValueError(f"cpus must be at least 1, it is {slots}")
+        self._kernels = KernelBuilder()
         self._dispatcher = Dispatcher(slots, simulate.lanes)
         self._threads = [
             threading.Thread(target=self._work, name=f"walks-{k}", daemon=True)
@@ -34,17 +36,18 @@ class InProcessEvaluator:
 
     @property
     def slots(self) -> int:
-        """See `Evaluator.slots`."""
+        """Number of threads."""
         return self._dispatcher.slots
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
-        """See `Evaluator.evaluate`."""
+        """Have the walks run by the pool, as soon as their robots' kernels are built."""
+        self._kernels.build((case.robot for case in request.cases), should_stop)
         return self._dispatcher.evaluate(request, should_stop)
 
     def close(self) -> None:
-        """See `Evaluator.close`. Waits for the chunks that are being run."""
+        """End the threads; waits for the chunks that are being run."""
         self._dispatcher.close("the evaluator was closed")
         for thread in self._threads:
             thread.join()

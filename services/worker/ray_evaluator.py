@@ -12,6 +12,7 @@ from typing import Any, Final
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.dispatch import Dispatcher, Work
+from services.worker.preparation import KernelBuilder, awaited
 from services.worker.ray_session import RaySession, open_ray
 from services.worker.tasks import Failure, run_in_worker, warm_up
 from sim import simulate
@@ -32,6 +33,9 @@ _IDLE: Final = 0.5
 _PULSE: Final = 4.0
 """Seconds between looks at whether the cluster's head is alive; three misses count as lost."""
 
+_PATIENCE: Final = 10.0
+"""Seconds to wait for a connection that is to be closed, and may be busy being opened."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -45,83 +49,99 @@ class RayEvaluator:
     def __init__(self, address: str | None = None, *, cpus: int | None = None) -> None:
         self._address = address
         self._cpus = cpus
-        self._reopening = threading.Lock()
+        self._changing = threading.Lock()
         self._closed = False
+        self._kernels = KernelBuilder()
         self._link = _Link(address, cpus)
         try:
             # Compiling and starting processes take seconds each, and can be done side by side.
             simulate.prepare()
-            self._link.dispatcher()
+            self._link.opened.result()
         except BaseException:
             self._link.close()
             raise
 
     @property
     def slots(self) -> int:
-        """See `Evaluator.slots`."""
-        return self._link.dispatcher().slots
+        """CPUs of the cluster."""
+        return self._link.opened.result().slots
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
-        """See `Evaluator.evaluate`."""
+        """Have the walks run by Ray's workers, on a new connection if the last was lost."""
         # Built here, the kernel lies in the cache when this machine's workers look for it.
-        for robot in {case.robot for case in request.cases}:
-            simulate.prepare(robot)
-        return self._living_dispatcher().evaluate(request, should_stop)
+        self._kernels.build((case.robot for case in request.cases), should_stop)
+        dispatcher = awaited(self._living_link().opened, should_stop)
+        return dispatcher.evaluate(request, should_stop)
 
     def close(self) -> None:
-        """See `Evaluator.close`. Ends an embedded cluster."""
-        with self._reopening:
+        """Disconnect; an embedded cluster ends."""
+        with self._changing:
             self._closed = True
-            self._link.close()
+        self._link.close()
 
-    def _living_dispatcher(self) -> Dispatcher:
-        with self._reopening:
+    def _living_link(self) -> _Link:
+        """A connection that is open, or about to be."""
+        with self._changing:
             if self._closed:
                 raise EvaluatorUnavailable("the evaluator was closed")
-            if not self._link.alive:
-                self._link.close()
-                self._link = _Link(self._address, self._cpus)
-            return self._link.dispatcher()
+            if self._link.lost:
+                self._link = _Link(self._address, self._cpus, after=self._link)
+            return self._link
 
 
 class _Link:
     """One connection to Ray, from opening to loss or closing.
 
-    An embedded cluster dies with the thread that started it, so one thread does it all.
+    An embedded cluster dies with the thread that started it, so one thread does it all. A process
+    has one connection at a time: a second is opened when the one before has been closed.
+
+    opened: what takes the requests, or what kept it from being opened.
     """
 
-    def __init__(self, address: str | None, cpus: int | None) -> None:
-        self._opened: Future[Dispatcher] = Future()
+    def __init__(
+        self, address: str | None, cpus: int | None, *, after: _Link | None = None
+    ) -> None:
+        self.opened: Future[Dispatcher] = Future()
+        self._closing = threading.Event()
         self._thread = threading.Thread(
-            target=self._live, args=(address, cpus), name="ray-link", daemon=True
+            target=self._live, args=(address, cpus, after), name="ray-link", daemon=True
         )
         self._thread.start()
 
-    def dispatcher(self) -> Dispatcher:
-        """Takes the requests, once it is open. Raises what kept it from being opened."""
-        return self._opened.result()
-
     @property
-    def alive(self) -> bool:
-        """False once it was lost, closed, or could not be opened."""
-        return self._opened.exception() is None and not self._opened.result().closed
+    def lost(self) -> bool:
+        """Whether it was lost or closed, or could not be opened. False while it is opened."""
+        if not self.opened.done():
+            return False
+        return self.opened.exception() is not None or self.opened.result().closed
 
     def close(self) -> None:
-        """Disconnect, and wait until that is done. Idempotent."""
-        if self._opened.exception() is None:
-            self._opened.result().close("the evaluator was closed")
-        self._thread.join()
+        """Disconnect, and wait until that is done, within reason. Idempotent."""
+        self._closing.set()
+        self._end()
+        self._thread.join(_PATIENCE)
+        if self._thread.is_alive():
+            _log.warning("Ray did not let go within %.0f s", _PATIENCE)
 
-    def _live(self, address: str | None, cpus: int | None) -> None:
+    def _end(self) -> None:
+        """Let the pump end, if it is to and has begun."""
+        is_open = self.opened.done() and self.opened.exception() is None
+        if is_open and self._closing.is_set():
+            self.opened.result().close("the evaluator was closed")
+
+    def _live(self, address: str | None, cpus: int | None, after: _Link | None) -> None:
         try:
+            if after is not None:
+                after.close()
             session = open_ray(address, cpus=cpus)
         except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
-            self._opened.set_exception(error)
+            self.opened.set_exception(error)
             return
         dispatcher = Dispatcher(session.slots, simulate.lanes)
-        self._opened.set_result(dispatcher)
+        self.opened.set_result(dispatcher)
+        self._end()
         try:
             _Pump(session, dispatcher).run()
         except Exception as error:  # noqa: BLE001 - whatever Ray raises when it is going down

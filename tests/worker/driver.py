@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
+from unittest.mock import patch
 
 from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.run.evaluator import EvaluationStopped
 from services.worker.ray_evaluator import RayEvaluator
+from services.worker.ray_session import RaySession, open_ray
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request
-
 
 def main(ending: str) -> None:
     evaluator = RayEvaluator(cpus=1)
@@ -25,9 +28,29 @@ def main(ending: str) -> None:
             if "gcs_server" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
         sys.stdout.write(f"{until_lost(evaluator)}\n")
+        sys.stdout.write(f"{told_to_stop_while_reopening(evaluator)}\n")
         assert bits(evaluator.evaluate(request(2), never)) == walked
     sys.stdin.readline()
     evaluator.close()
+
+
+def told_to_stop_while_reopening(evaluator: RayEvaluator) -> str:
+    """What came of a stop that was asked for while Ray took long to be opened."""
+    reopening, may_open = threading.Event(), threading.Event()
+
+    def open_slowly(address: str | None, *, cpus: int | None) -> RaySession:
+        reopening.set()
+        may_open.wait()
+        return open_ray(address, cpus=cpus)
+
+    with patch("services.worker.ray_evaluator.open_ray", open_slowly):
+        try:
+            evaluator.evaluate(request(2), reopening.is_set)
+        except EvaluationStopped:
+            return "stopped"
+        finally:
+            may_open.set()
+    return "not stopped"
 
 
 def until_lost(evaluator: RayEvaluator) -> str:

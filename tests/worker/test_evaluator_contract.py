@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,8 +13,12 @@ import pytest
 from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
 from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from services.worker.in_process import InProcessEvaluator
-from sim.errors import SimulationInputError
+from sim import simulate
+from sim.case import Walk
+from sim.errors import KernelBuildError, SimulationInputError
 from sim.outcome import Outcome
+from sim.robot import RobotVariant
+from sim.scenario import Scenario
 from tests.examples.walks import short_walk
 from tests.worker.requests import SCENARIOS, bits, never, request, walked_at_once
 
@@ -73,6 +78,59 @@ def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
     with pytest.raises(EvaluationStopped):
         evaluator.evaluate(request(8000, scenarios=(long,)), stop.is_set)
     assert time.monotonic() - begun < 2.0
+
+
+def test_whether_to_stop_is_asked_at_least_once_a_second(
+    evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A kernel that takes a second and a half, and then walks for as long.
+    monkeypatch.setattr(simulate, "prepare", lambda _: time.sleep(1.5))
+    long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
+    asked = [time.monotonic()]
+
+    def stop_after_three_seconds() -> bool:
+        asked.append(time.monotonic())
+        return asked[-1] - asked[0] > 3.0
+
+    with pytest.raises(EvaluationStopped):
+        evaluator.evaluate(request(8000, scenarios=(long,)), stop_after_three_seconds)
+    asked.append(time.monotonic())
+    assert max(later - earlier for earlier, later in pairwise(asked)) < 1.0
+
+
+def test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_not_told_to_stop(
+    evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    building, may_end = threading.Event(), threading.Event()
+    other = request(5)
+    slow = RobotVariant(name="szabadka2", contact_law="stick")
+    cases = tuple(Walk(slow, "pi", scenario, ("P", "I")) for scenario in SCENARIOS)
+
+    def build(robot: object) -> None:
+        if robot == slow:
+            building.set()
+            may_end.wait()
+
+    monkeypatch.setattr(simulate, "prepare", build)
+    with pytest.raises(EvaluationStopped):
+        evaluator.evaluate(replace(request(5), cases=cases), building.is_set)
+    assert bits(evaluator.evaluate(other, never)) == bits(walked_at_once(other))
+    may_end.set()
+
+
+def test_a_kernel_that_cannot_be_built_is_an_error_to_all_who_need_it(
+    evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_robot: object) -> None:
+        raise KernelBuildError("cc: 7 errors")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(simulate, "prepare", refuse)
+        for _ in range(2):
+            with pytest.raises(KernelBuildError, match="7 errors"):
+                evaluator.evaluate(request(3), never)
+    sound = request(3)
+    assert bits(evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
 
 
 def test_jobs_at_the_same_time_do_not_disturb_each_others_bits(evaluator: Evaluator) -> None:

@@ -1,0 +1,85 @@
+"""What takes seconds before anything can walk, done in threads that nobody has to wait for."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, wait
+from typing import Final, TypeVar
+
+from services.optimizer.run.evaluator import EvaluationStopped
+from sim import simulate
+from sim.robot import RobotSource
+
+T = TypeVar("T")
+
+_GLANCE: Final = 0.1
+"""Seconds between looks at `should_stop`."""
+
+
+def awaited(work: Future[T], should_stop: Callable[[], bool]) -> T:
+    """Wait for work that another thread does; it goes on there if it is not waited for.
+
+    Args:
+        work: What is waited for.
+        should_stop: Polled until the work is done.
+
+    Returns:
+        The work's result; its error is raised.
+
+    Raises:
+        EvaluationStopped: `should_stop` said so.
+    """
+    while not wait([work], timeout=_GLANCE).done:
+        if should_stop():
+            raise EvaluationStopped
+    return work.result()
+
+
+class KernelBuilder:
+    """Builds robots' kernels, each in a thread of its own, for all who need it at the same time.
+
+    Workers that met a robot without a kernel would all wait for it, and so would every other job.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._under_way: dict[RobotSource, Future[None]] = {}
+
+    def build(self, robots: Iterable[RobotSource], should_stop: Callable[[], bool]) -> None:
+        """Return when all kernels are in the cache.
+
+        Args:
+            robots: Those that are going to walk.
+            should_stop: Polled several times a second; what is being built is built to its end
+                even so, and found by whoever needs it next.
+
+        Raises:
+            EvaluationStopped: `should_stop` said so.
+            KernelBuildError: The compiler refuses a kernel.
+        """
+        for work in [self._building(robot) for robot in set(robots)]:
+            awaited(work, should_stop)
+
+    def _building(self, robot: RobotSource) -> Future[None]:
+        with self._lock:
+            work = self._under_way.get(robot)
+            if work is None:
+                work = self._under_way[robot] = Future()
+                threading.Thread(
+                    target=self._build, args=(robot, work), name="kernel", daemon=True
+                ).start()
+            return work
+
+    def _build(self, robot: RobotSource, work: Future[None]) -> None:
+        failure: BaseException | None = None
+        try:
+            simulate.prepare(robot)
+        except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
+            failure = error
+        with self._lock:
+            del self._under_way[robot]
+        if failure is None:
+            work.set_result(None)
+        else:
+            work.set_exception(failure)

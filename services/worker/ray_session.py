@@ -28,6 +28,8 @@ _BEFORE_IMPORT: Final = {
     "RAY_USAGE_STATS_ENABLED": "0",
     # Ray must not package the checkout and install it anew when we run under `uv run`.
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
+    # Its handler of signals takes SIGTERM away from us, for good when a connection is closed.
+    "RAY_DISABLE_FAILURE_SIGNAL_HANDLER": "1",
     # The behaviour that later versions have in any case; without it, init warns.
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
 }

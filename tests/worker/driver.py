@@ -16,7 +16,11 @@ from services.worker.ray_session import RaySession, open_ray
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request
 
+heard = threading.Event()
+
+
 def main(ending: str) -> None:
+    signal.signal(signal.SIGTERM, lambda *_: heard.set())
     evaluator = RayEvaluator(cpus=1)
     walked = bits(evaluator.evaluate(request(2), never))
     sys.stdout.write("walked\n")
@@ -30,6 +34,7 @@ def main(ending: str) -> None:
         sys.stdout.write(f"{until_lost(evaluator)}\n")
         sys.stdout.write(f"{told_to_stop_while_reopening(evaluator)}\n")
         assert bits(evaluator.evaluate(request(2), never)) == walked
+        sys.stdout.write(f"{terminated()}\n")
     sys.stdin.readline()
     evaluator.close()
 
@@ -51,6 +56,12 @@ def told_to_stop_while_reopening(evaluator: RayEvaluator) -> str:
         finally:
             may_open.set()
     return "not stopped"
+
+
+def terminated() -> str:
+    """Whether this process hears of SIGTERM as it did before Ray was opened."""
+    os.kill(os.getpid(), signal.SIGTERM)
+    return "heard" if heard.wait(5.0) else "not heard"
 
 
 def until_lost(evaluator: RayEvaluator) -> str:

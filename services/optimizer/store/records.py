@@ -1,6 +1,4 @@
-"""Single statements on jobs and iterations, inside a transaction that someone else began:
-rows, who holds a job, and what a transition sets.
-"""
+"""Single statements on jobs and iterations, inside a transaction that someone else began."""
 
 from __future__ import annotations
 
@@ -9,50 +7,40 @@ import re
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any, Final
 
 import numpy as np
-from sqlalchemy import ColumnElement, Connection, Select, and_, insert, or_, select, update
+from sqlalchemy import Connection, insert, select, update
 
 from services.optimizer.errors import (
-    BudgetChanged,
     Conflict,
     IdempotencyConflict,
-    LeaseLost,
     NotFound,
-    Unreadable,
 )
 from services.optimizer.jobs.job import (
     Answered,
     Ask,
-    Claim,
     CompletedIteration,
     Job,
     JobState,
-    UnreadableSpec,
 )
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, with_record
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.recordings import load_recordings
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
     best_particle,
-    budget,
     evaluation_rows,
     iteration_summary,
-    kept,
     provenance_document,
     provenance_records,
     spec_document,
-    storable,
     submitted_spec,
     to_ask,
     to_job,
 )
 from services.optimizer.store.tables import evaluations, iterations, jobs
-from sim.identification.recorded_walk import Recordings
 
 # No vowels, no look-alikes: an id is read aloud, and it spells no word.
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
@@ -98,15 +86,6 @@ class Submission:
     key: str | None = None
     digest: str | None = None
     provenance: ProvenanceRecords = ()
-
-
-@dataclass(frozen=True, slots=True)
-class _Work:
-    """What a claim brings beside the job; see `Claim`."""
-
-    ask: Ask | None
-    recordings: Recordings
-    answered: Answered | None
 
 
 def repeated_job(connection: Connection, asked: Submission) -> Job | None:
@@ -173,22 +152,6 @@ def outstanding_ask(connection: Connection, job: Row) -> Ask | None:
     )
     row = connection.execute(query).mappings().first()
     return to_ask(row) if row is not None else None
-
-
-def _work(connection: Connection, job: Row) -> _Work:
-    """All that a run needs beside the job. Raises Unreadable."""
-    spec = to_job(job).stored_spec
-    if isinstance(spec, UnreadableSpec):
-        raise Unreadable(spec.reason)
-    try:
-        walks = load_recordings(connection, spec.recording_ids)
-        ask = outstanding_ask(connection, job)
-        answered = answered_ask(connection, job) if ask is None else None
-    except NotFound as error:
-        raise kept(str(error)) from error
-    except (ValueError, TypeError, LookupError) as error:
-        raise kept(f"its iteration {job['iterations']} cannot be read ({error})") from error
-    return _Work(ask, walks, answered)
 
 
 def answered_ask(connection: Connection, job: Row) -> Answered | None:
@@ -292,81 +255,6 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
     return columns
 
 
-def take_job(
-    connection: Connection, row: Row, runner: str, lease_seconds: float, now: datetime
-) -> Claim:
-    """Make a locked job, which nobody else holds, the runner's: it runs, under a higher token.
-
-    Raises:
-        Unreadable: Something that a run needs cannot be read; nothing is changed.
-    """
-    work = _work(connection, row)
-    token = row["lease_token"] + 1
-    changes = entering(JobState.RUNNING, now) | {
-        "started_at": row["started_at"] or now,
-        "lease_owner": runner,
-        "lease_token": token,
-        "lease_expires_at": now + timedelta(seconds=lease_seconds),
-    }
-    job = to_job(update_job(connection, row, changes))
-    return Claim(job, runner, token, work.ask, work.recordings, work.answered)
-
-
-def set_aside(connection: Connection, row: Row, reason: Unreadable, now: datetime) -> None:
-    """Let a locked job fail that cannot be read, and touch nothing else of it."""
-    error = {"error": storable(str(reason))}
-    update_job(connection, row, entering(JobState.FAILED, now) | error)
-
-
-def held(connection: Connection, claim: Claim) -> Row:
-    """The locked row of a claimed job; LeaseLost unless the claim is still the job's.
-
-    A lease that ran out but that nobody has taken is still the claim's: the token decides.
-    """
-    row = job_row(connection, claim.job.id, lock=True)
-    if row["lease_token"] == claim.token and row["lease_owner"] == claim.runner:
-        return row
-    owner = row["lease_owner"]
-    now = f"held by {owner}" if owner is not None else f"{row['state']} and held by nobody"
-    raise LeaseLost(f"{claim.runner} has lost job {claim.job.id}: it is {now}")
-
-
 def require_readable(row: Row) -> None:
     """Raise Unreadable, with the reason, if the job's spec cannot be read."""
     _ = to_job(row).spec
-
-
-def require_budget_of(claim: Claim, row: Row) -> None:
-    """Raise BudgetChanged if the job was extended since the claim's job was read."""
-    if budget(row) != claim.job.spec.iterations:
-        raise BudgetChanged(f"job {row['id']} is to run {budget(row)} iterations now")
-
-
-def lease_is_live(row: Row, now: datetime) -> bool:
-    """Whether a runner has the job and has been heard of lately."""
-    expires = row["lease_expires_at"]
-    return expires is not None and expires > now
-
-
-def claimable(now: datetime, job_id: str | None) -> Select[*tuple[Any, ...]]:
-    """The oldest job waiting for a runner, or whose runner has gone; locked when it is selected.
-
-    Runners that look at the same time pass over each other's candidates; only a runner that wants
-    one certain job waits for it.
-    """
-    query = (
-        select(jobs)
-        .where(or_(jobs.c.state == JobState.QUEUED, _abandoned(now)))
-        .order_by(jobs.c.created_at, jobs.c.id)
-        .limit(1)
-    )
-    if job_id is None:
-        return query.with_for_update(skip_locked=True)
-    return query.where(jobs.c.id == job_id).with_for_update()
-
-
-def _abandoned(now: datetime) -> ColumnElement[bool]:
-    return and_(
-        jobs.c.state.in_((JobState.RUNNING, JobState.PAUSING)),
-        or_(jobs.c.lease_expires_at.is_(None), jobs.c.lease_expires_at <= now),
-    )

@@ -25,6 +25,14 @@ from services.optimizer.jobs.job import (
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.base import Page
+from services.optimizer.store.claims import (
+    claimable,
+    held,
+    lease_is_live,
+    require_budget_of,
+    set_aside,
+    take_job,
+)
 from services.optimizer.store.engine import (
     Clock,
     Database,
@@ -43,24 +51,18 @@ from services.optimizer.store.recordings import (
 )
 from services.optimizer.store.records import (
     Submission,
-    claimable,
     complete_iteration,
     entering,
-    held,
     insert_ask,
     insert_job,
     job_row,
-    lease_is_live,
     outstanding_ask,
     progress_after,
     provenance_columns,
     repeated_job,
-    require_budget_of,
     require_readable,
-    set_aside,
     state_after_commit,
     state_after_release,
-    take_job,
     update_job,
 )
 from services.optimizer.store.rows import (

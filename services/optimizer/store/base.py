@@ -27,7 +27,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Page(Generic[T]):
-    """A keyset page. `next` is the `after` of the following page, None on the last."""
+    """A page of a long list, told by where the one before it ended.
+
+    Attributes:
+        items: In the list's order.
+        next: The `after` of the following page; None on the last.
+    """
 
     items: tuple[T, ...]
     next: str | None
@@ -90,7 +95,14 @@ class Store(Protocol):
         """
 
     def job(self, job_id: str) -> Job:
-        """One job with its progress."""
+        """Read a job with its progress.
+
+        Args:
+            job_id: Of the job.
+
+        Returns:
+            The job as it is now, whether its spec can be read or not.
+        """
 
     def jobs(
         self,
@@ -101,50 +113,127 @@ class Store(Protocol):
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]:
-        """Jobs in a state whose name or id contains a text, whatever its case.
+        """Read a page of jobs.
 
-        Raises InvalidRequest (field `after`) for a cursor that is none of this order.
+        Args:
+            state: Only jobs in this state.
+            search: Only jobs whose name or id contains this, whatever its case.
+            order: By what they are sorted.
+            after: `next` of the page before.
+            limit: Most jobs on the page.
+
+        Returns:
+            The page; jobs that are submitted meanwhile do not shift later ones.
+
+        Raises:
+            InvalidRequest: `after` is no cursor of this order, or `limit` is less than 1.
         """
 
     def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
-        """Apply `commanded`; Conflict if the state does not allow it.
-
-        accept_changes: of a job that is queued again, whether it may go on although what its
-            numbers depend on has changed; until it is claimed.
+        """Apply a command of a user; see `commanded` for what is possible.
 
         Cancelling clears the lease, so a runner's next write is refused.
+
+        Args:
+            job_id: Of the job.
+            command: What to do with it.
+            accept_changes: Of a job that is queued again, whether it may go on although what its
+                numbers depend on has changed; until it is claimed.
+
+        Returns:
+            The job as it is then.
+
+        Raises:
+            Conflict: Its state does not allow it.
+            Unreadable: It would be queued, but cannot be read.
         """
 
     def extend(self, job_id: str, iterations: int) -> Job:
-        """Give a job another budget, of `iterations` in all; see `extended` for what it may be.
+        """Give a job another budget; see `extended` for what it may be.
 
         What is committed stays, as does the iteration under way; what is asked after it is asked
         under the new budget. A job that has succeeded is queued again.
+
+        Args:
+            job_id: Of the job.
+            iterations: The budget, in all.
+
+        Returns:
+            The job as it is then.
+
+        Raises:
+            Conflict: The job was cancelled.
+            InvalidRequest: The budget is spent already, or beyond reason.
+            Unreadable: The job's spec cannot be read.
         """
 
     def add_recording(self, walk: RecordedWalk) -> str:
-        """Keep a recorded walk; its id, which depends on its content alone."""
+        """Keep a recorded walk.
+
+        Args:
+            walk: As it was recorded.
+
+        Returns:
+            Its id, which depends on its content alone.
+        """
 
     def recordings(self, ids: Sequence[str]) -> Recordings:
-        """Recorded walks by id. Raises NotFound for the first that is not there."""
+        """Read recorded walks.
+
+        Args:
+            ids: Of the walks.
+
+        Returns:
+            The walks by id.
+
+        Raises:
+            NotFound: There is no such recording; names the first.
+            Unreadable: One was stored by another version, or damaged.
+        """
 
     def claim(
         self, runner: str, *, lease_seconds: float, job_id: str | None = None
     ) -> Claim | None:
         """Take the oldest job that is queued, or running/pausing with a lease that ran out.
 
-        job_id: only that one. A pausing job without a live lease becomes paused and is not claimed.
-        The claimed job is running, its token one higher than any before. The claim brings the
-        recordings that the job needs.
+        The claimed job is running, its token one higher than any before. A pausing job without a
+        live lease becomes paused, and one that cannot be read fails with the reason; neither is
+        claimed, and neither keeps others from being claimed.
+
+        Args:
+            runner: Name of whoever takes it.
+            lease_seconds: For how long, unless the claim is renewed [s].
+            job_id: The only job that is wanted; None for any.
+
+        Returns:
+            The claim, with all that a run needs; None if no job is to be had.
         """
 
     def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
-        """Heartbeat: extend the lease; returns the state, so that pausing is seen."""
+        """Prolong a lease: the heartbeat of whoever runs the job.
+
+        Args:
+            claim: On the job.
+            lease_seconds: From now on [s].
+
+        Returns:
+            The job's state, so that a pause is seen.
+
+        Raises:
+            LeaseLost: The claim is no longer the job's.
+        """
 
     def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
         """Append what the job's next iterations depend on, unless that is as before.
 
         Changes that its user has accepted are accepted no longer: they are recorded.
+
+        Args:
+            claim: On the job.
+            provenance: What numbers of whoever holds the claim depend on.
+
+        Raises:
+            LeaseLost: The claim is no longer the job's.
         """
 
     def begin(self, claim: Claim, ask: Ask) -> None:
@@ -166,42 +255,112 @@ class Store(Protocol):
     def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
         """Store a completed iteration and the next ask, in one transaction.
 
-        following: None at the end of the budget; the job is then succeeded. A pausing job becomes
-        paused and gives up its lease. Returns the state after. Unique on (job, iteration): a
-        commit whose answer was lost may be repeated, and changes nothing the second time. Raises
-        Conflict for an iteration that was not asked, and BudgetChanged, and stores nothing, if the
-        job has another budget than the claim's: `following` would be another ask.
+        Unique on (job, iteration): a commit whose answer was lost may be repeated, and changes
+        nothing the second time.
+
+        Args:
+            claim: On the job.
+            done: The iteration.
+            following: What is to be evaluated next; None at the end of the budget.
+
+        Returns:
+            The job's state after: succeeded at the end of the budget; paused, without a lease, if
+            it was to pause; else as before.
+
+        Raises:
+            BudgetChanged: The job has another budget than the claim's, under which `following`
+                would be another ask; nothing is stored.
+            Conflict: The iteration was not asked.
+            LeaseLost: The claim is no longer the job's.
         """
 
     def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
-        """Give up the lease: `failed` with its reason, `paused`, or `queued` to be claimed again.
+        """Give up the lease.
 
-        `queued` means paused for a job that is pausing, so a runner that stops need not look first.
+        Args:
+            claim: On the job.
+            state: `failed`, `paused`, or `queued` to be claimed again; the latter means paused for
+                a job that is pausing, so a runner that stops need not look first.
+            error: Why it failed.
+
+        Raises:
+            LeaseLost: The claim is no longer the job's.
         """
 
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100
     ) -> Page[Iteration]:
-        """Committed iterations in order, those with index > after."""
+        """Read a page of committed iterations, in order.
+
+        Args:
+            job_id: Of the job.
+            after: Only iterations with a greater index.
+            limit: Most iterations on the page.
+
+        Returns:
+            The page.
+
+        Raises:
+            InvalidRequest: `limit` is less than 1.
+        """
 
     def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """All particles of a committed iteration, in order; NotFound if it is not committed."""
+        """Read all particles of a committed iteration.
+
+        Args:
+            job_id: Of the job.
+            iteration: Index of the iteration, from 0.
+
+        Returns:
+            The particles, in order.
+
+        Raises:
+            NotFound: There is no such job, or the iteration is not committed.
+        """
 
     def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
-        """All particles of the committed iterations first <= index < last, in order.
+        """Read all particles of a range of committed iterations.
 
         For reading a long history by pieces, each a transaction of its own; committed iterations
         never change, so the pieces fit together.
+
+        Args:
+            job_id: Of the job.
+            first: Least index of an iteration.
+            last: Index after the greatest.
+
+        Returns:
+            The particles, in order of iteration and particle.
         """
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
-        """As `evaluations_between`, as columns, for many at once; None if there is none."""
+        """Read all particles of a range of committed iterations as columns, for many at once.
+
+        Args:
+            job_id: Of the job.
+            first: Least index of an iteration.
+            last: Index after the greatest.
+
+        Returns:
+            Rows in the order of `evaluations_between`; None if there is none.
+        """
 
     def best(self, job_id: str) -> Evaluation | None:
-        """The evaluation of least fitness, the earliest of equals; None if none is finite."""
+        """Read the best design so far.
+
+        Args:
+            job_id: Of the job.
+
+        Returns:
+            The evaluation of least fitness, the earliest of equals; None if none is finite.
+        """
 
     def ping(self) -> None:
-        """Raise StoreUnavailable unless the database answers and has this version's schema."""
+        """Check that the database can be used.
+
+        Raises:
+            StoreUnavailable: It does not answer, or has another schema than this version's.
+        """
 
     def verify(self) -> None:
         """Read anew what is stored, for a few seconds at most, before it is said to be safe.

@@ -10,6 +10,12 @@ from sqlalchemy import ColumnElement, Connection, Select, and_, or_, select
 
 from services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
 from services.optimizer.jobs.job import Answered, Ask, Claim, JobState, UnreadableSpec
+from services.optimizer.store.job_rows import (
+    budget,
+    kept,
+    storable,
+    to_job,
+)
 from services.optimizer.store.recordings import load_recordings
 from services.optimizer.store.records import (
     answered_ask,
@@ -18,16 +24,23 @@ from services.optimizer.store.records import (
     outstanding_ask,
     update_job,
 )
-from services.optimizer.store.rows import Row, budget, kept, storable, to_job
+from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import jobs
 from sim.identification.recorded_walk import Recordings
 
 
 def claimable(now: datetime, job_id: str | None) -> Select[*tuple[Any, ...]]:
-    """The oldest job waiting for a runner, or whose runner has gone; locked when it is selected.
+    """Select the oldest job that waits for a runner, or whose runner has gone, and lock it.
 
     Runners that look at the same time pass over each other's candidates; only a runner that wants
     one certain job waits for it.
+
+    Args:
+        now: The time by which leases are judged.
+        job_id: The only job that is wanted; None for any.
+
+    Returns:
+        A query for at most one row of `jobs`.
     """
     query = (
         select(jobs)
@@ -48,7 +61,15 @@ def _abandoned(now: datetime) -> ColumnElement[bool]:
 
 
 def lease_is_live(row: Row, now: datetime) -> bool:
-    """Whether a runner has the job and has been heard of lately."""
+    """Whether a runner has the job and has been heard of lately.
+
+    Args:
+        row: The job's row.
+        now: The time by which its lease is judged.
+
+    Returns:
+        False for a job that anybody may claim.
+    """
     expires = row["lease_expires_at"]
     return expires is not None and expires > now
 
@@ -57,6 +78,16 @@ def take_job(
     connection: Connection, row: Row, runner: str, lease_seconds: float, now: datetime
 ) -> Claim:
     """Make a locked job, which nobody else holds, the runner's: it runs, under a higher token.
+
+    Args:
+        connection: The transaction in which the job was locked.
+        row: The job's row.
+        runner: Who takes it.
+        lease_seconds: For how long, unless the claim is renewed [s].
+        now: The time at which it is taken.
+
+    Returns:
+        The claim.
 
     Raises:
         Unreadable: Something that a run needs cannot be read; nothing is changed.
@@ -99,15 +130,32 @@ def _work(connection: Connection, job: Row) -> _Work:
 
 
 def set_aside(connection: Connection, row: Row, reason: Unreadable, now: datetime) -> None:
-    """Let a locked job fail that cannot be read, and touch nothing else of it."""
+    """Let a locked job fail that cannot be read, and touch nothing else of it.
+
+    Args:
+        connection: The transaction in which the job was locked.
+        row: The job's row.
+        reason: What cannot be read; becomes the job's error.
+        now: The time at which it fails.
+    """
     error = {"error": storable(str(reason))}
     update_job(connection, row, entering(JobState.FAILED, now) | error)
 
 
 def held(connection: Connection, claim: Claim) -> Row:
-    """The locked row of a claimed job; LeaseLost unless the claim is still the job's.
+    """Lock the row of a claimed job.
 
     A lease that ran out but that nobody has taken is still the claim's: the token decides.
+
+    Args:
+        connection: An open transaction that may write.
+        claim: On the job.
+
+    Returns:
+        The job's row.
+
+    Raises:
+        LeaseLost: The claim is no longer the job's.
     """
     row = job_row(connection, claim.job.id, lock=True)
     if row["lease_token"] == claim.token and row["lease_owner"] == claim.runner:
@@ -118,6 +166,14 @@ def held(connection: Connection, claim: Claim) -> Row:
 
 
 def require_budget_of(claim: Claim, row: Row) -> None:
-    """Raise BudgetChanged if the job was extended since the claim's job was read."""
+    """Refuse an ask that was made under another budget than the job has now.
+
+    Args:
+        claim: On the job, with the job as whoever asks knows it.
+        row: The job's row.
+
+    Raises:
+        BudgetChanged: The job was extended since.
+    """
     if budget(row) != claim.job.spec.iterations:
         raise BudgetChanged(f"job {row['id']} is to run {budget(row)} iterations now")

@@ -27,7 +27,17 @@ _JSON: Final = TypeAdapter(Any)
 def select_columns(
     connection: Connection, job_id: str, first: int, last: int
 ) -> EvaluationColumns | None:
-    """Evaluations of the committed iterations first <= index < last; None if there is none."""
+    """Read the evaluations of a range of committed iterations.
+
+    Args:
+        connection: An open transaction.
+        job_id: Of the job.
+        first: Least index of an iteration.
+        last: Index after the greatest.
+
+    Returns:
+        Their columns, rows in order of iteration and particle; None if there is no row.
+    """
     table = evaluations.c
     query = (
         select(

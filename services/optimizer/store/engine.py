@@ -61,9 +61,16 @@ def database_time(connection: Connection) -> datetime:
 
 
 def parse_url(text: str) -> URL:
-    """`sqlite:///path`, a bare path, or `postgresql://...` to what SQLAlchemy takes.
+    """Read the URL of a database, or a file's name.
 
-    Raises StoreUnavailable that says which forms there are.
+    Args:
+        text: `sqlite:///path`, a bare path, or `postgresql://...`.
+
+    Returns:
+        What SQLAlchemy takes.
+
+    Raises:
+        StoreUnavailable: It is none of these; says which forms there are.
     """
     forms = "use a file name, sqlite:///FILE or postgresql://USER:PASSWORD@HOST/DATABASE"
     if "://" not in text:
@@ -125,10 +132,15 @@ class Database:
 
 
 def connect(url: URL, *, for_migration: bool = False) -> Database:
-    """An engine for a parsed URL; it connects only when it is first used.
+    """An engine for a database; it connects only when it is first used.
 
-    for_migration: no pool, and on SQLite no enforcement of foreign keys, because a batch migration
-        drops and renames tables that others refer to.
+    Args:
+        url: As `parse_url` has it.
+        for_migration: No pool, and on SQLite no enforcement of foreign keys, because a batch
+            migration drops and renames tables that others refer to.
+
+    Returns:
+        The database; whoever connects closes it.
     """
     options: dict[str, Any] = {"json_serializer": _strict_json}
     if for_migration:
@@ -208,6 +220,9 @@ def check_file(database: Database) -> None:
     """Read an SQLite file anew, for about `CHECK_SECONDS` at most; do nothing for a server.
 
     Open connections have pages in memory, and the journal others, that the file may have lost.
+
+    Args:
+        database: The database.
 
     Raises:
         StoreUnavailable: The file is damaged, or gone.

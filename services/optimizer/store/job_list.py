@@ -27,12 +27,30 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def to_cursor(created_at: datetime, job_id: str) -> str:
-    """Place of a job in the list: microseconds since 1970, then the id among equals."""
+    """Place of a job in the list by age.
+
+    Args:
+        created_at: When the job was submitted.
+        job_id: Of the job.
+
+    Returns:
+        Microseconds since 1970, then the id among equals.
+    """
     return f"{(created_at - _EPOCH) // timedelta(microseconds=1)}.{job_id}"
 
 
 def from_cursor(text: str) -> tuple[datetime, str]:
-    """Inverse of `to_cursor`; InvalidRequest (field `after`) for anything else."""
+    """Inverse of `to_cursor`.
+
+    Args:
+        text: What a page ended with.
+
+    Returns:
+        When the job was submitted, and its id.
+
+    Raises:
+        InvalidRequest: It is no such cursor; names the field `after`.
+    """
     match = _CURSOR.fullmatch(text)
     try:
         if match is not None:
@@ -43,12 +61,30 @@ def from_cursor(text: str) -> tuple[datetime, str]:
 
 
 def to_fitness_cursor(fitness: float | None, job_id: str) -> str:
-    """Place of a job in the list by fitness; a job without one is among the last."""
+    """Place of a job in the list by fitness; a job without one is among the last.
+
+    Args:
+        fitness: Of the job's best design.
+        job_id: Of the job.
+
+    Returns:
+        The cursor.
+    """
     return f"fitness:{'' if fitness is None else repr(fitness)}:{job_id}"
 
 
 def from_fitness_cursor(text: str) -> tuple[float | None, str]:
-    """Inverse of `to_fitness_cursor`; InvalidRequest (field `after`) for anything else."""
+    """Inverse of `to_fitness_cursor`.
+
+    Args:
+        text: What a page ended with.
+
+    Returns:
+        Fitness of the job's best design then, and the job's id.
+
+    Raises:
+        InvalidRequest: It is no such cursor; names the field `after`.
+    """
     match = _FITNESS_CURSOR.fullmatch(text)
     try:
         if match is not None:
@@ -59,12 +95,29 @@ def from_fitness_cursor(text: str) -> tuple[float | None, str]:
 
 
 def to_name_cursor(job_id: str) -> str:
-    """Place of a job in the list by name; a name may be long, and never changes."""
+    """Place of a job in the list by name; a name may be long, and never changes.
+
+    Args:
+        job_id: Of the job.
+
+    Returns:
+        The cursor.
+    """
     return f"name:{job_id}"
 
 
 def from_name_cursor(text: str) -> str:
-    """Inverse of `to_name_cursor`; InvalidRequest (field `after`) for anything else."""
+    """Inverse of `to_name_cursor`.
+
+    Args:
+        text: What a page ended with.
+
+    Returns:
+        The job's id.
+
+    Raises:
+        InvalidRequest: It is no such cursor; names the field `after`.
+    """
     match = _NAME_CURSOR.fullmatch(text)
     if match is None:
         raise no_cursor()
@@ -96,9 +149,20 @@ def sort_jobs(
     order: JobOrder,
     after: str | None,
 ) -> list[str]:
-    """Ids of all jobs that are asked for, in order, after a cursor.
+    """Find all jobs that are asked for, in order.
 
-    Raises InvalidRequest (field `after`) for a cursor that is none of this order.
+    Args:
+        connection: An open transaction.
+        state: Only jobs in this state.
+        search: Only jobs whose name or id contains this, whatever its case.
+        order: By what they are sorted.
+        after: Only jobs after this cursor.
+
+    Returns:
+        Their ids.
+
+    Raises:
+        InvalidRequest: The cursor is none of this order; names the field `after`.
     """
     query = _entries(connection)
     if state is not None:
@@ -128,14 +192,30 @@ def _entries(connection: Connection) -> Select[tuple[str, datetime, str, float |
 
 
 def job_rows(connection: Connection, ids: Sequence[str]) -> list[Row]:
-    """Rows of jobs, in the order of their ids."""
+    """Read the rows of jobs.
+
+    Args:
+        connection: An open transaction.
+        ids: Of the jobs.
+
+    Returns:
+        The rows in the order of the ids.
+    """
     query = select(jobs).where(jobs.c.id.in_(ids))
     rows = {row["id"]: row for row in connection.execute(query).mappings()}
     return [rows[job_id] for job_id in ids]
 
 
 def cursor_of(row: Row, order: JobOrder) -> str:
-    """Place of a job in the list."""
+    """Place of a job in the list.
+
+    Args:
+        row: The job's row.
+        order: By what the list is sorted.
+
+    Returns:
+        What a page that ends with this job ends with.
+    """
     match order:
         case JobOrder.CREATED:
             return to_cursor(row["created_at"], row["id"])

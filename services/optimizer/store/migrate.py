@@ -26,9 +26,13 @@ _one_at_a_time: Final = threading.Lock()
 
 
 def migrate(url: URL) -> None:
-    """Bring the database to the newest revision; safe when several processes do so at once.
+    """Bring a database to the newest revision; safe when several processes do so at once.
 
-    Raises StoreUnavailable if it cannot be opened, or was made by a newer gaitswarm.
+    Args:
+        url: Of the database, as `parse_url` has it; an SQLite file is created.
+
+    Raises:
+        StoreUnavailable: It cannot be opened or migrated, or was made by a newer gaitswarm.
     """
     database = connect(url, for_migration=True)
     try:
@@ -50,7 +54,14 @@ def migrate(url: URL) -> None:
 
 
 def check_revision(database: Database) -> None:
-    """Raise StoreUnavailable unless the database answers and has the newest revision."""
+    """Check that a database answers and has the newest revision.
+
+    Args:
+        database: The database.
+
+    Raises:
+        StoreUnavailable: It does not; says what to do.
+    """
     with database.transaction(write=False) as connection:
         revision = _revision(connection, database.name)
     if revision != head():
@@ -69,7 +80,11 @@ def head() -> str:
 
 
 def lock_for_migration(connection: Connection) -> None:
-    """One migrating process at a time; on SQLite the write transaction is lock enough."""
+    """Let one process migrate at a time; on SQLite the write transaction is lock enough.
+
+    Args:
+        connection: The transaction of the migration, with which the lock ends.
+    """
     if connection.dialect.name == "postgresql":
         connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_ADVISORY_LOCK})")
 

@@ -14,18 +14,34 @@ from pydantic import ValidationError
 from sqlalchemy import Connection, insert, select
 
 from services.optimizer.errors import NotFound
-from services.optimizer.store.rows import first_problems, kept
+from services.optimizer.store.job_rows import first_problems, kept
 from services.optimizer.store.tables import recordings
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
 def recording_id(walk: RecordedWalk) -> str:
-    """32 hexadecimal digits of the SHA-256 of its JSON."""
+    """The id of a recorded walk, which depends on its content alone.
+
+    Args:
+        walk: The walk.
+
+    Returns:
+        32 hexadecimal digits of the SHA-256 of its JSON.
+    """
     return hashlib.sha256(walk.model_dump_json().encode()).hexdigest()[:32]
 
 
 def insert_recording(connection: Connection, walk: RecordedWalk, now: datetime) -> str:
-    """Store a walk unless it is there; its id."""
+    """Store a walk unless it is there.
+
+    Args:
+        connection: An open transaction that may write.
+        walk: The walk.
+        now: The time at which it is stored.
+
+    Returns:
+        Its id.
+    """
     name = recording_id(walk)
     known = connection.execute(select(recordings.c.id).where(recordings.c.id == name)).first()
     if known is None:
@@ -35,7 +51,14 @@ def insert_recording(connection: Connection, walk: RecordedWalk, now: datetime) 
 
 
 def load_recordings(connection: Connection, ids: Sequence[str]) -> Recordings:
-    """Recorded walks by id.
+    """Read recorded walks.
+
+    Args:
+        connection: An open transaction.
+        ids: Of the walks.
+
+    Returns:
+        The walks by id.
 
     Raises:
         NotFound: There is no such recording; names the first.

@@ -27,18 +27,20 @@ from services.optimizer.jobs.job import (
 )
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, with_record
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.job_rows import (
+    provenance_document,
+    provenance_records,
+    spec_document,
+    submitted_spec,
+    to_job,
+)
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
     best_particle,
     evaluation_rows,
     iteration_summary,
-    provenance_document,
-    provenance_records,
-    spec_document,
-    submitted_spec,
     to_ask,
-    to_job,
 )
 from services.optimizer.store.tables import evaluations, iterations, jobs
 
@@ -53,15 +55,32 @@ def new_job_id() -> str:
 
 
 def is_job_id(text: str) -> bool:
-    """Whether it can be the id of a job at all; databases choke on some other strings."""
+    """Whether a text can be the id of a job at all; databases choke on some other strings.
+
+    Args:
+        text: Any text.
+
+    Returns:
+        True for what `new_job_id` might have made.
+    """
     return _ID.fullmatch(text) is not None
 
 
 def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
-    """A job's row. Raises NotFound.
+    """Read a job's row.
 
-    lock: keep it from other writers until the transaction ends. Every transaction that changes a
-        job begins so; two commands, or a command and a commit, never act upon the same state.
+    Args:
+        connection: An open transaction.
+        job_id: Of the job.
+        lock: Whether to keep it from other writers until the transaction ends. Every transaction
+            that changes a job begins so; two commands, or a command and a commit, never act upon
+            the same state.
+
+    Returns:
+        All columns of `jobs`.
+
+    Raises:
+        NotFound: There is no such job.
     """
     if is_job_id(job_id):
         query = select(jobs).where(jobs.c.id == job_id)
@@ -89,10 +108,17 @@ class Submission:
 
 
 def repeated_job(connection: Connection, asked: Submission) -> Job | None:
-    """The job that an earlier request made with the same key; None if there is none, or no key.
+    """Find the job that an earlier request made with the same key.
+
+    Args:
+        connection: An open transaction.
+        asked: The present request.
+
+    Returns:
+        That job; None if there is none, or no key.
 
     Raises:
-        IdempotencyConflict: That request asked for another job.
+        IdempotencyConflict: The earlier request asked for another job.
     """
     if asked.key is None:
         return None
@@ -113,7 +139,16 @@ def repeated_job(connection: Connection, asked: Submission) -> Job | None:
 
 
 def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
-    """A new queued job."""
+    """Store a new queued job.
+
+    Args:
+        connection: An open transaction that may write.
+        asked: What it is to do.
+        now: The time of its submission.
+
+    Returns:
+        The job.
+    """
     columns = {
         "id": new_job_id(),
         "state": JobState.QUEUED,
@@ -133,19 +168,44 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
 
 
 def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> Row:
-    """Change a locked job's row; the row as it is then."""
+    """Change a job's row.
+
+    Args:
+        connection: The transaction in which the row was locked.
+        row: The job as it was read.
+        columns: New values by name of their columns.
+
+    Returns:
+        The row as it is then.
+    """
     connection.execute(update(jobs).where(jobs.c.id == row["id"]).values(**columns))
     return {**row, **columns}
 
 
 def provenance_columns(job: Row, provenance: JobProvenance) -> dict[str, Any]:
-    """Columns of a job that goes on with a provenance, from its next iteration on."""
+    """Columns of a job that goes on with a provenance, from its next iteration on.
+
+    Args:
+        job: Its row.
+        provenance: What its numbers depend on from now on.
+
+    Returns:
+        Values by name of their columns.
+    """
     records = with_record(provenance_records(job), job["iterations"], provenance)
     return {"provenance": provenance_document(records), "accepts_changes": False}
 
 
 def outstanding_ask(connection: Connection, job: Row) -> Ask | None:
-    """The iteration that was asked and not yet committed; None for a job that has not begun."""
+    """Read the iteration that was asked and is not yet committed.
+
+    Args:
+        connection: An open transaction.
+        job: The job's row.
+
+    Returns:
+        The ask; None for a job that has not begun, or has spent its budget.
+    """
     query = select(iterations).where(
         iterations.c.job_id == job["id"],
         iterations.c.iteration == job["iterations"],
@@ -155,7 +215,15 @@ def outstanding_ask(connection: Connection, job: Row) -> Ask | None:
 
 
 def answered_ask(connection: Connection, job: Row) -> Answered | None:
-    """The last committed ask; None for a job that has committed nothing."""
+    """Read the last committed ask with its fitness, from which the next one follows.
+
+    Args:
+        connection: An open transaction.
+        job: The job's row.
+
+    Returns:
+        The ask and its answer; None for a job that has committed nothing.
+    """
     last = job["iterations"] - 1
     query = select(iterations).where(
         iterations.c.job_id == job["id"], iterations.c.iteration == last
@@ -173,7 +241,18 @@ def answered_ask(connection: Connection, job: Row) -> Answered | None:
 
 
 def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now: datetime) -> None:
-    """Store an ask before it is sent out. Raises Conflict unless it is the iteration expected."""
+    """Store an ask before it is sent out.
+
+    Args:
+        connection: The transaction in which the job was locked.
+        job: The job's row.
+        ask: What is to be evaluated.
+        expected: The iteration that is the job's next.
+        now: The time at which it is asked.
+
+    Raises:
+        Conflict: The ask is of another iteration.
+    """
     if ask.iteration != expected:
         raise Conflict(
             f"job {job['id']} asks for iteration {ask.iteration}, but its next is {expected}"
@@ -185,7 +264,17 @@ def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now
 def complete_iteration(
     connection: Connection, job: Row, done: CompletedIteration, now: datetime
 ) -> None:
-    """Fill in the asked iteration and add its evaluations. Raises Conflict if it was not asked."""
+    """Fill in the iteration that was asked, and add its evaluations.
+
+    Args:
+        connection: The transaction in which the job was locked.
+        job: The job's row.
+        done: What the iteration came to.
+        now: The time of the commit.
+
+    Raises:
+        Conflict: The iteration was not asked, or is committed already.
+    """
     filled = connection.execute(
         update(iterations)
         .where(
@@ -211,6 +300,13 @@ def entering(state: JobState, now: datetime) -> dict[str, Any]:
     """Columns that follow from a state; only a job under way keeps its lease.
 
     The token stays in any case, so that the next one is higher.
+
+    Args:
+        state: The state that a job enters.
+        now: The time at which it does.
+
+    Returns:
+        Values by name of their columns.
     """
     columns: dict[str, Any] = {
         "state": state,
@@ -223,21 +319,46 @@ def entering(state: JobState, now: datetime) -> dict[str, Any]:
 
 
 def state_after_commit(state: JobState, following: Ask | None) -> JobState:
-    """The end of the budget wins over a pause that was asked for in the last iteration."""
+    """The state of a job that has committed an iteration.
+
+    Args:
+        state: Its state before.
+        following: What was asked next. None at the end of the budget, which wins over a pause that
+            was asked for in the last iteration.
+
+    Returns:
+        Its state after.
+    """
     if following is None:
         return JobState.SUCCEEDED
     return JobState.PAUSED if state is JobState.PAUSING else state
 
 
 def state_after_release(state: JobState, wanted: JobState) -> JobState:
-    """A job that was to pause is not queued again by a runner that shuts down."""
+    """The state of a job that its runner gives up.
+
+    Args:
+        state: Its state before.
+        wanted: What the runner releases it as.
+
+    Returns:
+        As wanted; but a job that was to pause is not queued again by a runner that shuts down.
+    """
     if wanted is JobState.QUEUED and state is JobState.PAUSING:
         return JobState.PAUSED
     return wanted
 
 
 def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
-    """Progress with one more iteration; only a strictly lower fitness is a new best."""
+    """Progress with one more iteration; only a strictly lower fitness is a new best.
+
+    Args:
+        job: The job's row before.
+        done: What the iteration came to.
+
+    Returns:
+        Values by name of their columns.
+    """
     columns: dict[str, Any] = {
         "iterations": done.iteration + 1,
         "evaluations": job["evaluations"] + len(done.fitness),
@@ -256,5 +377,12 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
 
 
 def require_readable(row: Row) -> None:
-    """Raise Unreadable, with the reason, if the job's spec cannot be read."""
+    """Refuse what needs the spec of a job that cannot be read.
+
+    Args:
+        row: The job's row.
+
+    Raises:
+        Unreadable: Its spec cannot be read; says why.
+    """
     _ = to_job(row).spec

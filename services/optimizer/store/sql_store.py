@@ -43,6 +43,7 @@ from services.optimizer.store.engine import (
 )
 from services.optimizer.store.history import SqlHistory, checked_limit
 from services.optimizer.store.job_list import cursor_of, from_cursor, job_rows, sort_jobs, to_cursor
+from services.optimizer.store.job_rows import request_digest, storable, to_job
 from services.optimizer.store.migrate import check_revision, migrate
 from services.optimizer.store.recordings import (
     insert_recording,
@@ -64,11 +65,6 @@ from services.optimizer.store.records import (
     state_after_commit,
     state_after_release,
     update_job,
-)
-from services.optimizer.store.rows import (
-    request_digest,
-    storable,
-    to_job,
 )
 from services.optimizer.store.tables import jobs
 from sim.identification.recorded_walk import RecordedWalk, Recordings

@@ -39,7 +39,18 @@ class UtcDateTime(TypeDecorator[datetime]):
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """An aware time to what the database holds; ValueError for a naive one."""
+        """An aware time to what the database holds.
+
+        Args:
+            value: The time, aware; None for none.
+            dialect: Of the database.
+
+        Returns:
+            The same in UTC, naive for SQLite.
+
+        Raises:
+            ValueError: The time has no zone.
+        """
         if value is None:
             return None
         if value.tzinfo is None:
@@ -52,7 +63,15 @@ class UtcDateTime(TypeDecorator[datetime]):
         value: datetime | None,
         dialect: Dialect,  # noqa: ARG002 (the signature is SQLAlchemy's)
     ) -> datetime | None:
-        """What the database holds to an aware time in UTC."""
+        """What the database holds to an aware time in UTC.
+
+        Args:
+            value: As it was stored.
+            dialect: Of the database.
+
+        Returns:
+            The time.
+        """
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
@@ -74,11 +93,27 @@ class Document(TypeDecorator[Any]):
     cache_ok = True
 
     def coerce_compared_value(self, op: OperatorType | None, value: Any) -> TypeEngine[Any]:
-        """As JSON does it: a path into the document is no document."""
+        """Let paths into the document be names, as JSON does.
+
+        Args:
+            op: An operator on the column.
+            value: Its other operand.
+
+        Returns:
+            The type of that operand.
+        """
         return self.impl_instance.coerce_compared_value(op, value)
 
     def result_processor(self, dialect: Dialect, coltype: object) -> Callable[[Any], Any] | None:
-        """The parser of what the database holds."""
+        """The parser of what the database holds.
+
+        Args:
+            dialect: Of the database.
+            coltype: The driver's type of the column.
+
+        Returns:
+            A function of what the driver gives.
+        """
         parse = super().result_processor(dialect, coltype)
 
         def parse_if_possible(text: Any) -> Any:

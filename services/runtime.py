@@ -21,10 +21,18 @@ from services.worker import EvaluatorKind
 def open_evaluator(
     kind: EvaluatorKind = "ray", *, address: str | None = None, cpus: int | None = None
 ) -> Evaluator:
-    """Workers for walks. Raises EvaluatorUnavailable with what to do.
+    """Open workers for walks.
 
-    address: of a Ray cluster; None starts one that ends with this process.
-    cpus: slots to use on this machine; all by default.
+    Args:
+        kind: Where walks run.
+        address: Of a Ray cluster; None starts one that ends with this process.
+        cpus: Walks to compute at once on this machine; all of its cores by default.
+
+    Returns:
+        The workers; whoever opens them closes them.
+
+    Raises:
+        EvaluatorUnavailable: They cannot be started or reached; says what to do.
     """
     if kind == "in-process":
         from services.worker.in_process import InProcessEvaluator  # noqa: PLC0415 - see below
@@ -90,9 +98,15 @@ def open_runtime(
 
 @contextmanager
 def stop_on_signals(stop: threading.Event) -> Iterator[None]:
-    """SIGINT and SIGTERM set `stop` inside the block. The main thread's to use.
+    """Let SIGINT and SIGTERM set an event inside the block. The main thread's to use.
 
     A second SIGINT raises KeyboardInterrupt, for those who cannot wait.
+
+    Args:
+        stop: What is set.
+
+    Yields:
+        Nothing.
     """
 
     def _handle(number: int, _frame: FrameType | None) -> None:

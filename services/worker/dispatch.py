@@ -39,7 +39,14 @@ class Batch:
         return not self.missing or self.error is not None or self.dropped
 
     def awaits(self, chunk: Chunk) -> bool:
-        """Whether a result of this chunk is still of use."""
+        """Whether a result of a chunk is still of use.
+
+        Args:
+            chunk: Of this batch.
+
+        Returns:
+            False once it has come, or nobody waits for the batch any more.
+        """
         return not self.ended and chunk in self.missing
 
 
@@ -82,7 +89,7 @@ class Dispatcher:
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
-        """See `Evaluator.evaluate`."""
+        """Queue the chunks of a request, and put their results together."""
         durations = [case.duration for case in request.cases]
         count = len(request.designs)
         chunks = cut(durations, count, slots=self.slots, lanes=self.lanes())
@@ -103,7 +110,14 @@ class Dispatcher:
         return batch.outcomes
 
     def take(self, timeout: float) -> Work | None:
-        """The next chunk to run; None if there is none within so many seconds, or after close."""
+        """The next chunk to run.
+
+        Args:
+            timeout: How long to wait for one [s].
+
+        Returns:
+            The chunk; None if none has come, or no more work is taken.
+        """
         with self._changed:
             self._changed.wait_for(lambda: bool(self._queue) or self.closed, timeout)
             return None if self.closed else self._queue.pop()
@@ -111,8 +125,10 @@ class Dispatcher:
     def complete(self, work: Work, answer: Answer | Outcome) -> None:
         """The chunk has its result; a second one of the same chunk is the same and ignored.
 
-        answer: as the worker gave it. The whole request fails with ProvenanceChanged if it is not
-            of the provenance that the request expects.
+        Args:
+            work: The chunk as it was taken.
+            answer: As the worker gave it. The whole request fails with ProvenanceChanged if it is
+                not of the provenance that the request expects.
         """
         chunk, batch = work.chunk, work.batch
         expected = batch.request.provenance
@@ -137,7 +153,11 @@ class Dispatcher:
             self._changed.notify_all()
 
     def again(self, work: Work) -> None:
-        """The chunk was lost with its worker: it is to be run again."""
+        """The chunk was lost with its worker: it is to be run again.
+
+        Args:
+            work: The chunk as it was sent out.
+        """
         with self._changed:
             if work.batch.awaits(work.chunk):
                 retry = Work(work.batch, work.chunk, work.attempts + 1)
@@ -145,7 +165,12 @@ class Dispatcher:
                 self._changed.notify_all()
 
     def fail(self, work: Work, error: BaseException) -> None:
-        """The chunk cannot be run: the whole request fails with this error, if it needs it yet."""
+        """The chunk cannot be run: the whole request fails, if it needs it yet.
+
+        Args:
+            work: The chunk.
+            error: What the request fails with.
+        """
         with self._changed:
             if work.batch.awaits(work.chunk):
                 self._end(work.batch, error)

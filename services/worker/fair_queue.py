@@ -34,7 +34,13 @@ class FairQueue(Generic[T]):
         return sum(len(flow.waiting) for flow in self._flows.values())
 
     def push(self, flow: Hashable, cost: float, task: T) -> None:
-        """Add a task of a flow. cost: in any unit that all flows share, >= 0."""
+        """Add a task of a flow.
+
+        Args:
+            flow: Of all tasks that share one claim to the workers.
+            cost: In any unit that all flows share, >= 0.
+            task: What is popped in its turn.
+        """
         found = self._flows.get(flow)
         if found is None:
             found = self._flows[flow] = _Flow(self._now)
@@ -55,7 +61,11 @@ class FairQueue(Generic[T]):
         return task
 
     def discard(self, unwanted: Callable[[T], bool]) -> None:
-        """Take out the tasks that are unwanted; their flows are not charged for them."""
+        """Take out the tasks that are unwanted; their flows are not charged for them.
+
+        Args:
+            unwanted: Whether a task is.
+        """
         for flow in self._flows.values():
             kept = [entry for entry in flow.waiting if not unwanted(entry[1])]
             flow.waiting = deque(kept)

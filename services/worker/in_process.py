@@ -19,7 +19,14 @@ def available_cpus() -> int:
 
 
 class InProcessEvaluator:
-    """`Evaluator` on a pool of threads. cpus: their number, all processors by default."""
+    """`Evaluator` on a pool of threads.
+
+    Args:
+        cpus: Their number, all processors by default.
+
+    Raises:
+        ValueError: cpus is less than 1.
+    """
 
     def __init__(self, cpus: int | None = None) -> None:
         slots = cpus if cpus is not None else available_cpus()

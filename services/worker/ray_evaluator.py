@@ -40,10 +40,17 @@ _log = logging.getLogger(__name__)
 
 
 class RayEvaluator:
-    """`Evaluator` on Ray. address, cpus: as for `open_ray`.
+    """`Evaluator` on Ray.
 
     A cluster that was lost is opened again by the next `evaluate`, so that a caller who tries
     again later, as the runner does, outlives it.
+
+    Args:
+        address: As for `open_ray`.
+        cpus: As for `open_ray`.
+
+    Raises:
+        EvaluatorUnavailable: Ray cannot be opened; says what to do.
     """
 
     def __init__(self, address: str | None = None, *, cpus: int | None = None) -> None:

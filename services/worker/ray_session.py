@@ -48,8 +48,11 @@ _WORKER_ENVIRONMENT: Final = {
 class RaySession:
     """A connection to Ray.
 
-    ray: the module, imported by `open_ray`. slots: CPUs of the cluster. head: where its control
-    service listens, None where a proxy stands between. directory: files of an embedded cluster.
+    Attributes:
+        ray: The module, imported by `open_ray`.
+        slots: CPUs of the cluster.
+        head: Where its control service listens, None where a proxy stands between.
+        directory: Files of an embedded cluster.
     """
 
     ray: ModuleType
@@ -81,11 +84,18 @@ class RaySession:
 def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySession:
     """Start an embedded cluster, or connect to the one at an address.
 
-    address: None to embed; `auto`, `host:port` or `ray://host:port` to connect.
-    cpus: slots of an embedded cluster; all of this machine's by default.
+    An embedded cluster dies with the thread that opened it, so that must be one that stays. The
+    process's signals stay as they are, here and when the session is closed.
 
-    An embedded cluster dies with the thread that opened it, so that must be one that stays.
-    Raises EvaluatorUnavailable with what to do.
+    Args:
+        address: None to embed; `auto`, `host:port` or `ray://host:port` to connect.
+        cpus: Slots of an embedded cluster; all of this machine's by default.
+
+    Returns:
+        The session; whoever opens it closes it.
+
+    Raises:
+        EvaluatorUnavailable: Neither is possible; says what to do.
     """
     for name, value in _BEFORE_IMPORT.items():
         os.environ.setdefault(name, value)

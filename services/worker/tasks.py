@@ -34,7 +34,11 @@ that other jobs, and whoever cancels this one, need not wait."""
 class Chunk:
     """Designs start <= index < stop in one case.
 
-    cost: simulated seconds that the kernel steps through, with its lanes filled up.
+    Attributes:
+        case: Index of the case.
+        start: Index of the first design.
+        stop: Index after the last design.
+        cost: Simulated seconds that the kernel steps through, with its lanes filled up.
     """
 
     case: int
@@ -44,10 +48,17 @@ class Chunk:
 
 
 def cut(durations: Sequence[float], designs: int, *, slots: int, lanes: int) -> tuple[Chunk, ...]:
-    """Chunks of all cases, longest first.
+    """Cut an iteration into chunks of all cases, longest first.
 
-    durations: simulated seconds of each case. Every chunk but a case's last is a multiple
-    of `lanes`, because the kernel steps so many walkers together, present or not.
+    Args:
+        durations: Simulated seconds of each case.
+        designs: Their number.
+        slots: How many chunks run at the same time.
+        lanes: How many walkers the kernel steps together, present or not: every chunk but a case's
+            last is a multiple of it.
+
+    Returns:
+        The chunks; every design of every case is in one.
     """
     blocks = math.ceil(designs / lanes)
     total = sum(durations) * blocks * lanes
@@ -67,7 +78,13 @@ def cut(durations: Sequence[float], designs: int, *, slots: int, lanes: int) -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """Some designs in one case. designs: (n, v). provenance: what the outcome is to have."""
+    """Some designs in one case, as they are sent to a worker.
+
+    Attributes:
+        case: What the designs are put to.
+        designs: (n, v).
+        provenance: What the outcome is to have.
+    """
 
     case: Case
     designs: NDArray[np.float64]
@@ -101,7 +118,14 @@ class Failure:
 
 
 def run_in_worker(task: Task) -> Answer | Failure:
-    """The body of a remote task. An error is a result here, not a sign of a broken worker."""
+    """The body of a remote task. An error is a result here, not a sign of a broken worker.
+
+    Args:
+        task: What is to be run.
+
+    Returns:
+        What it came to, or what it raised.
+    """
     try:
         return task.run()
     except Exception as error:  # noqa: BLE001 - it is raised again where the result is wanted
@@ -109,7 +133,14 @@ def run_in_worker(task: Task) -> Answer | Failure:
 
 
 def transportable(error: Exception) -> Exception:
-    """The error itself if it survives pickling, else one of its family with the same message."""
+    """An error that can be sent to another process.
+
+    Args:
+        error: Any error.
+
+    Returns:
+        The error itself if it survives pickling, else one of its family with the same message.
+    """
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301 - written by the line itself
     except Exception:  # noqa: BLE001 - a constructor may raise anything

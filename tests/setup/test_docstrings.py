@@ -14,7 +14,11 @@ FILES = (
     "services/optimizer/search/*.py",
     "services/optimizer/jobs/*.py",
     "services/optimizer/analysis/*.py",
+    "services/optimizer/store/*.py",
+    "services/optimizer/run/*.py",
     "services/optimizer/service.py",
+    "services/worker/*.py",
+    "services/*.py",
     "gaitswarm/views/*.py",
     "api/*.py",
 )

@@ -74,7 +74,10 @@ from sim.identification.recorded_walk import Recordings
 class Backoff:
     """Exponential backoff: `first` [s], doubled at each attempt up to `longest` [s].
 
-    attempts: how often a failure is answered by another try before giving up.
+    Attributes:
+        first: The first delay [s].
+        longest: No delay is longer [s].
+        attempts: How often a failure is answered by another try before giving up.
     """
 
     first: float = 1.0
@@ -82,7 +85,14 @@ class Backoff:
     attempts: int = 8
 
     def delay(self, failures: int) -> float | None:
-        """Seconds to wait after that many failures in a row (>= 1); None: give up."""
+        """How long to wait before the next attempt.
+
+        Args:
+            failures: In a row, so far (>= 1).
+
+        Returns:
+            Seconds to wait; None: give up.
+        """
         if failures > self.attempts:
             return None
         # The exponent is bounded, so that a long row of attempts cannot overflow.
@@ -104,8 +114,19 @@ class Coordination:
     """Where one run of one job is. Never changed, only replaced.
 
     The optimizer is not kept: it is made from the stored ask whenever it is needed, so that going
-    on and resuming are one and the same path. answered: what the claim brought where it brought no
-    ask. done, following: those of a commit under way.
+    on and resuming are one and the same path.
+
+    Attributes:
+        backoff: How to wait for workers.
+        phase: What is waited for.
+        job: As it was last read.
+        recordings: Recorded walks that its cases need.
+        provenance: What its numbers depend on.
+        answered: The last answered ask, where the claim brought no other to go on with.
+        ask: What is being evaluated.
+        done: Of a commit under way: the iteration.
+        following: Of a commit under way: the ask after it.
+        failures: Of the workers, in a row.
     """
 
     backoff: Backoff = field(default_factory=Backoff)
@@ -121,7 +142,18 @@ class Coordination:
 
 
 def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
-    """Answer one event. Raises ValueError for one that makes no sense in this phase."""
+    """Answer one event.
+
+    Args:
+        state: Where the run is.
+        event: What has happened.
+
+    Returns:
+        Where the run is then, and what is to be done, in order; nothing when it has ended.
+
+    Raises:
+        ValueError: The event makes no sense in this phase.
+    """
     match state.phase, event:
         case Phase.ENDED, _:
             return state, ()

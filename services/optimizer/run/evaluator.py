@@ -18,7 +18,11 @@ from sim.provenance import Provenance
 class EvaluationRequest:
     """One iteration of one job: every design in every case.
 
-    designs: (n, v) float64. provenance: that of the process that asks; the outcomes are to have it.
+    Attributes:
+        job_id: Of the job; jobs share the workers equally.
+        cases: What every design is put to.
+        designs: (n, v) float64.
+        provenance: That of the process that asks; the outcomes are to have it.
     """
 
     job_id: str
@@ -41,13 +45,22 @@ class Evaluator(Protocol):
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
-        """One outcome per case, in the request's order, of n designs each, in index order.
+        """Run every design in every case.
 
-        should_stop: polled at least once a second; when true, work under way is dropped and
-            `EvaluationStopped` raised.
-        Raises EvaluatorUnavailable if the workers cannot be reached after retries,
-        ProvenanceChanged if one of them does not compute what the request expects, and lets errors
-        of the simulation itself (bugs, bad input) through.
+        Args:
+            request: What is to be run.
+            should_stop: Polled at least once a second, from any thread, while kernels are built,
+                workers connected and walks run. When true, the caller is let go and work under way
+                is dropped.
+
+        Returns:
+            One outcome per case, in the request's order, of n designs each, in index order.
+
+        Raises:
+            EvaluationStopped: `should_stop` said so.
+            EvaluatorUnavailable: The workers cannot be reached after retries.
+            ProvenanceChanged: One of them does not compute what the request expects.
+            Exception: Errors of the simulation itself (bugs, bad input) come through as they are.
         """
 
     def close(self) -> None:

@@ -25,6 +25,12 @@ class Heartbeat:
 
     A store that does not answer is tried again until the lease must have run out; then the job
     counts as lost, because another runner may have it.
+
+    Args:
+        store: Where the job is kept.
+        claim: What is renewed.
+        lease_seconds: How long each renewal holds [s].
+        clock: Monotonic time [s].
     """
 
     def __init__(

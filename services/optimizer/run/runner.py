@@ -85,10 +85,19 @@ def runner_name() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What a run needs beside its job. clock [s] and sleep [s] are replaced in tests.
+    """What a run needs beside its job.
 
-    provenance: of what is computed from here for a spec. accepts_changes: whether a job goes on
-        although that has changed.
+    Attributes:
+        store: Where the job is kept.
+        evaluator: Where its walks run.
+        lease_seconds: After so long without a word from here another runner takes the job over [s].
+        backoff: How to wait for workers that cannot be reached.
+        on_commit: Called after an iteration that was stored.
+        on_retry: Called before a wait for the workers.
+        provenance: Of what is computed from here for a spec.
+        accepts_changes: Whether the job goes on although that has changed.
+        clock: Monotonic time [s]; replaced in tests.
+        sleep: Lets seconds pass; replaced in tests.
     """
 
     store: Store
@@ -104,14 +113,22 @@ class Surroundings:
 
 
 def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None = None) -> Job:
-    """Run a claimed job until it ends, is paused, or is no longer ours; the job as it is then.
+    """Run a claimed job until it ends, is paused, or is no longer ours.
 
-    stop: when set, work under way is dropped and the job is given back to the queue. So it is
-        when `on_commit` raises, which is passed on.
     A store that does not answer is tried again as long as the lease can be held.
 
-    Raises StoreUnavailable if it still does not; the job then stays as last committed, and is taken
-    up again when its lease has run out.
+    Args:
+        claim: On the job.
+        around: What the run needs beside it.
+        stop: When set, work under way is dropped and the job is given back to the queue. So it is
+            when `on_commit` raises, which is passed on.
+
+    Returns:
+        The job as it is then.
+
+    Raises:
+        StoreUnavailable: The store does not answer in the end; the job then stays as last
+            committed, and is taken up again when its lease has run out.
     """
     heartbeat = Heartbeat(
         around.store, claim, lease_seconds=around.lease_seconds, clock=around.clock

@@ -154,9 +154,10 @@ def test_a_stale_claim_can_write_nothing(store: SqlStore, clock: Clock, lose: Lo
     claim = begun(store)
     lose(store, clock, claim)
     before = store.job(claim.job.id), store.iterations(claim.job.id)
+    index = before[0].progress.iterations
     for write in (
-        lambda: store.commit(claim, completed(0), ask(1)),
-        lambda: store.commit(claim, completed(0), None),
+        lambda: store.commit(claim, completed(index), ask(index + 1)),
+        lambda: store.commit(claim, completed(index), None),
         lambda: store.begin(claim, ask(0)),
         lambda: store.renew(claim, lease_seconds=LEASE),
         lambda: store.release(claim, JobState.FAILED, error="late"),

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from services.optimizer.jobs.job import Claim, JobState
+from services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
+from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Status
@@ -89,6 +89,28 @@ def test_a_repeated_commit_changes_nothing(store: SqlStore) -> None:
     assert store.commit(claim, completed(0, (1.0, 1.0)), ask(1)) is JobState.RUNNING
     assert (store.job(claim.job.id), store.iterations(claim.job.id)) == before
     assert [e.fitness for e in store.evaluations(claim.job.id, 0)] == [4.0, 3.0]
+
+
+@pytest.mark.parametrize("command", [None, Command.PAUSE])
+def test_a_repeated_commit_that_ended_or_paused_the_job_changes_nothing(
+    store: SqlStore, command: Command | None
+) -> None:
+    claim = begun(store, iterations=2)
+    if command is not None:
+        store.command(claim.job.id, command)
+    given = completed(0), None if command is None else ask(1)
+    state = store.commit(claim, *given)
+    before = store.job(claim.job.id)
+    assert store.commit(claim, *given) is state is before.state
+    assert store.job(claim.job.id) == before
+
+
+def test_a_commit_is_not_taken_for_a_repeated_one_after_another_claim(store: SqlStore) -> None:
+    claim = run(store, (4.0, 3.0))
+    store.release(claim, JobState.QUEUED)
+    assert store.claim("another", lease_seconds=60.0) is not None
+    with pytest.raises(LeaseLost):
+        store.commit(claim, completed(0), ask(1))
 
 
 def test_a_repeated_begin_keeps_the_ask_that_is_there(store: SqlStore) -> None:

@@ -280,10 +280,12 @@ class SqlStore(SqlHistory):
     def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
         """Store an iteration, the ask that follows, and what becomes of the job."""
         with self._database.transaction(write=True) as connection:
+            row = job_row(connection, claim.job.id, lock=True)
+            # The token outlives the lease, which a commit that ends or pauses the job gives up.
+            if row["lease_token"] == claim.token and done.iteration < row["iterations"]:
+                return JobState(row["state"])
             row = held(connection, claim)
             now = self._clock(connection)
-            if done.iteration < row["iterations"]:
-                return JobState(row["state"])
             require_budget_of(claim, row)
             complete_iteration(connection, row, done, now)
             if following is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -14,11 +14,12 @@ import pytest
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.jobs.job import Claim, Command, CompletedIteration, JobState
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
-from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
 from services.optimizer.run.runner import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
+from sim.outcome import Outcome
 from tests.optimizer.formula import SPEC, FormulaEvaluator
 
 ALL = list(range(SPEC.iterations))
@@ -209,6 +210,35 @@ def test_a_job_that_is_lost_to_another_process_is_followed_there_and_nothing_is_
     assert (told.committed, told.followed) == ([], ALL)
 
 
+class Asleep(FormulaEvaluator):
+    """Workers on a machine that sleeps in the first call, until another has run the job."""
+
+    def __init__(self, store: Store, clock: Clock) -> None:
+        super().__init__()
+        self.store = store
+        self.clock = clock
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        theirs = None
+        while theirs is None:
+            # A heartbeat may just have come in between.
+            self.clock.advance(EMBEDDED_LEASE_SECONDS + 1.0)
+            theirs = self.store.claim("another", lease_seconds=60.0)
+        run_claim(theirs, Surroundings(self.store, FormulaEvaluator()))
+        return super().evaluate(request, should_stop)
+
+
+def test_a_job_that_another_process_took_and_ended_unnoticed_is_told_to_its_end(
+    store: Store, clock: Clock, told: Told
+) -> None:
+    job = run_embedded(store, Asleep(store, clock), submitted(store), **told.callbacks())
+    assert job.state is JobState.SUCCEEDED
+    assert (told.committed, told.followed) == ([], ALL)
+    assert len(told.news) == 1 and "not heard of" in told.news[0]
+
+
 def test_a_job_that_is_cancelled_while_it_is_followed_is_returned_cancelled(
     store: Store, told: Told
 ) -> None:
@@ -237,3 +267,14 @@ def test_a_run_that_is_told_to_stop_before_it_begins_leaves_the_job_queued(store
     stop = threading.Event()
     stop.set()
     assert run_embedded(store, no_workers, submitted(store), stop=stop).state is JobState.QUEUED
+
+
+def test_a_run_that_is_told_to_stop_leaves_a_job_alone_that_another_process_took(
+    store: Store, clock: Clock
+) -> None:
+    stop = threading.Event()
+    stop.set()
+    mine = submitted(store)
+    clock.advance(EMBEDDED_LEASE_SECONDS + 1.0)
+    assert store.claim("another", lease_seconds=60.0) is not None
+    assert run_embedded(store, no_workers, mine, stop=stop).state is JobState.RUNNING

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
-from services.optimizer.errors import GaitswarmError
+from services.optimizer.errors import GaitswarmError, LeaseLost
 from services.optimizer.jobs.job import Claim, CompletedIteration, Iteration, Job, JobState
 from services.optimizer.run.coordinator import Backoff
 from services.optimizer.run.evaluator import Evaluator
@@ -32,10 +32,12 @@ _UNDER_WAY: Final = (JobState.QUEUED, JobState.RUNNING, JobState.PAUSING)
 
 _HELD: Final = "another process runs this job, or was killed while it did; following it"
 
-_TAKEN: Final = (
+_LOST: Final = (
     f"this process was not heard of for {EMBEDDED_LEASE_SECONDS:g} s, and another one has taken the"
-    " job over; following it there"
+    " job over"
 )
+
+_TAKEN: Final = f"{_LOST}; following it there"
 
 _FREE: Final = "no other process holds the job any more; it goes on here"
 
@@ -131,8 +133,13 @@ class _EmbeddedRun:
                 self._run(claim)
                 claim = None
         if claim is not None:
-            self.store.release(claim, JobState.QUEUED)
+            with suppress(LeaseLost):
+                self.store.release(claim, JobState.QUEUED)
             self.job = self.store.job(self.job.id)
+        if self.job.state.terminal and self.seen + 1 < self.job.progress.iterations:
+            # It was lost and ended elsewhere before anybody here looked.
+            self.on_news(_LOST)
+            self._catch_up()
         if self.job.state.terminal:
             self.store.verify()
         return self.job

@@ -179,12 +179,13 @@ def test_a_name_that_can_be_read_is_shown(store: SqlStore, write_spec: Write) ->
     assert [found.id for found in store.jobs(search="min").items] == [job.id]
 
 
+@pytest.mark.parametrize("document", ['{"name": "cut o', "[" * 100_000], ids=["cut", "deep"])
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_a_spec_that_is_no_json_at_all_fails_alone_too(
-    store: SqlStore, clock: Clock, write_spec: Write, database_url: str
+    store: SqlStore, clock: Clock, write_spec: Write, database_url: str, document: str
 ) -> None:
     job, _ = store.create_job(spec())
-    write_spec(job.id, '{"name": "cut o')
+    write_spec(job.id, document)
     clock.advance(1.0)
     sound, _ = store.create_job(spec())
     claim = store.claim("runner", lease_seconds=LEASE)
@@ -193,7 +194,36 @@ def test_a_spec_that_is_no_json_at_all_fails_alone_too(
     assert error is not None and "not JSON" in error
     for order in JobOrder:
         assert len(store.jobs(order=order).items) == 2
-    assert stored(database_url, job.id)["spec"] == '{"name": "cut o'
+    assert stored(database_url, job.id)["spec"] == document
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_a_spec_that_is_not_even_text_fails_alone_too(
+    store: SqlStore, clock: Clock, database_url: str
+) -> None:
+    job, _ = store.create_job(spec())
+    # SQLite keeps bytes that are no UTF-8, as a damaged disk leaves them.
+    damage = "UPDATE jobs SET spec = CAST(x'7b22ff' || :document AS TEXT) WHERE id = :id"
+    execute(database_url, damage, "", job.id)
+    clock.advance(1.0)
+    sound, _ = store.create_job(spec())
+    claim = store.claim("runner", lease_seconds=LEASE)
+    assert claim is not None and claim.job.id == sound.id
+    error = store.job(job.id).error
+    assert error is not None and "not JSON" in error
+    for order in JobOrder:
+        assert len(store.jobs(order=order).items) == 2
+
+
+@pytest.mark.parametrize("recorded", ["{}", "0", "false", '""'])
+def test_a_provenance_that_is_no_list_is_not_taken_for_none(
+    store: SqlStore, database_url: str, recorded: str
+) -> None:
+    job, _ = store.create_job(spec())
+    execute(database_url, "UPDATE jobs SET provenance = :document WHERE id = :id", recorded, job.id)
+    assert store.claim("runner", lease_seconds=LEASE) is None
+    error = store.job(job.id).error
+    assert error is not None and "its provenance cannot be read" in error
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -161,6 +162,8 @@ def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> 
     @event.listens_for(engine, "connect")
     def _configure(connection: sqlite3.Connection, _record: object) -> None:
         _journal_ahead(connection)
+        # One text that is none would else keep all rows of a query from whoever asks for them.
+        connection.text_factory = partial(str, encoding="utf-8", errors="replace")
         # An iteration that was acknowledged survives a power cut: WAL alone syncs less often.
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")

@@ -140,8 +140,9 @@ def provenance_records(row: Row) -> ProvenanceRecords:
     Raises:
         Unreadable: They were written by another version, or damaged.
     """
+    recorded = row["provenance"]
     try:
-        return _RECORDS.validate_python(row["provenance"] or ())
+        return _RECORDS.validate_python(() if recorded is None else recorded)
     except ValidationError as error:
         problems = first_problems(error)
         raise kept(f"its provenance cannot be read by this gaitswarm ({problems})") from error

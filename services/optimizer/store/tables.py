@@ -119,7 +119,7 @@ class Document(TypeDecorator[Any]):
         def parse_if_possible(text: Any) -> Any:
             try:
                 return text if parse is None else parse(text)
-            except ValueError:
+            except (ValueError, RecursionError):
                 return UnparsedText(text)
 
         return parse_if_possible

@@ -16,7 +16,7 @@ from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit
-from tests.examples.frames import unframed
+from tests.examples.servers import unframed
 
 pytestmark = pytest.mark.slow
 

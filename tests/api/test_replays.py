@@ -13,8 +13,8 @@ import pytest
 from sim.outcome import OBJECTIVE_NAMES
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
-from tests.examples.frames import unframed
 from tests.examples.paths import QUADRUPED
+from tests.examples.servers import unframed
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, quadruped_files
 
 pytestmark = pytest.mark.slow

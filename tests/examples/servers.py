@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -9,6 +11,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import httpx2
+import numpy as np
+from numpy.typing import NDArray
 
 from api import dependencies
 from api.app import create_app
@@ -111,3 +115,11 @@ class ServerProcess:
             self.process.kill()
             self._drain.join()
             output(self.process.stderr).close()
+
+
+def unframed(content: bytes) -> tuple[dict[str, Any], NDArray[np.float32]]:
+    """Header and numbers of a binary answer, as docs/api.md says."""
+    (length,) = struct.unpack_from("<I", content)
+    assert length % 4 == 0
+    header = json.loads(content[4 : 4 + length])
+    return header, np.frombuffer(content, dtype="<f4", offset=4 + length)

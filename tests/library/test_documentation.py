@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import re
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,14 +12,12 @@ from typing import Any
 import pytest
 
 import gaitswarm
-from api.app import create_app
-from api.server import ApiServer
-from gaitswarm.settings import Settings
 from services.runtime import open_runtime
+from tests.examples.paths import ROOT
+from tests.examples.servers import Server
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
 URL = "http://127.0.0.1:8000"
 
 _BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -41,13 +38,9 @@ def server(tmp_path: Path) -> Iterator[str]:
         runtime = stack.enter_context(
             open_runtime(str(tmp_path / "served.db"), evaluator="in-process", cpus=1)
         )
-        app = create_app(runtime.service, settings=Settings(api_event_poll_seconds=0.05))
-        server = ApiServer(app, host="127.0.0.1", port=0, log_level="critical")
-        thread = threading.Thread(target=server.run)
-        thread.start()
-        stack.callback(thread.join, timeout=10.0)
-        stack.callback(server.stop)
-        yield server.url
+        served = Server(runtime.service)
+        stack.callback(served.close)
+        yield served.url
 
 
 Run = Callable[[str], dict[str, Any]]

@@ -13,8 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Locator, Page, expect
 
-from tests.examples.frames import unframed
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import ServerProcess, unframed
 from tests.web.pixels import colours, pixels
 from tests.web.visit import Visit
 

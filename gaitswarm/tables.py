@@ -93,13 +93,15 @@ class Table:
             ImportError: pandas is not installed; gaitswarm does not need it otherwise.
         """
         try:
-            return self.to_arrow().to_pandas()
+            # By ourselves: whether Arrow would raise this depends on what it has imported before.
+            import pandas  # noqa: F401, ICN001
         except ImportError as error:
             raise ImportError(
                 "to_pandas() needs pandas, which is not installed: `pip install pandas`, or use"
                 " to_arrow() or the columns as numpy arrays",
                 name="pandas",
             ) from error
+        return self.to_arrow().to_pandas()
 
 
 class EvaluationTable(Table):

@@ -74,10 +74,10 @@ def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
 def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
-    spec = write_json(SMALL_SPEC | {"iterations": 400})
+    spec = write_json(SMALL_SPEC | {"iterations": 250})
     process = start_python(*OPTIMIZE, "--spec", spec, "--db", db, *IN_PROCESS, "--json")
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
-    line_with(process.stderr, r"^iteration \d+/400")
+    line_with(process.stderr, r"^iteration \d+/250")
     process.send_signal(signal.SIGSTOP)
     before = _job(gaitswarm, job_id, db)["iterations"]
     eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > before + 1)

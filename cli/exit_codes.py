@@ -6,7 +6,7 @@
 3    no such job, iteration, database or result
 4    the job's present state does not allow it
 5    server, database, workers, compiler, files or standard output cannot be reached or used now
-70   a bug; only then there is a traceback
+70   a bug; the traceback says where
 130  interrupted
 """
 

@@ -1,51 +1,19 @@
-"""Options that several commands share."""
+"""Options that several commands share, one by one and in groups."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
-SpecFile = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Job spec as JSON; `-` reads standard input. Without one: the chapter-4 job.",
-    ),
-]
-
-Iterations = Annotated[int | None, typer.Option(help="Iterations to run.")]
-
-Particles = Annotated[int | None, typer.Option(help="Size of the swarm.")]
-
-Seed = Annotated[int | None, typer.Option(help="Source of all randomness.")]
-
-PreferenceOption = Annotated[
-    str | None, typer.Option("--preference", help="How objectives are weighed: A, B or C.")
-]
-
-Scenarios = Annotated[
-    str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
-]
-
-ControllerOption = Annotated[
-    str | None, typer.Option("--controller", help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")
-]
-
-RobotOption = Annotated[
-    str | None,
-    typer.Option(
-        "--robot",
-        metavar="NAME|JSON|FOLDER",
-        help="Robot by name, a variant as JSON, such as"
-        ' {"contact_law": "stick", "backlash": [2.5, 1, 1]}, or the folder of your own.',
-    ),
-]
-
-JobName = Annotated[str | None, typer.Option("--name", help="Name of the job, for people.")]
-
 JobId = Annotated[str, typer.Argument(metavar="ID", help="Identifier of the job.")]
+
+JobName = Annotated[str | None, typer.Option(help="Name of the job, for people.")]
 
 Server = Annotated[
     str | None,
@@ -71,27 +39,133 @@ AcceptChanges = Annotated[
     ),
 ]
 
-EvaluatorOption = Annotated[
+RobotOption = Annotated[
     str | None,
     typer.Option(
-        "--evaluator",
-        help="ray, or in-process (threads of this process). [env: GAITSWARM_EVALUATOR; default:"
-        " ray]",
+        "--robot",
+        metavar="NAME|JSON|FOLDER",
+        help="Robot by name, a variant as JSON, such as"
+        ' {"contact_law": "stick", "backlash": [2.5, 1, 1]}, or the folder of your own.',
     ),
 ]
 
-Cpus = Annotated[
-    int | None,
-    typer.Option(
-        min=1,
-        help="Walks to compute at once on this machine. [env: GAITSWARM_CPUS; default: all cores]",
-    ),
-]
 
-RayAddress = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Use this Ray cluster; else one is started, and ended. [env: GAITSWARM_RAY_ADDRESS]",
-    ),
-]
+@dataclass(frozen=True, slots=True)
+class SpecOptions:
+    """Options of a command that submits a job; None leaves the value of the spec in the file.
+
+    scenarios: names, numbers or files, separated by commas.
+    """
+
+    spec: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Job spec as JSON; `-` reads standard input. Without one: the chapter-4 job.",
+        ),
+    ] = None
+    iterations: Annotated[int | None, typer.Option(help="Iterations to run.")] = None
+    particles: Annotated[int | None, typer.Option(help="Size of the swarm.")] = None
+    seed: Annotated[int | None, typer.Option(help="Source of all randomness.")] = None
+    preference: Annotated[
+        str | None, typer.Option(help="How objectives are weighed: A, B or C.")
+    ] = None
+    scenarios: Annotated[
+        str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
+    ] = None
+    controller: Annotated[str | None, typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")] = (
+        None
+    )
+    robot: RobotOption = None
+    name: JobName = None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Those that the user gave, by name."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerOptions:
+    """Options of a command that runs jobs, named as the settings that they go before."""
+
+    db: Db = None
+    evaluator: Annotated[
+        str | None,
+        typer.Option(
+            help="ray, or in-process (threads of this process). [env: GAITSWARM_EVALUATOR; default:"
+            " ray]",
+        ),
+    ] = None
+    cpus: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Walks to compute at once on this machine. [env: GAITSWARM_CPUS; default: all"
+            " cores]",
+        ),
+    ] = None
+    ray_address: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Use this Ray cluster; else one is started, and ended. [env:"
+            " GAITSWARM_RAY_ADDRESS]",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerOptions(WorkerOptions):
+    """Options of a command that runs queued jobs."""
+
+    concurrent_jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            min=1,
+            max=256,
+            help="Jobs to run at once. [env: GAITSWARM_CONCURRENT_JOBS; default: 2]",
+        ),
+    ] = None
+
+
+def with_groups(command: Callable[..., None]) -> Callable[..., None]:
+    """A command as Typer, which knows no groups of options, takes it.
+
+    Args:
+        command: A function; each of its arguments that is annotated with a dataclass is a group.
+
+    Returns:
+        The same with the fields of its groups in their place, all to be given by name.
+    """
+    annotations = get_type_hints(command, include_extras=True)
+    groups: dict[str, type[Any]] = {
+        name: kind
+        for name, kind in annotations.items()
+        if isinstance(kind, type) and is_dataclass(kind)
+    }
+    parameters: list[inspect.Parameter] = []
+    for name, parameter in inspect.signature(command).parameters.items():
+        if name in groups:
+            parameters += _parameters(groups[name])
+        else:
+            parameters.append(parameter.replace(annotation=annotations[name]))
+
+    @wraps(command)
+    def called(**given: Any) -> None:
+        for name, kind in groups.items():
+            given[name] = kind(**{field.name: given.pop(field.name) for field in fields(kind)})
+        command(**given)
+
+    by_name = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
+    called.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
+    called.__annotations__ = {parameter.name: parameter.annotation for parameter in by_name}
+    return called
+
+
+def _parameters(group: type) -> list[inspect.Parameter]:
+    """Those with which a dataclass is made, their annotations resolved."""
+    annotations = get_type_hints(group, include_extras=True)
+    parameters = inspect.signature(group).parameters
+    return [own.replace(annotation=annotations[name]) for name, own in parameters.items()]

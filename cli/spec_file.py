@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,6 +11,7 @@ from cli.robots import chosen_robot, scenario_data
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from cli.options import SpecOptions
     from services.optimizer.jobs.documents import AnySpec
 
 LARGEST_FILE: Final = 1 << 20
@@ -45,39 +45,17 @@ def read_json_object(path: Path, what: str) -> dict[str, Any]:
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Overrides:
-    """Options laid over a spec; None leaves the spec's own value.
-
-    scenarios: names or numbers, separated by commas.
-    """
-
-    iterations: int | None = None
-    particles: int | None = None
-    seed: int | None = None
-    preference: str | None = None
-    scenarios: str | None = None
-    controller: str | None = None
-    name: str | None = None
-    robot: str | None = None
-
-    @property
-    def any(self) -> bool:
-        """Whether there is one."""
-        return any(value is not None for value in asdict(self).values())
-
-
-def build_spec(path: Path | None, overrides: Overrides) -> AnySpec:
+def build_spec(options: SpecOptions) -> AnySpec:
     """The spec in a file (without one: the defaults) with options laid over it.
 
     Raises InvalidRequest that names the field.
     """
-    data = read_json_object(path, "spec") if path is not None else {}
-    chosen = {name: value for name, value in asdict(overrides).items() if value is not None}
-    if overrides.scenarios is not None:
-        chosen["scenarios"] = scenario_data(overrides.scenarios)
-    if overrides.robot is not None:
-        chosen["robot"] = chosen_robot(overrides.robot)
+    data = read_json_object(options.spec, "spec") if options.spec is not None else {}
+    chosen = {name: value for name, value in options.given.items() if name != "spec"}
+    if options.scenarios is not None:
+        chosen["scenarios"] = scenario_data(options.scenarios)
+    if options.robot is not None:
+        chosen["robot"] = chosen_robot(options.robot)
     particles = chosen.pop("particles", None)
     if particles is not None:
         optimizer = data.get("optimizer", {})

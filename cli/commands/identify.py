@@ -14,7 +14,7 @@ from cli.measured_walk import (
     TrajectoryOption,
     WalkController,
 )
-from cli.options import Cpus, Db, EvaluatorOption, JobName, Json, RayAddress, RobotOption, Server
+from cli.options import Db, JobName, Json, RobotOption, Server, WorkerOptions, with_groups
 
 Truth = Annotated[
     Path | None,
@@ -69,10 +69,12 @@ def record(
     )
 
 
+@with_groups
 def identify(
     recordings: Annotated[
         list[str], typer.Argument(metavar="RECORDING...", help="Ids that `record` printed.")
     ],
+    *,
     variables: Annotated[
         str | None,
         typer.Option(help="Parameters to fit, separated by commas. Default: all of table 2.7."),
@@ -92,14 +94,12 @@ def identify(
     seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
     name: JobName = None,
     truth: Truth = None,
-    db: Db = None,
-    evaluator: EvaluatorOption = None,
-    cpus: Cpus = None,
-    ray_address: RayAddress = None,
+    workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
     """Fit parameters of a robot to recorded walks, here and now, and say which can be trusted."""
     from contextlib import closing
+    from dataclasses import asdict
 
     from cli.embedded import Embedded
     from cli.output import note
@@ -126,7 +126,7 @@ def identify(
         "iterations": iterations,
     }
     specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
-    settings = read_settings(db=db, evaluator=evaluator, ray_address=ray_address, cpus=cpus)
+    settings = read_settings(**asdict(workers))
     url = database_to_write(settings)
     with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
         service = JobService(store)

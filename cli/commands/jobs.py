@@ -7,22 +7,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from cli.options import (
-    AcceptChanges,
-    ControllerOption,
-    Db,
-    Iterations,
-    JobId,
-    JobName,
-    Json,
-    Particles,
-    PreferenceOption,
-    RobotOption,
-    Scenarios,
-    Seed,
-    Server,
-    SpecFile,
-)
+from cli.options import AcceptChanges, Db, JobId, Json, Server, SpecOptions, with_groups
 
 S = TypeVar("S", bound=StrEnum)
 
@@ -39,16 +24,9 @@ def register(app: typer.Typer) -> None:
     app.command()(cancel)
 
 
+@with_groups
 def submit(
-    spec: SpecFile = None,
-    iterations: Iterations = None,
-    particles: Particles = None,
-    seed: Seed = None,
-    preference: PreferenceOption = None,
-    scenarios: Scenarios = None,
-    controller: ControllerOption = None,
-    robot: RobotOption = None,
-    name: JobName = None,
+    options: SpecOptions,
     idempotency_key: Annotated[
         str | None, typer.Option(help="The same key and spec again make no second job.")
     ] = None,
@@ -58,13 +36,10 @@ def submit(
 ) -> None:
     """Queue a job for a running server; see `optimize` to run one here and now."""
     from cli.output import note, print_json, stdout_console
-    from cli.spec_file import Overrides, build_spec
+    from cli.spec_file import build_spec
     from gaitswarm.jobs.open import open_jobs
 
-    overrides = Overrides(
-        iterations, particles, seed, preference, scenarios, controller, name, robot
-    )
-    asked = build_spec(spec, overrides)
+    asked = build_spec(options)
     with open_jobs(server, db, create=True) as jobs:
         job = jobs.submit(asked, idempotency_key=idempotency_key)
         if as_json:

@@ -6,23 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.options import (
-    AcceptChanges,
-    ControllerOption,
-    Cpus,
-    Db,
-    EvaluatorOption,
-    Iterations,
-    JobName,
-    Json,
-    Particles,
-    PreferenceOption,
-    RayAddress,
-    RobotOption,
-    Scenarios,
-    Seed,
-    SpecFile,
-)
+from cli.options import AcceptChanges, Json, SpecOptions, WorkerOptions, with_groups
 
 
 def register(app: typer.Typer) -> None:
@@ -30,16 +14,10 @@ def register(app: typer.Typer) -> None:
     app.command()(optimize)
 
 
+@with_groups
 def optimize(
-    spec: SpecFile = None,
-    iterations: Iterations = None,
-    particles: Particles = None,
-    seed: Seed = None,
-    preference: PreferenceOption = None,
-    scenarios: Scenarios = None,
-    controller: ControllerOption = None,
-    robot: RobotOption = None,
-    name: JobName = None,
+    options: SpecOptions,
+    *,
     resume: Annotated[
         str | None,
         typer.Option(
@@ -54,18 +32,16 @@ def optimize(
             "--compare-published", help="Show the best design beside the one of the literature."
         ),
     ] = False,
-    db: Db = None,
-    evaluator: EvaluatorOption = None,
-    cpus: Cpus = None,
-    ray_address: RayAddress = None,
+    workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
     """Run a job here and now, without a server. Ctrl-C stops it; --resume goes on with it."""
     from contextlib import closing
+    from dataclasses import asdict
 
     from cli.embedded import Embedded, finish, resumed_job
     from cli.output import note
-    from cli.spec_file import Overrides, build_spec
+    from cli.spec_file import build_spec
     from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
@@ -77,13 +53,8 @@ def optimize(
         raise InvalidRequest("is for people; leave it out with --json", field="compare-published")
     if accept_changes and resume is None:
         raise InvalidRequest("a new job has nothing to go on from", field="accept-changes")
-    settings = read_settings(db=db, evaluator=evaluator, ray_address=ray_address, cpus=cpus)
-    overrides = Overrides(
-        iterations, particles, seed, preference, scenarios, controller, name, robot
-    )
-    asked = None
-    if resume is None or spec is not None or overrides.any:
-        asked = build_spec(spec, overrides)
+    settings = read_settings(**asdict(workers))
+    asked = build_spec(options) if resume is None or options.given else None
     url = database_to_write(settings)
     with (
         closing(open_store(url)) as store,

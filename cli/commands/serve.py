@@ -6,23 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Cpus, Db, EvaluatorOption, RayAddress
+from cli.options import RunnerOptions, with_groups
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from gaitswarm.settings import Settings
     from services.runtime import Runtime
-
-ConcurrentJobs = Annotated[
-    int | None,
-    typer.Option(
-        "--jobs",
-        min=1,
-        max=256,
-        help="Jobs to run at once. [env: GAITSWARM_CONCURRENT_JOBS; default: 2]",
-    ),
-]
 
 
 def register(app: typer.Typer) -> None:
@@ -31,8 +21,9 @@ def register(app: typer.Typer) -> None:
     app.command()(runner)
 
 
+@with_groups
 def serve(
-    db: Db = None,
+    *,
     host: Annotated[
         str | None,
         typer.Option(help="Address to listen on. [env: GAITSWARM_API_HOST; default: 127.0.0.1]"),
@@ -48,12 +39,11 @@ def serve(
     no_runner: Annotated[
         bool, typer.Option("--no-runner", help="Run no jobs; other processes do.")
     ] = False,
-    jobs: ConcurrentJobs = None,
-    evaluator: EvaluatorOption = None,
-    cpus: Cpus = None,
-    ray_address: RayAddress = None,
+    options: RunnerOptions,
 ) -> None:
     """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
+    from dataclasses import asdict
+
     from api.app import create_app
     from api.page import is_built
     from api.server import ApiServer
@@ -61,15 +51,7 @@ def serve(
     from gaitswarm.settings import read_settings
     from services.optimizer.errors import EvaluatorUnavailable
 
-    settings = read_settings(
-        db=db,
-        api_host=host,
-        api_port=port,
-        concurrent_jobs=jobs,
-        evaluator=evaluator,
-        cpus=cpus,
-        ray_address=ray_address,
-    )
+    settings = read_settings(**asdict(options), api_host=host, api_port=port)
     log_to_stderr(settings.log_level)
     with _runtime(settings, runs_jobs=not no_runner) as opened:
         beside = opened.runner
@@ -93,27 +75,21 @@ def serve(
         server.run()
 
 
-def runner(
-    db: Db = None,
-    jobs: ConcurrentJobs = None,
-    evaluator: EvaluatorOption = None,
-    cpus: Cpus = None,
-    ray_address: RayAddress = None,
-) -> None:
+@with_groups
+def runner(options: RunnerOptions) -> None:
     """Run queued jobs, without page and API, until Ctrl-C or SIGTERM.
 
     The jobs that are then under way go back to the queue.
     """
     import logging
     import threading
+    from dataclasses import asdict
 
     from cli.output import log_to_stderr
     from gaitswarm.settings import read_settings
     from services.runtime import stop_on_signals
 
-    settings = read_settings(
-        db=db, concurrent_jobs=jobs, evaluator=evaluator, cpus=cpus, ray_address=ray_address
-    )
+    settings = read_settings(**asdict(options))
     log_to_stderr(settings.log_level)
     log = logging.getLogger(__name__)
     stop = threading.Event()

@@ -1,7 +1,7 @@
 """Exit codes of `gaitswarm`, and which error ends in which.
 
 0    done
-1    the job that was waited for failed or was cancelled
+1    the job that was waited for failed, was cancelled or was paused
 2    usage, or input that makes no sense; the message names the option, file or field
 3    no such job, iteration, database or result
 4    the job's present state does not allow it

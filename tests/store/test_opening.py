@@ -20,6 +20,7 @@ from services.optimizer.store.migrate import head, lock_for_migration
 from services.optimizer.store.sql_store import SqlStore, open_store
 from services.optimizer.store.tables import metadata
 from tests.store.examples import LEASE, spec
+from tests.store.postgres_server import postgres_binaries
 
 
 def edit(url: str, statement: str) -> None:
@@ -263,3 +264,14 @@ def test_what_a_reading_transaction_sees_of_others_depends_on_the_database(
         seen = connection.execute(count).scalar_one()
     assert seen == (0 if database.engine.dialect.name == "sqlite" else 1)
     database.close()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(postgres_binaries() is None, reason="needs PostgreSQL")
+@pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
+def test_a_server_that_takes_no_writes_is_unavailable(database_url: str) -> None:
+    # As a standby that the address leads to while another server becomes the primary.
+    opened = open_store(f"{database_url}?options=-c%20default_transaction_read_only%3Don")
+    with pytest.raises(StoreUnavailable, match="read-only transaction"):
+        opened.create_job(spec())
+    opened.close()

@@ -24,7 +24,13 @@ from sqlalchemy import (
     make_url,
     select,
 )
-from sqlalchemy.exc import ArgumentError, DatabaseError, InterfaceError, OperationalError
+from sqlalchemy.exc import (
+    ArgumentError,
+    DatabaseError,
+    InterfaceError,
+    InternalError,
+    OperationalError,
+)
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from services.optimizer.errors import StoreUnavailable
@@ -252,8 +258,9 @@ def check_file(database: Database) -> None:
 
 def _is_infrastructure(error: DatabaseError | InterfaceError | PoolTimeout) -> bool:
     """Whether the database is at fault, and not a statement of ours."""
-    # The bare DatabaseError is how the drivers say that a file or an answer is no database's.
-    return isinstance(error, (OperationalError, InterfaceError, PoolTimeout)) or (
+    # PostgreSQL's InternalError is a server that became read-only or gave a session up, and the
+    # bare DatabaseError how the drivers say that a file or an answer is no database's.
+    return isinstance(error, (OperationalError, InterfaceError, InternalError, PoolTimeout)) or (
         type(error) is DatabaseError
     )
 

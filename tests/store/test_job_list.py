@@ -168,6 +168,15 @@ def test_the_list_can_be_searched_by_name_whatever_its_case(
     assert listed(store, search=text) == found
 
 
+def test_a_name_of_any_characters_keeps_no_other_job_from_the_list(
+    store: SqlStore, clock: Clock
+) -> None:
+    made = named(store, clock, "zero\0byte", '"\\ü\U0001f916', "plain")
+    listed = store.jobs(order=JobOrder.NAME).items
+    assert {job.id for job in listed} == {job.id for job in made}
+    assert [job.id for job in store.jobs(search="ü").items] == [made[1].id]
+
+
 def test_the_list_can_be_searched_by_a_part_of_the_id(store: SqlStore, clock: Clock) -> None:
     wanted, _ = named(store, clock, "one", "two")
     assert [job.id for job in store.jobs(search=wanted.id[2:].upper()).items] == [wanted.id]

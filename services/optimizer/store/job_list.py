@@ -183,10 +183,14 @@ def sort_jobs(
 
 def _entries(connection: Connection) -> Select[tuple[str, datetime, str, float | None]]:
     """A row of what `_Entry` holds for every job."""
-    name: ColumnElement[str] = jobs.c.spec["name"].as_string()
+    document = cast(jobs.c.spec, Text)
     if connection.dialect.name == "sqlite":
         # It keeps any text, and fails at a path into one that is not JSON.
-        name = case((func.json_valid(cast(jobs.c.spec, Text)), name), else_="")
+        has_name: ColumnElement[bool] = func.json_valid(document)
+    else:
+        # A zero byte, as JSON spells it, makes PostgreSQL fail at any path into the document.
+        has_name = func.strpos(document, r"\u0000") == 0
+    name = case((has_name, jobs.c.spec["name"].as_string()), else_="")
     named = func.coalesce(cast(name, Text), "")
     return select(jobs.c.id, jobs.c.created_at, named, jobs.c.best_fitness)
 

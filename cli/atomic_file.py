@@ -16,10 +16,25 @@ from services.optimizer.errors import InvalidRequest
 def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
     """A binary file that takes the path's place when the block ends without an exception.
 
+    A link stays, and what it points to is replaced; a device or pipe stays, and is written to.
+
     option: which option named the path, for the message of InvalidRequest if it cannot be written.
     """
     try:
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        special = path.exists() and not path.is_file()
+        target = path.resolve()
+    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
+        reason = getattr(error, "strerror", None) or "its links lead in a circle"
+        raise InvalidRequest(f"cannot write {path}: {reason}", field=option) from error
+    if special:
+        try:
+            with path.open("wb") as file:
+                yield file
+        except OSError as error:
+            raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
+        return
+    try:
+        descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     except OSError as error:
         raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
     temporary = Path(name)
@@ -30,7 +45,7 @@ def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
+        temporary.replace(target)
     except OSError as error:
         raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
     finally:

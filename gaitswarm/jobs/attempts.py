@@ -1,7 +1,7 @@
 """When a call is sent again, and what its failure means. No I/O here; both clients lean on it.
 
-Sent again are calls that do no harm twice, GET and those with an idempotency key: when the
-connection could not be made or broke, and on 503, after the time that the server asks for.
+Sent again are calls that do no harm twice, those that only read or have an idempotency key: when
+the connection could not be made or broke, and on 503, after the time that the server asks for.
 """
 
 from __future__ import annotations

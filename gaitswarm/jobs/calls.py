@@ -61,6 +61,7 @@ class Call(Generic[T]):
         params: Query.
         body: JSON; None for none.
         headers: Further headers.
+        reads: Whether it changes nothing on the server, as no GET does.
     """
 
     method: str
@@ -69,11 +70,12 @@ class Call(Generic[T]):
     params: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
     body: str | None = None
     headers: Mapping[str, str] = field(default_factory=dict)
+    reads: bool = False
 
     @property
     def repeatable(self) -> bool:
         """Whether sending it twice does what sending it once does."""
-        return self.method == "GET" or IDEMPOTENCY_KEY in self.headers
+        return self.reads or self.method == "GET" or IDEMPOTENCY_KEY in self.headers
 
 
 def submit(spec: Spec, key: str) -> Call[JobView]:
@@ -84,7 +86,7 @@ def submit(spec: Spec, key: str) -> Call[JobView]:
 
 def estimate(spec: Spec) -> Call[EstimateView]:
     """Say what a job would cost."""
-    return _posted("/estimates", EstimateView, spec)
+    return _posted("/estimates", EstimateView, spec, reads=True)
 
 
 def jobs(
@@ -154,7 +156,7 @@ def events(job_id: str, last: int | None) -> Call[bytes]:
 
 def ranking(job_id: str, request: RankingRequest) -> Call[RankingView]:
     """Judge all designs of a job by another preference."""
-    return _posted(f"{_job(job_id)}/ranking", RankingView, request)
+    return _posted(f"{_job(job_id)}/ranking", RankingView, request, reads=True)
 
 
 def parameters(job_ids: Sequence[str]) -> Call[IdentifiabilityView]:
@@ -180,18 +182,19 @@ def simulate(request: SimulationRequest) -> Call[SimulationResult]:
     def read(content: bytes) -> SimulationResult:
         return SimulationResult.from_view(SimulationView.model_validate_json(content))
 
-    return Call("POST", "/simulations", read, body=request.model_dump_json())
+    return Call("POST", "/simulations", read, body=request.model_dump_json(), reads=True)
 
 
 def replay(request: ReplayRequest) -> Call[WalkReplay]:
     """Let one design walk, to look at it."""
-    return Call("POST", "/replays", decoded_replay, body=request.model_dump_json())
+    body = request.model_dump_json()
+    return Call("POST", "/replays", decoded_replay, body=body, reads=True)
 
 
 def surface(controller: ControllerName, request: SurfaceRequest) -> Call[SurfaceView]:
     """Take a fuzzy controller's surfaces."""
     path = f"/controllers/{_segment(controller, 'controller')}/surface"
-    return _posted(path, SurfaceView, request)
+    return _posted(path, SurfaceView, request, reads=True)
 
 
 def _got(path: str, kind: type[V]) -> Call[V]:
@@ -199,10 +202,15 @@ def _got(path: str, kind: type[V]) -> Call[V]:
 
 
 def _posted(
-    path: str, kind: type[V], body: BaseModel, headers: Mapping[str, str] | None = None
+    path: str,
+    kind: type[V],
+    body: BaseModel,
+    headers: Mapping[str, str] | None = None,
+    *,
+    reads: bool = False,
 ) -> Call[V]:
-    text = body.model_dump_json()
-    return Call("POST", path, kind.model_validate_json, body=text, headers=headers or {})
+    read, text = kind.model_validate_json, body.model_dump_json()
+    return Call("POST", path, read, body=text, headers=headers or {}, reads=reads)
 
 
 def _page(

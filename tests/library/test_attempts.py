@@ -232,6 +232,35 @@ def test_a_program_with_an_event_loop_makes_the_same_attempts(
     anyio.run(work)
 
 
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda jobs: jobs.estimate(**SMALL),
+        lambda jobs: jobs.ranking("k2q7zr5dm9xw", "B"),
+        lambda jobs: jobs.simulate({"P": 0.2}, controller="p", scenarios="1"),
+        lambda jobs: jobs.replay({"P": 0.2}, controller="p"),
+        lambda jobs: jobs.surface({"I": 0.1}),
+    ],
+    ids=["estimate", "ranking", "simulate", "replay", "surface"],
+)
+def test_whatever_only_reads_is_sent_again_although_it_has_a_body(
+    read: Callable[[gaitswarm.Jobs], object],
+) -> None:
+    sent = list[httpx2.Request]()
+
+    def busy(request: httpx2.Request) -> httpx2.Response:
+        sent.append(request)
+        return refusal(503)
+
+    way = httpx2.MockTransport(busy)
+    with (
+        gaitswarm.ServerJobs(URL, backoff=QUICK, transport=way) as jobs,
+        pytest.raises(gaitswarm.StoreUnavailable),
+    ):
+        read(jobs)
+    assert [request.method for request in sent] == ["POST"] * 4
+
+
 def test_a_server_that_is_not_there_is_unavailable_and_named() -> None:
     with (
         gaitswarm.connect(URL, backoff=QUICK) as jobs,

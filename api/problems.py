@@ -9,6 +9,7 @@
 | NotFound; no such route                       | 404    | not-found             |
 | Conflict, LeaseLost                           | 409    | conflict              |
 | IdempotencyConflict                           | 409    | idempotency-conflict  |
+| Unreadable                                    | 409    | unreadable            |
 | a body over the limit                         | 413    | body-too-large        |
 | StoreUnavailable, EvaluatorUnavailable,       | 503    | unavailable           |
 | SimulationError, too many simulations         |        |                       |
@@ -37,6 +38,7 @@ from services.optimizer.errors import (
     LeaseLost,
     NotFound,
     StoreUnavailable,
+    Unreadable,
 )
 from sim.errors import SimulationError, SimulationInputError
 
@@ -59,6 +61,7 @@ _TITLES: Final = {
     "method-not-allowed": "The method is not allowed here",
     "conflict": "The present state does not allow it",
     "idempotency-conflict": "The idempotency key was used for another request",
+    "unreadable": "This version cannot read the job",
     "body-too-large": "The body is too large",
     "unavailable": "The service cannot do it now",
     "internal-error": "Something went wrong on the server",
@@ -68,6 +71,7 @@ _KINDS: Final[tuple[tuple[type[Exception], HTTPStatus, str], ...]] = (
     (InvalidRequest, HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request"),
     (NotFound, HTTPStatus.NOT_FOUND, "not-found"),
     (IdempotencyConflict, HTTPStatus.CONFLICT, "idempotency-conflict"),
+    (Unreadable, HTTPStatus.CONFLICT, "unreadable"),
     (Conflict, HTTPStatus.CONFLICT, "conflict"),
     (LeaseLost, HTTPStatus.CONFLICT, "conflict"),
     (StoreUnavailable, HTTPStatus.SERVICE_UNAVAILABLE, "unavailable"),

@@ -22,6 +22,7 @@ from gaitswarm.errors import (
     InvalidRequest,
     NotFound,
     StoreUnavailable,
+    Unreadable,
 )
 from gaitswarm.jobs.calls import Call
 from gaitswarm.jobs.port import JobEvent
@@ -44,6 +45,12 @@ _ERRORS: Final[Mapping[int, type[GaitswarmError]]] = {
     HTTPStatus.NOT_FOUND: NotFound,
     HTTPStatus.CONFLICT: Conflict,
 }
+
+_CONFLICTS: Final[Mapping[str, type[Conflict]]] = {
+    "idempotency-conflict": IdempotencyConflict,
+    "unreadable": Unreadable,
+}
+"""By the end of the problem's type, where the status alone does not tell."""
 
 
 class Attempts:
@@ -169,8 +176,9 @@ def error_of(response: httpx2.Response) -> GaitswarmError:
         problem = ProblemView.model_validate_json(response.content)
     except ValidationError:
         return StoreUnavailable(f"server answered {response.status_code} without saying why")
-    if problem.type.endswith(":idempotency-conflict"):
-        return IdempotencyConflict(problem.detail)
+    special = _CONFLICTS.get(problem.type.rpartition(":")[2])
+    if special is not None:
+        return special(problem.detail)
     kind = _ERRORS.get(problem.status)
     if kind is not None:
         return kind(problem.detail)

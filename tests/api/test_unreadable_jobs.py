@@ -79,6 +79,7 @@ def test_what_needs_the_spec_is_refused_with_the_reason(
 ) -> None:
     answer = client.request(method, f"/v1/jobs/{unreadable.id}/{path}", json=body)
     assert answer.status_code == 409
+    assert answer.json()["type"].endswith(":unreadable")
     assert "schema_version" in answer.json()["detail"]
 
 

@@ -91,6 +91,7 @@ def test_a_command_to_a_busy_server_is_not_repeated() -> None:
         (404, "not-found", gaitswarm.NotFound),
         (409, "conflict", gaitswarm.Conflict),
         (409, "idempotency-conflict", gaitswarm.IdempotencyConflict),
+        (409, "unreadable", gaitswarm.Unreadable),
         (422, "invalid-request", gaitswarm.InvalidRequest),
         (500, "internal-error", gaitswarm.StoreUnavailable),
     ],

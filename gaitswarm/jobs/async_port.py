@@ -122,6 +122,13 @@ class AsyncJobs(ABC):
         """Follow a job until it has ended; a paused one is waited for.
 
         A loop that is left early should close it, as `contextlib.aclosing` does.
+
+        Args:
+            job_id: Identifier of the job.
+            after: Leave out iterations up to this index, which are known already.
+
+        Returns:
+            Each iteration and each state, the one in which it ended last.
         """
 
     async def wait(self, job_id: str) -> JobView:

@@ -57,16 +57,26 @@ class Attempts:
     """The attempts at one call: counts failures, and says when to try again or what went wrong."""
 
     def __init__(self, call: Call[T], url: str, backoff: Backoff) -> None:
+        """Begin with the first attempt.
+
+        Args:
+            call: What is sent.
+            url: Of the server, for messages.
+            backoff: How long to wait before which of the further attempts.
+        """
         self._repeatable = call.repeatable
         self._url = url
         self._backoff = backoff
         self._failures = 0
 
     def after_failure(self, error: httpx2.HTTPError) -> float:
-        """Seconds to wait before the next attempt.
+        """Decide what follows a call that got no answer.
 
         Args:
             error: Why there is no answer.
+
+        Returns:
+            Time to wait before the next attempt [s].
 
         Raises:
             StoreUnavailable: There is to be no further attempt.
@@ -77,10 +87,13 @@ class Attempts:
         return seconds
 
     def after_refusal(self, response: httpx2.Response) -> float:
-        """Seconds to wait before the next attempt.
+        """Decide what follows an error of the server.
 
         Args:
-            response: An error of the server, with its body.
+            response: The error, with its body.
+
+        Returns:
+            Time to wait before the next attempt [s].
 
         Raises:
             GaitswarmError: There is to be no further attempt: the error that the server had.
@@ -102,9 +115,21 @@ class Attempts:
 
 
 class Following:
-    """What has been seen of a job's events, over all connections that it took."""
+    """What has been seen of a job's events, over all connections that it took.
+
+    Attributes:
+        last: Index of the last iteration that was seen; None before the first.
+        ended: Whether the job has ended, so that nothing more comes.
+    """
 
     def __init__(self, url: str, after: int | None, backoff: Backoff) -> None:
+        """Begin to follow a job.
+
+        Args:
+            url: Of the server, for messages.
+            after: Index of the last iteration that is known already; None for none.
+            backoff: How long to wait before which of the further connections.
+        """
         self.last = after
         self.ended = False
         self._url = url
@@ -113,7 +138,14 @@ class Following:
         self._failures = 0
 
     def event(self, sent: httpx2.ServerSentEvent) -> JobEvent | None:
-        """The event that was sent; None if it is no news."""
+        """Read what the server sent.
+
+        Args:
+            sent: An event of the stream.
+
+        Returns:
+            The job's event; None if it is no news.
+        """
         self._failures = 0
         if sent.event == "iteration":
             iteration = IterationView.model_validate_json(sent.data)
@@ -128,10 +160,13 @@ class Following:
         return None if state.state is told else state
 
     def after_break(self, error: httpx2.HTTPError | StoreUnavailable | None) -> float:
-        """Seconds to wait before connecting again.
+        """Decide what follows the end of a connection.
 
         Args:
             error: What broke the connection; None where the server ended the stream.
+
+        Returns:
+            Time to wait before connecting again [s].
 
         Raises:
             StoreUnavailable: It broke too often in a row.
@@ -148,7 +183,19 @@ class Following:
 
 
 def result(call: Call[T], response: httpx2.Response, url: str) -> T:
-    """What a successful answer says. Raises StoreUnavailable if it makes no sense."""
+    """What a successful answer says.
+
+    Args:
+        call: What was sent.
+        response: The answer, with its body.
+        url: Of the server, for messages.
+
+    Returns:
+        The call's result.
+
+    Raises:
+        StoreUnavailable: The answer makes no sense.
+    """
     try:
         return call.read(response.content)
     except ValueError as error:
@@ -156,7 +203,15 @@ def result(call: Call[T], response: httpx2.Response, url: str) -> T:
 
 
 def unreachable(url: str, error: Exception) -> StoreUnavailable:
-    """The server did not answer."""
+    """The error for a server that did not answer.
+
+    Args:
+        url: Of the server.
+        error: Why there is no answer.
+
+    Returns:
+        The error, to be raised.
+    """
     return StoreUnavailable(
         f"server {url}: {str(error) or type(error).__name__}; start one with `gaitswarm serve`, or"
         " check the URL"
@@ -164,14 +219,28 @@ def unreachable(url: str, error: Exception) -> StoreUnavailable:
 
 
 def foreign(url: str) -> StoreUnavailable:
-    """The server answered something else."""
+    """The error for a server that answered something else.
+
+    Args:
+        url: Of the server.
+
+    Returns:
+        The error, to be raised.
+    """
     return StoreUnavailable(
         f"server {url} does not answer as a gaitswarm server of this version does"
     )
 
 
 def error_of(response: httpx2.Response) -> GaitswarmError:
-    """The error that the server had, again."""
+    """The error that the server had, again.
+
+    Args:
+        response: An answer that is no success, with its body.
+
+    Returns:
+        The error, to be raised.
+    """
     try:
         problem = ProblemView.model_validate_json(response.content)
     except ValidationError:

@@ -79,20 +79,36 @@ class Call(Generic[T]):
 
 
 def submit(spec: Spec, key: str) -> Call[JobView]:
-    """Queue a job."""
+    """Queue a job.
+
+    Args:
+        spec: What it is to do.
+        key: Idempotency key: the same key and spec again make no second job.
+    """
     headers = {IDEMPOTENCY_KEY: key}
     return _posted("/jobs", JobView, spec, headers)
 
 
 def estimate(spec: Spec) -> Call[EstimateView]:
-    """Say what a job would cost."""
+    """Say what a job would cost.
+
+    Args:
+        spec: What it would do.
+    """
     return _posted("/estimates", EstimateView, spec, reads=True)
 
 
 def jobs(
     state: JobState | None, search: str, order: JobOrder, after: str | None
 ) -> Call[PageView[JobSummaryView]]:
-    """A page of the list of jobs."""
+    """A page of the list of jobs.
+
+    Args:
+        state: Of the jobs; None for any.
+        search: Text that name or id contains, whatever its case.
+        order: In which they are listed.
+        after: `next` of the page before; None for the first page.
+    """
     chosen = {"search": search, "order": order.value}
     if state is not None:
         chosen["state"] = state.value
@@ -100,40 +116,75 @@ def jobs(
 
 
 def job(job_id: str) -> Call[JobView]:
-    """Look at one job."""
+    """Look at one job.
+
+    Args:
+        job_id: Identifier of the job.
+    """
     return _got(_job(job_id), JobView)
 
 
 def command(job_id: str, asked: Command, accept_changes: bool) -> Call[JobView]:
-    """Pause, resume or cancel."""
+    """Pause, resume or cancel.
+
+    Args:
+        job_id: Identifier of the job.
+        asked: Which of these.
+        accept_changes: Whether a job that is resumed goes on although what its numbers depend on
+            has changed.
+    """
     body = json.dumps({"accept_changes": True}) if accept_changes else None
     return Call("POST", f"{_job(job_id)}/{asked.value}", JobView.model_validate_json, body=body)
 
 
 def extend(job_id: str, iterations: int) -> Call[JobView]:
-    """Give a job another budget."""
+    """Give a job another budget.
+
+    Args:
+        job_id: Identifier of the job.
+        iterations: The budget, in all.
+    """
     body = json.dumps({"iterations": iterations})
     return Call("POST", f"{_job(job_id)}/extend", JobView.model_validate_json, body=body)
 
 
 def best(job_id: str) -> Call[BestView]:
-    """Take the best design."""
+    """Take the best design.
+
+    Args:
+        job_id: Identifier of the job.
+    """
     return _got(f"{_job(job_id)}/best", BestView)
 
 
 def iterations(job_id: str, after: str | None) -> Call[PageView[IterationView]]:
-    """A page of a job's committed iterations."""
+    """A page of a job's committed iterations.
+
+    Args:
+        job_id: Identifier of the job.
+        after: `next` of the page before; None for the first page.
+    """
     return _page(f"{_job(job_id)}/iterations", PageView[IterationView], after)
 
 
 def evaluations_of(job_id: str, iteration: int) -> Call[CatalogueView[EvaluationView]]:
-    """Every particle of one iteration."""
+    """Every particle of one iteration.
+
+    Args:
+        job_id: Identifier of the job.
+        iteration: Its index.
+    """
     path = f"{_job(job_id)}/iterations/{iteration}/evaluations"
     return _got(path, CatalogueView[EvaluationView])
 
 
 def evaluations(job_id: str, spec: Spec) -> Call[EvaluationTable]:
-    """Every evaluation of a job at once."""
+    """Every evaluation of a job at once.
+
+    Args:
+        job_id: Identifier of the job.
+        spec: Of the job, which names the columns.
+    """
 
     def read(content: bytes) -> EvaluationTable:
         return EvaluationTable.from_parquet(spec, content)
@@ -142,12 +193,22 @@ def evaluations(job_id: str, spec: Spec) -> Call[EvaluationTable]:
 
 
 def export(job_id: str, file_format: TableFormat) -> Call[bytes]:
-    """Every evaluation of a job as a file."""
+    """Every evaluation of a job as a file.
+
+    Args:
+        job_id: Identifier of the job.
+        file_format: Of the file.
+    """
     return Call("GET", f"{_job(job_id)}/export", bytes, {"format": file_format})
 
 
 def events(job_id: str, last: int | None) -> Call[bytes]:
-    """The stream of what happens to a job, after one iteration."""
+    """The stream of what happens to a job, after one iteration.
+
+    Args:
+        job_id: Identifier of the job.
+        last: Index of that iteration; None for all from the beginning.
+    """
     headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
     if last is not None:
         headers["Last-Event-ID"] = str(last)
@@ -155,29 +216,50 @@ def events(job_id: str, last: int | None) -> Call[bytes]:
 
 
 def ranking(job_id: str, request: RankingRequest) -> Call[RankingView]:
-    """Judge all designs of a job by another preference."""
+    """Judge all designs of a job by another preference.
+
+    Args:
+        job_id: Identifier of the job.
+        request: The preference, and how many designs to list.
+    """
     return _posted(f"{_job(job_id)}/ranking", RankingView, request, reads=True)
 
 
 def parameters(job_ids: Sequence[str]) -> Call[IdentifiabilityView]:
-    """See which parameters runs agree on."""
+    """Find out which parameters runs agree on.
+
+    Args:
+        job_ids: Identifiers of the runs, at least one.
+    """
     first, *others = job_ids
     path = f"{_job(first)}/parameters"
     return Call("GET", path, IdentifiabilityView.model_validate_json, {"also": others})
 
 
 def record(walk: RecordedWalk) -> Call[RecordingView]:
-    """Keep a recorded walk."""
+    """Keep a recorded walk.
+
+    Args:
+        walk: As it was measured.
+    """
     return _posted("/recordings", RecordingView, walk)
 
 
 def recording(recording_id: str) -> Call[RecordedWalk]:
-    """Take a recorded walk."""
+    """Take a recorded walk.
+
+    Args:
+        recording_id: Its identifier.
+    """
     return _got(f"/recordings/{_segment(recording_id, 'recording')}", RecordedWalk)
 
 
 def simulate(request: SimulationRequest) -> Call[SimulationResult]:
-    """Let one design walk."""
+    """Let one design walk.
+
+    Args:
+        request: The design and its walks.
+    """
 
     def read(content: bytes) -> SimulationResult:
         return SimulationResult.from_view(SimulationView.model_validate_json(content))
@@ -186,13 +268,22 @@ def simulate(request: SimulationRequest) -> Call[SimulationResult]:
 
 
 def replay(request: ReplayRequest) -> Call[WalkReplay]:
-    """Let one design walk, to look at it."""
+    """Let one design walk, to look at it.
+
+    Args:
+        request: The design and its walk.
+    """
     body = request.model_dump_json()
     return Call("POST", "/replays", decoded_replay, body=body, reads=True)
 
 
 def surface(controller: ControllerName, request: SurfaceRequest) -> Call[SurfaceView]:
-    """Take a fuzzy controller's surfaces."""
+    """Take a fuzzy controller's surfaces.
+
+    Args:
+        controller: Name of the controller.
+        request: The design, and how finely to look at it.
+    """
     path = f"/controllers/{_segment(controller, 'controller')}/surface"
     return _posted(path, SurfaceView, request, reads=True)
 

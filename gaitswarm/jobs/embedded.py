@@ -23,9 +23,15 @@ _TAKEN_UP: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """What walks run on: a kind of workers to open, or workers that are open already.
+    """What walks run on.
 
-    Raises InvalidRequest for a kind that does not exist, and for no processor.
+    Attributes:
+        evaluator: A kind of workers to open, or workers that are open already.
+        cpus: Walks to compute at once on this machine; all of its cores by default.
+        ray_address: Of a Ray cluster; None starts one that ends with this process.
+
+    Raises:
+        InvalidRequest: The kind does not exist, or `cpus` is less than 1.
     """
 
     evaluator: EvaluatorKind | Evaluator
@@ -43,7 +49,11 @@ class Workers:
 
     @contextmanager
     def when_needed(self) -> Iterator[Evaluator | Callable[[], Evaluator]]:
-        """Workers that are open already, or a function that opens them: these are closed again."""
+        """Open workers no earlier than they are needed, and close those again.
+
+        Yields:
+            Workers that are open already, or a function that opens them at its first call.
+        """
         if not isinstance(self.evaluator, str):
             yield self.evaluator
             return

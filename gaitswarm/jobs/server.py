@@ -318,14 +318,32 @@ class ServerJobs(Jobs):
 
 
 def server_url(url: str) -> str:
-    """The URL without a slash at its end. Raises InvalidRequest."""
+    """A server's URL without a slash at its end.
+
+    Args:
+        url: As a user gave it.
+
+    Returns:
+        The same, without that slash.
+
+    Raises:
+        InvalidRequest: It is not a URL of HTTP.
+    """
     if not url.startswith(("http://", "https://")):
         raise InvalidRequest(f"{url!r} is not a URL like http://127.0.0.1:8000", field="server")
     return url.rstrip("/")
 
 
 def request_of(client: httpx2.Client | httpx2.AsyncClient, call: Call[T]) -> httpx2.Request:
-    """A call as the client sends it."""
+    """A call as the client sends it.
+
+    Args:
+        client: Which knows the server's URL.
+        call: What is asked.
+
+    Returns:
+        The request, with body and headers.
+    """
     headers = dict(call.headers)
     if call.body is not None:
         headers["Content-Type"] = "application/json"

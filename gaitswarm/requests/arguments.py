@@ -33,29 +33,79 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def state(text: JobState | str | None) -> JobState | None:
-    """A job's state by name; None for any."""
+    """A job's state by name.
+
+    Args:
+        text: The name; None for any state.
+
+    Returns:
+        The state, None for any.
+
+    Raises:
+        InvalidRequest: There is none of this name.
+    """
     return None if text is None else _one_of(JobState, text, "state")
 
 
 def order(text: JobOrder | str) -> JobOrder:
-    """An order by name."""
+    """An order of the job list by name.
+
+    Args:
+        text: The name.
+
+    Returns:
+        The order.
+
+    Raises:
+        InvalidRequest: There is none of this name.
+    """
     return _one_of(JobOrder, text, "order")
 
 
 def command(text: Command | str) -> Command:
-    """A command by name."""
+    """A command to a job by name.
+
+    Args:
+        text: The name.
+
+    Returns:
+        The command.
+
+    Raises:
+        InvalidRequest: There is none of this name.
+    """
     return _one_of(Command, text, "command")
 
 
 def controller(name: str) -> ControllerName:
-    """A controller by name. Raises NotFound."""
+    """A controller by name.
+
+    Args:
+        name: The name.
+
+    Returns:
+        The same.
+
+    Raises:
+        NotFound: There is none of this name.
+    """
     if name not in CONTROLLERS:
         raise NotFound(f"no controller {name!r}; known are {', '.join(CONTROLLERS)}")
     return name
 
 
 def table_format(text: str) -> TableFormat:
-    """A file's format by name."""
+    """A file's format by name.
+
+    Args:
+        text: The name.
+
+    Returns:
+        The format.
+
+    Raises:
+        InvalidRequest: There is none of this name; its field is `file_format`.
+    """
     if text not in get_args(TableFormat):
         known = ", ".join(get_args(TableFormat))
         raise InvalidRequest(f"{text!r} is none of {known}", field="file_format")
@@ -63,14 +113,35 @@ def table_format(text: str) -> TableFormat:
 
 
 def runs(job_ids: Sequence[str]) -> Sequence[str]:
-    """Ids of at least one job."""
+    """Ids of jobs.
+
+    Args:
+        job_ids: At least one.
+
+    Returns:
+        The same.
+
+    Raises:
+        InvalidRequest: There is none, or it is a single text.
+    """
     if isinstance(job_ids, str) or not job_ids:
         raise InvalidRequest("must be a list of at least one id", field="job_ids")
     return job_ids
 
 
 def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
-    """By what to judge the designs of a job anew."""
+    """By what to judge the designs of a job anew.
+
+    Args:
+        preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+        top: How many of the best designs to list.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
     return _valid(RankingRequest, {"preference": preference, "top": top})
 
 
@@ -83,7 +154,22 @@ def simulation(
     preference: PreferenceInput,
     log: bool,
 ) -> SimulationRequest:
-    """One design and the walks in which to try it; scenarios None: all presets."""
+    """One design and the walks in which to try it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        scenarios: Names or numbers of presets, or `Scenario`; None for all presets.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+        log: Whether to record every walk at 500 Hz.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
     document: dict[str, Any] = {
         "robot": robot_source(robot),
         "controller": controller,
@@ -104,7 +190,21 @@ def replay(
     robot: RobotInput,
     rate: float,
 ) -> ReplayRequest:
-    """One design and the walk in which to look at it."""
+    """One design and the walk in which to look at it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        scenario: Name or number of a preset, or `Scenario`.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        rate: Frames a second [Hz].
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
     document: dict[str, Any] = {
         "robot": robot_source(robot),
         "controller": controller,
@@ -122,7 +222,20 @@ def surface(
     current_points: int,
     velocity_error: float,
 ) -> SurfaceRequest:
-    """One design of a fuzzy controller, and how finely to look at it."""
+    """One design of a fuzzy controller, and how finely to look at it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        error_points: Points of the grid over the error's range.
+        current_points: Points of the grid over the current's range.
+        velocity_error: At which the surfaces of fuzzy-pi-3 are taken [counts/s].
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
     document: dict[str, Any] = {
         "design": _design(design),
         "error_points": error_points,

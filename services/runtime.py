@@ -46,7 +46,13 @@ def open_evaluator(
 
 @dataclass(frozen=True, slots=True)
 class Runtime:
-    """What was opened. evaluator and runner are None in a process that runs no jobs."""
+    """What was opened.
+
+    Attributes:
+        service: On the database's jobs.
+        evaluator: Where walks run; None in a process that runs no jobs.
+        runner: What runs the jobs; None in a process that runs none.
+    """
 
     service: JobService
     evaluator: Evaluator | None

@@ -25,7 +25,15 @@ _NO_STATUS: Final = 255
 
 @dataclass(slots=True, eq=False)
 class Batch:
-    """One request under way. missing: its chunks that have no result yet."""
+    """One request under way.
+
+    Attributes:
+        request: What was asked.
+        outcomes: One per case, filled in as results come.
+        missing: Chunks that have no result yet.
+        error: With which the request failed; None if it has not.
+        dropped: Whether nobody waits for it any more.
+    """
 
     request: EvaluationRequest
     outcomes: tuple[Outcome, ...]
@@ -54,7 +62,10 @@ class Batch:
 class Work:
     """A chunk of a batch, as it waits, runs, and is perhaps run again.
 
-    attempts: how often it was sent out before.
+    Attributes:
+        batch: Which it belongs to.
+        chunk: Some of the batch's designs in one case.
+        attempts: How often it was sent out before.
     """
 
     batch: Batch
@@ -78,6 +89,10 @@ class Dispatcher:
 
     Thread-safe. `evaluate` is called by those who want results, `take`, `complete`, `again` and
     `fail` by those who run the tasks.
+
+    Attributes:
+        slots: Tasks that run at the same time.
+        lanes: Tells how many designs the kernel steps at once.
     """
 
     slots: int
@@ -181,7 +196,11 @@ class Dispatcher:
         return self._closed is not None
 
     def close(self, reason: str) -> None:
-        """Take no more work; requests under way end with EvaluatorUnavailable. Idempotent."""
+        """Take no more work; requests under way end with EvaluatorUnavailable. Idempotent.
+
+        Args:
+            reason: For people; the first one counts.
+        """
         with self._changed:
             self._closed = self._closed or reason
             self._queue.discard(lambda _: True)

@@ -91,7 +91,11 @@ class Task:
     provenance: Provenance
 
     def run(self) -> Answer:
-        """Put them to it, unless this process computes something else."""
+        """Put the designs to the case, unless this process computes something else.
+
+        Returns:
+            The outcome, or None in its place, with the provenance of this process.
+        """
         here = provenance_of(self.case.robot)
         outcome = self.case.run(self.designs) if here == self.provenance else None
         return Answer(here, outcome, platform.node())
@@ -101,8 +105,10 @@ class Task:
 class Answer:
     """What a task came to.
 
-    provenance: that of the process that ran it. outcome: None if it is not what the task asks for,
-    so that nothing was computed. host: name of the machine.
+    Attributes:
+        provenance: That of the process that ran it.
+        outcome: None if the provenance is not what the task asks for, so that nothing was computed.
+        host: Name of the machine.
     """
 
     provenance: Provenance
@@ -112,7 +118,11 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """What the simulation raised, on its way back from another process."""
+    """What the simulation raised, on its way back from another process.
+
+    Attributes:
+        error: The exception, or one that can be sent in its place.
+    """
 
     error: Exception
 

@@ -14,8 +14,10 @@ from sim.outcome import Outcome
 class Claimed:
     """The job is ours.
 
-    provenance: what numbers that are computed from here depend on. accepts_changes: whether whoever
-        runs the job goes on although that has changed.
+    Attributes:
+        claim: With the job as it was when it was claimed.
+        provenance: What numbers that are computed from here depend on.
+        accepts_changes: Whether whoever runs the job goes on although that has changed.
     """
 
     claim: Claim
@@ -25,7 +27,12 @@ class Claimed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluated:
-    """The ask was evaluated. outcomes: one per case; seconds: how long it took."""
+    """The ask was evaluated.
+
+    Attributes:
+        outcomes: One per case, of all designs.
+        seconds: How long it took [s].
+    """
 
     outcomes: tuple[Outcome, ...]
     seconds: float
@@ -33,14 +40,22 @@ class Evaluated:
 
 @dataclass(frozen=True, slots=True)
 class EvaluationFailed:
-    """The simulation refused the request, or has a bug: trying again would not help."""
+    """The simulation refused the request, or has a bug: trying again would not help.
+
+    Attributes:
+        reason: For people.
+    """
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluatorLost:
-    """The workers could not be reached: trying again may help."""
+    """The workers could not be reached: trying again may help.
+
+    Attributes:
+        reason: For people.
+    """
 
     reason: str
 
@@ -52,14 +67,22 @@ class Waited:
 
 @dataclass(frozen=True, slots=True)
 class Committed:
-    """The iteration is stored. state: the job's state after it."""
+    """The iteration is stored.
+
+    Attributes:
+        state: Of the job after it.
+    """
 
     state: JobState
 
 
 @dataclass(frozen=True, slots=True)
 class Extended:
-    """Nothing is stored: the job has another budget, under which what follows is to be asked."""
+    """Nothing is stored: the job has another budget, under which what follows is to be asked.
+
+    Attributes:
+        job: With that budget.
+    """
 
     job: Job
 
@@ -95,28 +118,45 @@ Event = (
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Store what the next iterations depend on."""
+    """Store what the next iterations depend on.
+
+    Attributes:
+        provenance: Of the process that runs the job.
+    """
 
     provenance: JobProvenance
 
 
 @dataclass(frozen=True, slots=True)
 class Begin:
-    """Store the first ask."""
+    """Store the first ask.
+
+    Attributes:
+        ask: What is to be evaluated first.
+    """
 
     ask: Ask
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Run the walks of the stored ask."""
+    """Run the walks of the stored ask.
+
+    Attributes:
+        request: Its designs and cases.
+    """
 
     request: EvaluationRequest
 
 
 @dataclass(frozen=True, slots=True)
 class Commit:
-    """Store the iteration and the ask that follows it, None at the end of the budget."""
+    """Store the iteration and the ask that follows it.
+
+    Attributes:
+        done: The iteration, with what it came to.
+        following: The next ask; None at the end of the budget.
+    """
 
     done: CompletedIteration
     following: Ask | None
@@ -124,7 +164,12 @@ class Commit:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Let this many seconds pass."""
+    """Let some time pass.
+
+    Attributes:
+        seconds: How long [s].
+        reason: Why, for people.
+    """
 
     seconds: float
     reason: str
@@ -132,7 +177,12 @@ class Wait:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Give up the lease."""
+    """Give up the lease.
+
+    Attributes:
+        state: In which the job is left.
+        error: Why it failed, for people; None if it did not.
+    """
 
     state: JobState
     error: str | None = None

@@ -103,7 +103,12 @@ def _sqlite_url(path: str, forms: str) -> URL:
 
 @dataclass(frozen=True, slots=True)
 class Database:
-    """An engine and the name by which messages call its database (without password)."""
+    """An engine and its name.
+
+    Attributes:
+        engine: Connections to the database.
+        name: By which messages call the database, without password.
+    """
 
     engine: Engine
     name: str

@@ -21,7 +21,11 @@ _LARGEST_PAGE: Final = 10_000
 
 
 class SqlHistory:
-    """Those methods of `Store` that read committed iterations."""
+    """Those methods of `Store` that read committed iterations.
+
+    Args:
+        database: With the newest schema.
+    """
 
     def __init__(self, database: Database) -> None:
         self._database = database

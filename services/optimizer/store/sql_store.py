@@ -94,7 +94,12 @@ def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
 
 
 class SqlStore(SqlHistory):
-    """`Store` on a database that has the newest schema. See `open_store`."""
+    """`Store` on a database that has the newest schema, such as `open_store` gives.
+
+    Args:
+        database: Closed with this.
+        clock: Tells the time of all that is stored.
+    """
 
     def __init__(self, database: Database, *, clock: Clock = database_time) -> None:
         super().__init__(database)

@@ -85,6 +85,24 @@ def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[int, 
     return round(physics_rate * CONTROL_PERIOD), 1.0 / physics_rate
 
 
+def check_stuck_leg(robot: Robot, scenario: Scenario) -> None:
+    """Check that the leg that a scenario jams is one of the robot's.
+
+    Args:
+        robot: That is to walk.
+        scenario: The walk.
+
+    Raises:
+        SimulationInputError: The robot has no such leg; names those that it has.
+    """
+    legs = [leg.name for leg in robot.legs]
+    if scenario.stuck_leg is not None and scenario.stuck_leg not in legs:
+        raise SimulationInputError(
+            f"stuck_leg: {robot.description.name} has no leg {scenario.stuck_leg!r};"
+            f" its legs are {', '.join(legs)}"
+        )
+
+
 def plan_walk(
     robot: Robot,
     scenario: Scenario,
@@ -104,14 +122,19 @@ def plan_walk(
 
     Returns:
         From a control law to the walk; None for a gait out of the legs' reach.
+
+    Raises:
+        SimulationInputError: The scenario jams a leg that the robot does not have.
     """
+    check_stuck_leg(robot, scenario)
     trajectory = trajectory or desired_angles(robot, scenario)
     if not trajectory.reachable:
         return None
     ticks, n_joints = trajectory.angles.shape
     weight = (robot.mass + scenario.load) * -gravity_on(scenario.slope)[2]
     joints = trajectory.angles[0]
-    base = [0.0, 0.0, resting_height(robot, joints, weight), 0.0, 0.0, 0.0, 1.0]
+    height = resting_height(robot, joints, weight) + scenario.drop
+    base = [0.0, 0.0, height, 0.0, 0.0, 0.0, 1.0]
     internal_state = np.zeros(internal_state_size(robot))
     if robot.has_backlash:
         internal_state[:n_joints] = joints
@@ -123,6 +146,7 @@ def plan_walk(
         pack_parameters(robot, scenario, timestep),
         codes.astype(np.int32),
         fall_height=0.5 * scenario.hip_height,
+        drop=scenario.drop,
         disturbance=None if noise is None else noise.torques(ticks, n_joints),
     )
 
@@ -146,7 +170,7 @@ def judge(
         return result.status, objectives
     steps = setup.ticks * substeps
     objectives[:3] = np.sqrt(result.sums[:3] / steps)
-    objectives[5] = result.end[2] - setup.start[2]
+    objectives[5] = result.end[2] - (setup.start[2] - setup.drop)
     distance = result.sums[4] * timestep
     if distance < SHORTEST_WALK:
         return Status.STALLED, objectives

@@ -111,6 +111,19 @@ class Scenario(BaseModel):
     cycles: float = Field(
         default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."
     )
+    stuck_leg: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=60,
+        description="Name of the leg whose coxa is jammed at its first angle; by default none.",
+        examples=["right_middle"],
+    )
+    drop: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=0.5,
+        description="Height above its stance from which the robot is dropped at the start [m].",
+    )
 
     @model_validator(mode="before")
     @classmethod

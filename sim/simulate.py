@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import PHYSICS_RATE, Backend, control_steps, judge, kernel_of, plan_walk
+from sim.assembly import (
+    PHYSICS_RATE,
+    Backend,
+    check_stuck_leg,
+    control_steps,
+    judge,
+    kernel_of,
+    plan_walk,
+)
 from sim.compiler.compilation import target
 from sim.controllers import CONTROLLERS, ControlLaw
 from sim.controllers.fixed_point import CONTROL_PERIOD
@@ -112,7 +120,7 @@ def check_reach(
     *,
     robot: RobotChoice,
 ) -> None:
-    """Check that the legs reach all of a walk.
+    """Check that a robot can begin a walk: it has the leg that is jammed, and its legs reach all.
 
     Args:
         scenario: The walk.
@@ -122,13 +130,16 @@ def check_reach(
 
     Raises:
         UnreachablePose: A foot's target lies outside its leg's reach.
+        SimulationInputError: The scenario jams a leg that the robot does not have.
     """
+    machine = load_robot(robot)
+    check_stuck_leg(machine, scenario)
     gait = {
         name: value
         for name, value in zip(variables, design, strict=True)
         if name in GAIT_VARIABLE_NAMES
     }
-    require_reachable(load_robot(robot), with_gait(scenario, gait))
+    require_reachable(machine, with_gait(scenario, gait))
 
 
 def prepare(robot: RobotChoice = "szabadka2", *, backend: Backend = "auto") -> str:

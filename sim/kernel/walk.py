@@ -86,6 +86,7 @@ class WalkSetup:
         fall_height: of the body; below it the robot has fallen [m].
         fall_cosine: of the tilt; below it the robot has fallen.
         disturbance: torques on the links, (T, J) [N m], or None.
+        drop: height of the start above the stance at which the soles carry the weight [m].
     """
 
     start: Floats
@@ -96,6 +97,7 @@ class WalkSetup:
     fall_height: float
     fall_cosine: float = 0.5**0.5
     disturbance: Floats | None = None
+    drop: float = 0.0
 
     @property
     def ticks(self) -> int:

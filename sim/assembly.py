@@ -18,7 +18,7 @@ from sim.kernel.native import native_kernel
 from sim.kernel.parameters import gravity_on, internal_state_size, pack_parameters
 from sim.kernel.walk import Kernel, WalkResult, WalkSetup
 from sim.noise import LinkNoise
-from sim.outcome import N_OBJECTIVES, Status
+from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
 from sim.robot import Robot
 from sim.robot.posture import resting_height
 from sim.scenario import Scenario
@@ -146,6 +146,7 @@ def plan_walk(
         pack_parameters(robot, scenario, timestep),
         codes.astype(np.int32),
         fall_height=0.5 * scenario.hip_height,
+        energy=robot.description.supply.energy,
         drop=scenario.drop,
         disturbance=None if noise is None else noise.torques(ticks, n_joints),
     )
@@ -174,6 +175,40 @@ def judge(
     distance = result.sums[4] * timestep
     if distance < SHORTEST_WALK:
         return Status.STALLED, objectives
-    objectives[3] = result.sums[3] * timestep / distance
+    objectives[3] = _energy_sum(setup, result) * timestep / distance
     objectives[4] = steps * timestep / distance
     return Status.OK, objectives
+
+
+def measure(setup: WalkSetup, result: WalkResult, substeps: int) -> NDArray[np.float64]:
+    """What a walk tells beside its objectives.
+
+    Args:
+        setup: The walk.
+        result: What the kernel made of it.
+        substeps: Physics steps a control tick.
+
+    Returns:
+        (5,) in the order of `sim.outcome.MEASUREMENTS`, NaN for a walk that ended early.
+    """
+    if result.status is not Status.OK:
+        return np.full(N_MEASUREMENTS, np.nan)
+    steps, motors = setup.ticks * substeps, setup.desired.shape[1]
+    forward_speed, _, absolute_current, heat = result.sums[4:].tolist()
+    return np.array(
+        [
+            result.peak_current,
+            absolute_current / (steps * motors),
+            heat / steps,
+            _energy_sum(setup, result) / steps,
+            forward_speed / steps,
+        ]
+    )
+
+
+def _energy_sum(setup: WalkSetup, result: WalkResult) -> float:
+    """Electrical power that counts as spent, summed over physics steps [W]."""
+    signed, absolute = float(result.sums[3]), float(result.sums[5])
+    return {"signed": signed, "positive": 0.5 * (signed + absolute), "absolute": absolute}[
+        setup.energy
+    ]

@@ -84,6 +84,34 @@ OBJECTIVES: Final[tuple[Objective, ...]] = (
 )
 """Objectives of a walk (thesis table 4.1): columns of its objectives array, in order."""
 
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """One thing that a walk tells beside its objectives.
+
+    Attributes:
+        name: as in tables and JSON.
+        unit: of its values.
+        description: for people.
+    """
+
+    name: str
+    unit: str
+    description: str
+
+
+MEASUREMENTS: Final[tuple[Measurement, ...]] = (
+    Measurement("peak_current", "A", "largest absolute current of any motor at any physics step"),
+    Measurement("mean_current", "A", "mean over time and motors of the absolute current"),
+    Measurement("motor_heat", "W", "mean of what all windings turn to heat, R I^2"),
+    Measurement("power", "W", "mean electrical power of all motors, what f4 counts as spent"),
+    Measurement("speed", "m/s", "mean forward speed"),
+)
+"""What a walk tells beside its objectives: columns of a measurements array, in order."""
+
+MEASUREMENT_NAMES: Final = tuple(measurement.name for measurement in MEASUREMENTS)
+N_MEASUREMENTS: Final = len(MEASUREMENTS)
+
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in OBJECTIVES)
 N_OBJECTIVES: Final = len(OBJECTIVES)
 
@@ -108,3 +136,39 @@ class Outcome:
                 f"an outcome of {n} designs needs objectives of shape ({n}, m),"
                 f" not {self.objectives.shape}"
             )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurements:
+    """What the walks of n designs tell beside their objectives, NaN where a walk ended early.
+
+    Attributes:
+        peak_current: largest absolute current of any motor at any physics step, (n,) [A].
+        mean_current: mean over time and motors of the absolute current, (n,) [A].
+        motor_heat: mean of what all windings turn to heat, R I^2, (n,) [W].
+        power: mean electrical power of all motors, as far as it counts as spent
+            (`sim.robot.description.Supply.energy`), (n,) [W].
+        speed: mean forward speed, (n,) [m/s].
+    """
+
+    peak_current: NDArray[np.float64]
+    mean_current: NDArray[np.float64]
+    motor_heat: NDArray[np.float64]
+    power: NDArray[np.float64]
+    speed: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, rows: NDArray[np.float64]) -> Measurements:
+        """Measurements from an array.
+
+        Args:
+            rows: (n, 5), columns as in `MEASUREMENTS`.
+
+        Returns:
+            The measurements.
+        """
+        return cls(**dict(zip(MEASUREMENT_NAMES, rows.T.copy(), strict=True)))
+
+    def array(self) -> NDArray[np.float64]:
+        """All of them, (n, 5), columns as in `MEASUREMENTS`."""
+        return np.stack([getattr(self, name) for name in MEASUREMENT_NAMES], axis=1)

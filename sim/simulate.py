@@ -1,4 +1,4 @@
-"""The entry point: a batch of designs in one scenario -> objectives and statuses."""
+"""The entry point: designs in one scenario -> objectives, statuses, measurements."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from sim.assembly import (
     control_steps,
     judge,
     kernel_of,
+    measure,
     plan_walk,
 )
 from sim.compiler.compilation import target
@@ -25,7 +26,7 @@ from sim.gait.trajectory import desired_angles, require_reachable
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Coding, WalkSetup
 from sim.noise import LinkNoise
-from sim.outcome import N_OBJECTIVES, Outcome, Status
+from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import Robot, RobotChoice, load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
 
@@ -36,11 +37,13 @@ class Simulation:
 
     Attributes:
         outcome: of all designs.
+        measurements: of all designs: currents, heat, power and speed.
         logs: of every walk, if they were asked for. A design that was never simulated
             (unreachable) has none; one that ended early has NaN after its end.
     """
 
     outcome: Outcome
+    measurements: Measurements
     logs: tuple[WalkLog | None, ...] = ()
 
 
@@ -74,7 +77,7 @@ def simulate(
         physics_rate: Physics steps a second [Hz], a multiple of the control rate.
 
     Returns:
-        Outcomes and logs. A design's bits do not depend on the designs beside it.
+        Outcomes, measurements and logs. A design's bits do not depend on the designs beside it.
 
     Raises:
         SimulationInputError: A design cannot be simulated; names the variable.
@@ -85,6 +88,7 @@ def simulate(
     substeps, timestep = control_steps(machine, physics_rate)
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
+    measured = np.full((len(designs), N_MEASUREMENTS), np.nan)
     setups: dict[int, WalkSetup] = {}
     plans: dict[tuple[float, ...], Callable[[ControlLaw], WalkSetup] | None] = {}
     for index, row in enumerate(designs.tolist()):
@@ -108,9 +112,12 @@ def simulate(
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
         statuses[index], objectives[index] = judge(setup, result, substeps, timestep)
+        measured[index] = measure(setup, result, substeps)
         if result.states is not None:
             logs[index] = walk_log(machine, setup, result.states)
-    return Simulation(Outcome(objectives, statuses), tuple(logs) if log else ())
+    return Simulation(
+        Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
+    )
 
 
 def check_reach(

@@ -5,7 +5,7 @@
 
 #define NQ (7 + NJ)
 #define NV (6 + NJ)
-#define N_INTEGRANDS 5
+#define N_INTEGRANDS 8
 #define NLOG (NQ + NV + NI + NJ)
 
 enum { OK = 0, DIVERGED = 1, FELL = 2 };
@@ -41,6 +41,7 @@ typedef struct {
   double *sums;        /* N_INTEGRANDS, summed over physics steps */
   double *end;         /* NQ, final position */
   double *log;         /* ticks x NLOG: q, v, internal state, duty; or NULL */
+  double peak_current; /* largest |I| of any motor [A] */
   int64_t status;
 } Walker;
 
@@ -148,7 +149,7 @@ static ivec all_finite(const vec *q, const vec *v, const vec *internal)
 static void walk(Walker *const *lane, const Coding *c)
 {
   vec q[2][NQ], v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
-  vec sums[N_INTEGRANDS], integrands[N_INTEGRANDS];
+  vec sums[N_INTEGRANDS], integrands[N_INTEGRANDS], largest, peak = SPLAT(0.0);
   Past past;
   int walking[LANES];
   int64_t last = 0;
@@ -172,9 +173,10 @@ static void walk(Walker *const *lane, const Coding *c)
     write_log(lane, walking, tick, q[now], v[now], internal[now], duty);
     for (int64_t n = 0; n < c->substeps; n++) {
       step(q[now], v[now], internal[now], duty, disturbance, p, q[1 - now], v[1 - now],
-           internal[1 - now], current, integrands);
+           internal[1 - now], current, integrands, &largest);
       now = 1 - now;
       for (int i = 0; i < N_INTEGRANDS; i++) sums[i] += integrands[i];
+      peak = vec_max(peak, largest);
     }
     const vec qx = q[now][3], qy = q[now][4];
     const vec upright = SPLAT(1.0) - SPLAT(2.0) * (qx * qx + qy * qy);
@@ -190,6 +192,7 @@ static void walk(Walker *const *lane, const Coding *c)
         walking[k] = 0;
         for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = sums[i][k];
         for (int i = 0; i < NQ; i++) w->end[i] = q[now][i][k];
+        w->peak_current = peak[k];
       } else {
         any = 1;
       }

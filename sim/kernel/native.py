@@ -69,6 +69,7 @@ class _Walker(ctypes.Structure):
         ("sums", ctypes.c_void_p),
         ("end", ctypes.c_void_p),
         ("log", ctypes.c_void_p),
+        ("peak_current", ctypes.c_double),
         ("status", ctypes.c_int64),
     ]
 
@@ -178,7 +179,7 @@ class NativeKernel:
         packed = _Coding(*dataclasses.astuple(coding))
         self._library.gaitswarm_walk(walkers, n, ctypes.byref(packed))
         return tuple(
-            WalkResult(Status(int(w.status)), sums[k], end[k], logs[k])
+            WalkResult(Status(int(w.status)), sums[k], end[k], float(w.peak_current), logs[k])
             for k, w in enumerate(walkers)
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any, Final
 
 import casadi as ca
@@ -44,9 +44,13 @@ INTEGRANDS: Final = (
     "angular_acceleration",
     "power",
     "forward_speed",
+    "absolute_power",
+    "absolute_current",
+    "heat",
 )
 """Rates that the driver accumulates: squared gear torque sum [N2 m2], squared accelerations
-[m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]."""
+[m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over the motors, the sums
+of the absolute electrical power [W], of the absolute current [A], and of the heat R I^2 [W]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +63,8 @@ class PhysicsModel:
     `parameters.Layout` says.
 
     Attributes:
-        step: to q, v and internal state after the step, current (J) and integrands (5).
+        step: to q, v and internal state after the step, current (J), integrands (8) and largest
+            absolute current (1).
         observe: to current (J), voltage (J), load torque (J), foot force in the world (3 L), supply
             (1) and acceleration (6+J) as `pinocchio.aba` gives it.
         layout: of the parameters.
@@ -119,7 +124,8 @@ def physics_model(robot: Robot) -> PhysicsModel:
         *integrated(s.q, s.v, rates, d.attitude, s.p["timestep"][0]),
         list(d.internal_state),
         list(d.electrical.currents),
-        _integrands(s, d),
+        _integrands(robot, s, d),
+        [_largest([ca.fabs(current) for current in d.electrical.currents])],
     ]
     observe = [
         list(d.electrical.currents),
@@ -305,23 +311,44 @@ def _feet(
     return feet, forces, internal_state
 
 
-def _integrands(s: _Symbols, d: _Dynamics) -> list[Scalar]:
+def _integrands(robot: Robot, s: _Symbols, d: _Dynamics) -> list[Scalar]:
     """The rates of INTEGRANDS at the state before the step."""
     torque = sum(ca.fabs(load) for load in d.loads)
     v, w = _triple(s.v[0:3]), _triple(s.v[3:6])
     # The base's twist is in its own frame, so the material acceleration adds omega x v.
     linear = add(d.acceleration.base.linear, cross(w, v))
     angular = d.acceleration.base.angular
-    power = sum(
-        voltage * current
-        for voltage, current in zip(d.electrical.voltages, d.electrical.currents, strict=True)
-    )
+    currents = d.electrical.currents
+    powers = [
+        voltage * current for voltage, current in zip(d.electrical.voltages, currents, strict=True)
+    ]
     world = apply(d.attitude, v)
     ahead_x, ahead_y = d.attitude[0][0], d.attitude[1][0]
     forward = (world[0] * ahead_x + world[1] * ahead_y) / ca.sqrt(
         ahead_x * ahead_x + ahead_y * ahead_y
     )
-    return [torque * torque, dot(linear, linear), dot(angular, angular), power, forward]
+    return [
+        torque * torque,
+        dot(linear, linear),
+        dot(angular, angular),
+        sum(powers),
+        forward,
+        sum(ca.fabs(power) for power in powers),
+        sum(ca.fabs(current) for current in currents),
+        _heat(robot, currents),
+    ]
+
+
+def _heat(robot: Robot, currents: Sequence[Scalar]) -> Scalar:
+    """Sum of R I^2; motors of one resistance share a product."""
+    squares: dict[float, Scalar] = {}
+    for resistance, current in zip(robot.actuators().resistance.tolist(), currents, strict=True):
+        squares[resistance] = squares.get(resistance, 0.0) + current * current
+    return sum(resistance * square for resistance, square in squares.items())
+
+
+def _largest(values: Sequence[Scalar]) -> Scalar:
+    return reduce(ca.fmax, values)
 
 
 def _triple(values: Sequence[Scalar]) -> Vector:

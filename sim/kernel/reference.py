@@ -57,7 +57,7 @@ class ReferenceKernel:
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
         step = Stepper(self._model.step, setup)
         past = _Past.of(setup.desired.shape[1])
-        sums = np.zeros(len(INTEGRANDS))
+        sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
         status = Status.OK
         for tick, desired in enumerate(setup.desired):
@@ -72,10 +72,12 @@ class ReferenceKernel:
             for _ in range(coding.substeps):
                 step.advance()
                 sums += step.integrands
+                peak_current = max(peak_current, float(step.largest_current[0]))
             status = _status_of(step, setup)
             if status is not Status.OK:
                 break
-        return WalkResult(status, sums, step.q.copy(), _padded(rows, setup.ticks) if log else None)
+        states = _padded(rows, setup.ticks) if log else None
+        return WalkResult(status, sums, step.q.copy(), peak_current, states)
 
 
 class Stepper:
@@ -94,7 +96,7 @@ class Stepper:
             np.ascontiguousarray(setup.parameters),
         )
         self.duty, self.disturbance, self.current = (np.zeros(n_joints) for _ in range(3))
-        self.integrands = np.zeros(len(INTEGRANDS))
+        self.integrands, self.largest_current = np.zeros(len(INTEGRANDS)), np.zeros(1)
         self._after = [np.zeros_like(array) for array in (self.q, self.v, self.internal_state)]
         self._buffer, self._evaluate = function.buffer()
         arguments = (
@@ -107,7 +109,8 @@ class Stepper:
         )
         for k, array in enumerate(arguments):
             self._buffer.set_arg(k, array.data)
-        for k, array in enumerate((*self._after, self.current, self.integrands)):
+        results = (*self._after, self.current, self.integrands, self.largest_current)
+        for k, array in enumerate(results):
             self._buffer.set_res(k, array.data)
 
     def advance(self) -> None:

@@ -13,6 +13,7 @@ from sim.controllers.base import ControlLaw
 from sim.errors import SimulationInputError
 from sim.outcome import Status
 from sim.robot import Robot
+from sim.robot.description import EnergyConvention
 
 Floats = NDArray[np.float64]
 
@@ -86,6 +87,7 @@ class WalkSetup:
         fall_height: of the body; below it the robot has fallen [m].
         fall_cosine: of the tilt; below it the robot has fallen.
         disturbance: torques on the links, (T, J) [N m], or None.
+        energy: what of a motor's electrical power counts as spent.
         drop: height of the start above the stance at which the soles carry the weight [m].
     """
 
@@ -97,6 +99,7 @@ class WalkSetup:
     fall_height: float
     fall_cosine: float = 0.5**0.5
     disturbance: Floats | None = None
+    energy: EnergyConvention = "signed"
     drop: float = 0.0
 
     @property
@@ -137,8 +140,9 @@ class WalkResult:
 
     Attributes:
         status: how it ended.
-        sums: `physics_step.INTEGRANDS` summed over physics steps, (5,).
+        sums: `physics_step.INTEGRANDS` summed over physics steps, (8,).
         end: final q, (7+J,).
+        peak_current: largest |I| of any motor at any physics step [A].
         states: q, v, internal state and duty at every control tick after its control,
             (T, 7+J + 6+J + I + J), NaN after an early end; None if not asked for.
             `observation.walk_log` tells the rest.
@@ -147,6 +151,7 @@ class WalkResult:
     status: Status
     sums: Floats
     end: Floats
+    peak_current: float
     states: Floats | None = field(default=None, repr=False)
 
 

@@ -69,6 +69,11 @@ class Actuator(_Data):
         return current_names(document, former_names.ACTUATOR)
 
 
+EnergyConvention = Literal["signed", "positive", "absolute"]
+"""What of a motor's electrical power counts as spent: all of it, so that braking gives back; only
+where it is positive, so that what braking gives back is lost; or its absolute value."""
+
+
 class Supply(_Data):
     """One battery for all motors."""
 
@@ -76,6 +81,11 @@ class Supply(_Data):
     resistance: float = Field(ge=0.0, description="internal resistance [ohm]")
     nominal_voltage: float = Field(
         gt=0.0, description="supply at which the PWM's full scale is given [V]"
+    )
+    energy: EnergyConvention = Field(
+        default="signed",
+        description="what of each motor's electrical power counts as spent: signed (braking gives"
+        " back), positive (what it gives back is lost) or absolute; the battery's load is the same",
     )
 
 

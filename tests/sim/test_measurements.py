@@ -1,0 +1,111 @@
+"""What a walk tells beside its objectives: currents, heat, power and speed."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from sim.assembly import Backend, measure, plan_walk
+from sim.controllers import CONTROLLERS
+from sim.kernel.native import native_kernel
+from sim.kernel.observation import walk_log
+from sim.kernel.walk import Coding
+from sim.outcome import MEASUREMENT_NAMES, Measurements, Status
+from sim.robot import Robot, load_robot
+from sim.robot.description import EnergyConvention
+from sim.scenario import SCENARIOS
+from sim.simulate import Simulation, simulate
+from tests.examples.robots import changed
+from tests.examples.walks import short_walk, walk
+
+PI = {"P": 0.45, "I": 0.1}
+BRIEF = short_walk(cycle_time=0.5)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("szabadka2")
+
+
+def test_measurements_are_sums_over_every_physics_step(robot: Robot) -> None:
+    """With a control tick at every physics step the log has them all."""
+    kernel, plan = native_kernel(robot), plan_walk(robot, SCENARIOS[0], 2e-4)
+    assert kernel is not None
+    assert plan is not None
+    setup = plan(CONTROLLERS["pi"].compile(PI))
+    (result,) = kernel.walk([setup], Coding.of(robot, 1), log=True)
+    assert result.states is not None
+    log = walk_log(robot, setup, result.states)
+    peak, mean, heat, power, speed = measure(setup, result, 1)
+    assert peak == pytest.approx(np.abs(log.current).max(), rel=1e-9)
+    assert mean == pytest.approx(np.abs(log.current).mean(), rel=1e-9)
+    lost = (robot.actuators().resistance * log.current**2).sum(axis=1)
+    assert heat == pytest.approx(lost.mean(), rel=1e-9)
+    powers = log.voltage * log.current
+    counted = {"signed": powers, "positive": powers.clip(min=0.0), "absolute": np.abs(powers)}
+    assert power == pytest.approx(powers.sum(axis=1).mean(), rel=1e-9)
+    for convention in get_args(EnergyConvention):
+        changed_setup = dataclasses.replace(setup, energy=convention)
+        assert measure(changed_setup, result, 1)[3] == pytest.approx(
+            counted[convention].sum(axis=1).mean(), rel=1e-9
+        )
+    assert speed == pytest.approx(result.end[0] / (setup.ticks * 2e-4), rel=0.01)
+
+
+def test_power_and_speed_are_those_of_the_objectives() -> None:
+    run = walk(BRIEF, PI, "pi")
+    _, _, _, energy, reciprocal_speed, _ = run.outcome.objectives[0]
+    assert run.measurements.speed[0] == pytest.approx(1.0 / reciprocal_speed, rel=1e-12)
+    assert run.measurements.power[0] == pytest.approx(energy / reciprocal_speed, rel=1e-12)
+
+
+def test_measurements_are_an_array_and_back() -> None:
+    rows = np.arange(10.0).reshape(2, 5)
+    told = Measurements.of(rows)
+    assert told.motor_heat.tolist() == [2.0, 7.0]
+    np.testing.assert_array_equal(told.array(), rows)
+
+
+def test_a_failed_walk_has_no_measurements() -> None:
+    beyond_reach = short_walk(hip_height=0.4)
+    run = walk(beyond_reach, PI, "pi")
+    assert run.outcome.statuses.tolist() == [Status.UNREACHABLE]
+    for name in MEASUREMENT_NAMES:
+        assert np.isnan(getattr(run.measurements, name)).tolist() == [True], name
+
+
+def walked(robot: Robot, backend: Backend = "auto") -> Simulation:
+    values = np.array([list(PI.values())])
+    return simulate(BRIEF, "pi", list(PI), values, robot=robot, backend=backend)
+
+
+@pytest.mark.parametrize("convention", get_args(EnergyConvention))
+def test_kernels_agree_on_measurements_under_every_convention(
+    robot: Robot, convention: EnergyConvention
+) -> None:
+    counted = changed(robot, supply={"energy": convention})
+    fast, slow = (walked(counted, backend) for backend in ("native", "reference"))
+    np.testing.assert_allclose(
+        fast.measurements.array(), slow.measurements.array(), rtol=1e-9, atol=0.0
+    )
+    np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
+
+
+def test_what_braking_gives_back_counts_by_the_convention_and_changes_nothing_else(
+    robot: Robot,
+) -> None:
+    signed, positive, absolute = (
+        changed(robot, supply={"energy": convention}) for convention in get_args(EnergyConvention)
+    )
+    assert native_kernel(positive) is native_kernel(absolute) is native_kernel(robot)
+    runs = [walked(machine) for machine in (robot, signed, positive, absolute)]
+    default, *powers = (float(run.measurements.power[0]) for run in runs)
+    assert default == powers[0] < powers[1] < powers[2]
+    # P+ - P- , P+ and P+ + P-.
+    assert powers[1] - powers[0] == pytest.approx(powers[2] - powers[1], rel=1e-9)
+    others = [np.delete(run.outcome.objectives[0], 3) for run in runs]
+    for other in others[1:]:
+        np.testing.assert_array_equal(other, others[0])

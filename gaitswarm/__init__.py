@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from sim.kernel.observation import WalkLog
     from sim.outcome import OBJECTIVES, Status
     from sim.robot import RobotFiles, RobotVariant
-    from sim.scenario import SCENARIOS, Scenario
+    from sim.scenario import PRESETS, SCENARIOS, Scenario
     from sim.variables import Variable
 
     __version__: str
@@ -77,6 +77,7 @@ __all__ = [
     "CONTROLLERS",
     "OBJECTIVES",
     "PREFERENCES",
+    "PRESETS",
     "SCENARIOS",
     "AsyncDatabaseJobs",
     "AsyncJobs",
@@ -171,7 +172,7 @@ _MODULES: Final = {
     "sim.kernel.observation": ("WalkLog",),
     "sim.outcome": ("OBJECTIVES", "Status"),
     "sim.robot": ("RobotFiles", "RobotVariant"),
-    "sim.scenario": ("SCENARIOS", "Scenario"),
+    "sim.scenario": ("PRESETS", "SCENARIOS", "Scenario"),
     "sim.variables": ("Variable",),
 }  # fmt: skip
 """Where each name is defined."""

@@ -178,14 +178,23 @@ SCENARIOS: Final[tuple[Scenario, ...]] = (
     Scenario(name="slope-fast", cycle_time=1.5, radius=0.20, hip_height=0.14, slope=10.0),
     Scenario(name="turn-right-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, turn=0.5),
 )
-"""The six scenarios of table 4.2, in its order."""
+"""The six scenarios of table 4.2, in its order: those that a job has unless it names others."""
+
+PRESETS: Final[tuple[Scenario, ...]] = (
+    *SCENARIOS,
+    Scenario(name="straight", cycle_time=1.5, radius=0.16, hip_height=0.15),
+)
+"""All scenarios that have a name and, by their order, a number from 1 on.
+
+`straight` is the walk of chapter 3 (section 3.1), whose designs bring a gait of their own.
+"""
 
 
 def find_scenario(name: str) -> Scenario:
     """A preset.
 
     Args:
-        name: Of the scenario, or its number 1 to 6 in table 4.2.
+        name: Of the scenario, or its number in `PRESETS`; 1 to 6 are those of table 4.2.
 
     Returns:
         The scenario.
@@ -193,10 +202,10 @@ def find_scenario(name: str) -> Scenario:
     Raises:
         SimulationInputError: There is none; names those that there are.
     """
-    for number, scenario in enumerate(SCENARIOS, start=1):
+    for number, scenario in enumerate(PRESETS, start=1):
         if name in (scenario.name, str(number)):
             return scenario
-    known = ", ".join(f"{k} {s.name}" for k, s in enumerate(SCENARIOS, start=1))
+    known = ", ".join(f"{k} {s.name}" for k, s in enumerate(PRESETS, start=1))
     raise SimulationInputError(f"unknown scenario {name!r}; known are {known}")
 
 

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 from gaitswarm.views.base import View, listing_name
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
 from sim.controllers import CONTROLLERS
-from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario
+from sim.scenario import GAIT_VARIABLES, PRESETS, Scenario
 from sim.variables import Variable
 
 T = TypeVar("T")
@@ -37,10 +37,11 @@ class CatalogueView(View, Generic[T]):
 
 
 class ScenarioView(Scenario):
-    """A preset walking scenario (thesis table 4.2)."""
+    """A preset walking scenario; 1 to 6 are those of thesis table 4.2."""
 
     number: int = Field(
-        description="Number in table 4.2; a job may name a scenario by it.", examples=[1]
+        description="Its number, 1 to 6 as in table 4.2; a job may name a scenario by it.",
+        examples=[1],
     )
     simulated_seconds: float = Field(description="Length of the walk [s].", examples=[4.5])
 
@@ -71,10 +72,10 @@ class ControllerView(View):
 
 
 def scenario_views() -> list[ScenarioView]:
-    """The presets of table 4.2, in its order."""
+    """The presets, those of table 4.2 first, in its order."""
     return [
         ScenarioView(**dict(scenario), number=number, simulated_seconds=scenario.duration)
-        for number, scenario in enumerate(SCENARIOS, start=1)
+        for number, scenario in enumerate(PRESETS, start=1)
     ]
 
 

@@ -8,7 +8,7 @@ import httpx2
 
 from services.optimizer.jobs.preference import PREFERENCES
 from sim.controllers import CONTROLLERS
-from sim.scenario import GAIT_VARIABLES, SCENARIOS
+from sim.scenario import GAIT_VARIABLES, PRESETS, SCENARIOS
 
 
 def items(client: httpx2.Client, what: str) -> list[dict[str, Any]]:
@@ -17,13 +17,25 @@ def items(client: httpx2.Client, what: str) -> list[dict[str, Any]]:
     return answer.json()["items"]
 
 
-def test_scenarios_are_those_of_the_table_with_their_numbers(client: httpx2.Client) -> None:
+def test_scenarios_are_the_presets_and_begin_with_those_of_the_table(client: httpx2.Client) -> None:
     found = items(client, "scenarios")
 
-    assert [item["number"] for item in found] == [1, 2, 3, 4, 5, 6]
-    assert [item["name"] for item in found] == [scenario.name for scenario in SCENARIOS]
+    assert [item["number"] for item in found] == list(range(1, len(PRESETS) + 1))
+    assert [item["name"] for item in found] == [scenario.name for scenario in PRESETS]
+    assert PRESETS[:6] == SCENARIOS
     assert found[2]["load"] == 2.0
     assert found[0]["simulated_seconds"] == SCENARIOS[0].duration
+
+
+def test_a_job_walks_in_the_scenarios_of_the_table_unless_it_names_others(
+    client: httpx2.Client,
+) -> None:
+    job = client.post("/v1/jobs", json={"controller": "pi"}).json()
+    assert job["scenarios"] == [scenario.name for scenario in SCENARIOS]
+
+    document = client.get("/openapi.json").json()
+    default = document["components"]["schemas"]["JobSpec"]["properties"]["scenarios"]["default"]
+    assert default == job["scenarios"], "the page begins with it"
 
 
 def test_preferences_have_their_biases_and_exponents(client: httpx2.Client) -> None:

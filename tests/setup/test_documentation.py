@@ -12,7 +12,7 @@ from api.app import create_app
 from gaitswarm.settings import Settings
 from services.optimizer.jobs.documents import SPECS
 from services.optimizer.service import JobService
-from sim.scenario import SCENARIOS
+from sim.scenario import PRESETS
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
 from tests.setup.documents import blocks, documentation, shell_commands
@@ -54,7 +54,7 @@ def test_every_route_is_documented_and_no_other() -> None:
     assert {f"{method} {path}" for method, path in rows} == routes
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
+@pytest.mark.parametrize("scenario", PRESETS, ids=lambda s: s.name)
 def test_every_scenario_is_documented(scenario: object) -> None:
     assert f"`{getattr(scenario, 'name', '')}`" in documentation()
 

@@ -148,6 +148,8 @@ def test_a_missing_variable_is_named() -> None:
 
 def test_scenarios_are_found_by_name_and_number() -> None:
     assert find_scenario("3") is find_scenario("loaded-fast") is SCENARIOS[2]
+    assert find_scenario("7") is find_scenario("straight")
+    assert find_scenario("straight") not in SCENARIOS
     with pytest.raises(SimulationInputError, match=r"unknown scenario 'moon'.*normal-fast"):
         find_scenario("moon")
 

@@ -9,6 +9,7 @@ export const DOCUMENT: OpenApiDocument = {
       JobSpec: {
         properties: {
           controller: { type: 'string', enum: ['pi', 'p'], default: 'pi' },
+          scenarios: { default: ['fast', 'loaded'] },
           preference: { default: 'A' },
           iterations: { type: 'integer', minimum: 1, maximum: 1_000_000, default: 25 },
           seed: { type: 'integer', minimum: 0, exclusiveMaximum: 2 ** 63, default: 1 },
@@ -62,6 +63,7 @@ export const CATALOGUE = {
   scenarios: [
     { name: 'fast', radius: 0.16, load: 0, number: 1, simulated_seconds: 4.5 },
     { name: 'loaded', radius: 0.145, load: 2, number: 2, simulated_seconds: 4.5 },
+    { name: 'straight', radius: 0.16, load: 0, number: 3, simulated_seconds: 4.5 },
   ],
   preferences: [
     { name: 'A', bias: [0.9, 0.8, 0.24, 0.5, 0.8], exponent: [0.1, 0.7, 0.3, 0.3, 0.1] },

@@ -60,7 +60,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
       urdf: '',
     },
     controller,
-    presets: catalogue.scenarios.map((scenario) => scenario.name),
+    presets: names(job.get('scenarios')?.default),
     own: [],
     variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, preset),
@@ -201,6 +201,10 @@ function texts(values: object): Record<string, string> {
 
 function list(values: unknown, length: number): readonly string[] {
   return Array.isArray(values) ? values.map(text) : Array(length).fill('0')
+}
+
+function names(values: unknown): readonly string[] {
+  return Array.isArray(values) ? values.map(text) : []
 }
 
 function text(value: unknown): string {

@@ -99,6 +99,10 @@ class Scenario(BaseModel):
     fir_ms: int = Field(
         default=12, ge=0, le=1000, description="Length of the low-pass FIR filter [ms]."
     )
+    fir_window: Literal["moving_average", "hamming"] = Field(
+        default="moving_average",
+        description="Coefficients of the FIR filter: all equal, or those of Matlab's fir1.",
+    )
     trajectory_rate: float = Field(
         default=500.0,
         ge=1.0,

@@ -12,6 +12,7 @@ from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import UnreachablePose
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import leg_angles
+from sim.gait.low_pass import low_pass
 from sim.gait.quadratic_spline import quadratic_spline
 from sim.robot import Robot
 from sim.scenario import Scenario
@@ -88,24 +89,8 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
         )
         columns.append(angles)
         misses.append(float(miss.max()))
-    angles = low_pass(np.concatenate(columns, axis=1), scenario.fir_ms)
+    angles = low_pass(np.concatenate(columns, axis=1), scenario.fir_ms, scenario.fir_window)
     return Trajectory(angles, np.array(misses))
-
-
-def low_pass(angles: Floats, fir_ms: int) -> Floats:
-    """Moving average, at rest before t = 0.
-
-    Args:
-        angles: (T, J).
-        fir_ms: Length of the filter [ms].
-
-    Returns:
-        (T, J).
-    """
-    taps = max(1, round(fir_ms * 1e-3 / CONTROL_PERIOD))
-    at_rest = np.repeat(angles[:1], taps - 1, axis=0)
-    windows = np.lib.stride_tricks.sliding_window_view(np.concatenate([at_rest, angles]), taps, 0)
-    return np.asarray(windows.mean(axis=-1))
 
 
 def require_reachable(robot: Robot, scenario: Scenario) -> None:

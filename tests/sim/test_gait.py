@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import leg_angles
-from sim.gait.trajectory import desired_angles, low_pass, n_ticks
+from sim.gait.low_pass import FirWindow, fir_gains, low_pass
+from sim.gait.trajectory import desired_angles, n_ticks
 from sim.robot import Robot, load_robot
 from sim.robot.posture import feet_below_body, resting_height
 from sim.scenario import SCENARIOS
@@ -108,6 +109,60 @@ def test_the_filter_is_a_moving_average_from_rest(taps: int) -> None:
     expected = [padded[k : k + taps].mean(axis=0) for k in range(len(signal))]
     np.testing.assert_allclose(smooth, expected, atol=1e-12)
     np.testing.assert_allclose(smooth[0], signal[0])
+
+
+@pytest.mark.parametrize("fir_ms", [4, 12, 93, 300])
+def test_a_hamming_filter_is_a_windowed_sinc_with_unit_gain_at_zero_frequency(fir_ms: int) -> None:
+    gains = fir_gains(fir_ms, "hamming")
+    order = round(fir_ms / 2)
+    n = np.arange(order + 1)
+    sinc = np.sinc(2.0 * (n - order / 2) / (order + 1))
+    expected = sinc * (0.54 - 0.46 * np.cos(2.0 * np.pi * n / order))
+    np.testing.assert_allclose(gains, expected / expected.sum(), atol=1e-15)
+    assert gains.sum() == pytest.approx(1.0, abs=1e-15)
+    assert (gains > 0.0).all()
+
+
+@pytest.mark.parametrize("fir_ms", [12, 93, 300])
+def test_a_hamming_filter_falls_to_0_6_at_its_cut_off_and_to_nothing_beyond(fir_ms: int) -> None:
+    gains = fir_gains(fir_ms, "hamming")
+    cut_off = 1.0 / len(gains)
+    frequency = np.concatenate([[cut_off], np.linspace(3.0 * cut_off, 0.5, 500)])
+    passed = abs(np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(gains)))) @ gains)
+    assert passed[0] == pytest.approx(0.62, abs=0.03)
+    assert (passed[1:] < 0.02).all()
+
+
+@pytest.mark.parametrize("fir_ms", [0, 1, 2, 3])
+@pytest.mark.parametrize("window", ["moving_average", "hamming"])
+def test_a_filter_of_a_few_milliseconds_still_passes_what_is_constant(
+    window: FirWindow, fir_ms: int
+) -> None:
+    assert fir_gains(fir_ms, window).sum() == pytest.approx(1.0)
+    still = np.full((5, 2), 0.3)
+    np.testing.assert_allclose(low_pass(still, fir_ms, window), still)
+
+
+def test_a_hamming_filter_convolves_the_angles_from_rest_and_delays_by_half_its_length(
+    robot: Robot,
+) -> None:
+    signal = np.random.default_rng(0).normal(size=(200, 2))
+    smooth = low_pass(signal, 100, "hamming")
+    padded = np.concatenate([np.repeat(signal[:1], 50, axis=0), signal])
+    expected = [np.convolve(padded[:, k], fir_gains(100, "hamming"), "valid") for k in (0, 1)]
+    np.testing.assert_allclose(smooth, np.stack(expected, axis=1), atol=1e-14)
+    ramp = np.arange(200.0)[:, np.newaxis]
+    np.testing.assert_allclose(low_pass(ramp, 100, "hamming")[60:], ramp[35:-25], atol=1e-12)
+
+    rough = SCENARIOS[0].model_copy(update={"fir_ms": 100, "trajectory_rate": 25.0})
+    windows = ("moving_average", "hamming")
+    averaged, hamming = (
+        desired_angles(robot, rough.model_copy(update={"fir_window": window})).angles
+        for window in windows
+    )
+    unfiltered = desired_angles(robot, rough.model_copy(update={"fir_ms": 0})).angles
+    np.testing.assert_array_equal(averaged, low_pass(unfiltered, 100))
+    np.testing.assert_array_equal(hamming, low_pass(unfiltered, 100, "hamming"))
 
 
 def test_at_rest_the_springs_carry_the_weight(robot: Robot) -> None:

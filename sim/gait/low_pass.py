@@ -1,0 +1,66 @@
+"""The low-pass FIR filter that smooths desired angles (thesis section 5.4, table 3.2)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+
+Floats = NDArray[np.float64]
+
+FirWindow = Literal["moving_average", "hamming"]
+"""`hamming` is the default of Matlab's fir1: a windowed sinc."""
+
+
+def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
+    """Coefficients of the filter at the control rate; their sum, the gain at 0 Hz, is 1.
+
+    Args:
+        fir_ms: Length of the filter [ms].
+        window: `moving_average`: equal coefficients, one a control period. `hamming`: as
+            fir1(order, cut-off), order being the number of control periods, so that the delay is
+            half of the length. The cut-off is one over the number of coefficients times the
+            control period: the main lobe of the ideal low-pass then just fills the filter.
+
+    Returns:
+        (n,), oldest angle first.
+    """
+    order = round(fir_ms * 1e-3 / CONTROL_PERIOD)
+    taps = max(1, order) if window == "moving_average" else order + 1
+    # One or two coefficients that are symmetric are equal, and have no cut-off below Nyquist's.
+    if window == "moving_average" or taps < 3:
+        return np.full(taps, 1.0 / taps)
+    # Slow to import, and only for this window.
+    from scipy.signal import firwin  # noqa: PLC0415
+
+    return np.asarray(firwin(taps, 2.0 / taps, window="hamming"))
+
+
+def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") -> Floats:
+    """Filtered angles, at rest before t = 0.
+
+    Args:
+        angles: At the control rate, (T, J).
+        fir_ms: Length of the filter [ms].
+        window: Which filter, see `fir_gains`.
+
+    Returns:
+        (T, J).
+    """
+    gains = fir_gains(fir_ms, window)
+    taps, ticks = len(gains), len(angles)
+    padded = np.concatenate([np.repeat(angles[:1], taps - 1, axis=0), angles])
+    if window == "moving_average":
+        # Summed tick by tick from the oldest on: a running sum would be faster still, but rounds
+        # otherwise.
+        summed = padded[:ticks].copy()
+        for delay in range(1, taps):
+            summed += padded[delay : delay + ticks]
+        return np.asarray(summed / taps)
+    filtered = np.zeros_like(angles)
+    for delay, gain in enumerate(gains):
+        filtered += padded[delay : delay + ticks] * gain
+    return filtered

@@ -66,6 +66,11 @@ class Scenario(BaseModel):
         le=1.0,
         description="Share by which the inner legs' stride is shortened [1]; right turns positive.",
     )
+    turn_mode: Literal["inner", "both"] = Field(
+        default="inner",
+        description="Whether a turn shortens the inner legs' stride alone, or lengthens that of the"
+        " outer ones by the same share as well.",
+    )
     slope: float = Field(
         default=0.0,
         ge=-45.0,
@@ -94,7 +99,16 @@ class Scenario(BaseModel):
         default=0.56,
         ge=0.1,
         le=0.95,
-        description="Support phase's share of the cycle [1].",
+        description="Share of the cycle of the phase that `duty_phase` names [1].",
+    )
+    duty_phase: Literal["support", "swing"] = Field(
+        default="support", description="Phase whose share of the cycle `duty_factor` is."
+    )
+    start_phase: float = Field(
+        default=0.0,
+        ge=0.0,
+        lt=1.0,
+        description="Share of the cycle at which the gait begins [1]; 0.5 exchanges the tripods.",
     )
     fir_ms: int = Field(
         default=12, ge=0, le=1000, description="Length of the low-pass FIR filter [ms]."
@@ -138,6 +152,25 @@ class Scenario(BaseModel):
     def duration(self) -> float:
         """Simulated time [s]."""
         return self.cycles * self.cycle_time
+
+    @property
+    def support_share(self) -> float:
+        """Support's share of the cycle [1]."""
+        return self.duty_factor if self.duty_phase == "support" else 1.0 - self.duty_factor
+
+    def stride_of(self, side: float) -> float:
+        """Stride of the legs of one side [m].
+
+        Args:
+            side: 1 for the left legs, -1 for the right ones.
+
+        Returns:
+            The scenario's stride, shortened or lengthened by its turn.
+        """
+        shortened = -side * self.turn
+        if self.turn_mode == "inner":
+            shortened = max(0.0, shortened)
+        return self.stride * (1.0 - shortened)
 
 
 GAIT_VARIABLES: Final[tuple[Variable, ...]] = (

@@ -72,13 +72,11 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
     )
     columns, misses = [], []
     for leg, data in zip(robot.legs, robot.description.legs, strict=True):
-        # A right turn shortens the right legs' stride; a negative turn the left legs'.
-        inner = max(0.0, -leg.side * scenario.turn)
         forward, lift = _CURVES[scenario.curve](
-            np.mod(time / scenario.cycle_time + data.phase, 1.0),
-            stride=scenario.stride * (1.0 - inner),
+            np.mod(time / scenario.cycle_time + (data.phase + scenario.start_phase), 1.0),
+            stride=scenario.stride_of(leg.side),
             height=scenario.height,
-            duty_factor=scenario.duty_factor,
+            duty_factor=scenario.support_share,
         )
         sole = (data.contact or robot.description.contact).sole
         angles, miss = leg_angles(

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import leg_angles
 from sim.gait.low_pass import FirWindow, fir_gains, low_pass
@@ -92,6 +93,53 @@ def test_a_right_turn_shortens_the_right_strides(robot: Robot) -> None:
     swing = np.ptp(desired_angles(robot, SCENARIOS[5]).angles[:, ::3], axis=0)
     right, left = swing[[0, 2, 4]], swing[[1, 3, 5]]
     assert (right < 0.6 * left).all()
+
+
+def test_a_turn_of_both_sides_lengthens_the_outer_strides_by_what_it_takes_from_the_inner(
+    robot: Robot,
+) -> None:
+    turn = SCENARIOS[5].model_copy(update={"turn": 0.25, "turn_mode": "both"})
+    inner = turn.model_copy(update={"turn_mode": "inner"})
+    (right, left), straight = ((turn.stride_of(side) for side in (-1, 1)), turn.stride)
+    assert (right, left) == (0.75 * straight, 1.25 * straight)
+    assert (inner.stride_of(-1), inner.stride_of(1)) == (0.75 * straight, straight)
+    to_the_left = turn.model_copy(update={"turn": -0.25})
+    assert (to_the_left.stride_of(-1), to_the_left.stride_of(1)) == (left, right)
+
+    swing = np.ptp(desired_angles(robot, turn).angles[:, ::3], axis=0)
+    narrow = np.ptp(desired_angles(robot, inner).angles[:, ::3], axis=0)
+    np.testing.assert_allclose(swing[[0, 2, 4]], narrow[[0, 2, 4]])
+    assert (swing[[1, 3, 5]] > 1.1 * narrow[[1, 3, 5]]).all()
+
+
+def test_a_share_of_swing_is_the_rest_of_one_of_support(robot: Robot) -> None:
+    support = SCENARIOS[0].model_copy(update={"duty_factor": 0.6})
+    swing = SCENARIOS[0].model_copy(update={"duty_factor": 0.4, "duty_phase": "swing"})
+    np.testing.assert_array_equal(
+        desired_angles(robot, swing).angles, desired_angles(robot, support).angles
+    )
+
+
+@pytest.mark.parametrize(
+    ("start_phase", "first"), [(0.0, [1, 2, 5]), (0.5, [0, 3, 4])], ids=["0", "0.5"]
+)
+def test_where_the_gait_begins_says_which_legs_swing_first(
+    robot: Robot, start_phase: float, first: list[int]
+) -> None:
+    scenario = SCENARIOS[0].model_copy(update={"start_phase": start_phase})
+    angles = desired_angles(robot, scenario).angles
+    quarter = angles[n_ticks(scenario) // 12]
+    raised = feet_below_body(robot, quarter) - feet_below_body(robot, angles[0])
+    assert np.flatnonzero(raised > 0.01).tolist() == first
+    assert raised[[k for k in range(6) if k not in first]] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_gait_begins_with_the_pose_that_it_has_at_its_start_phase(robot: Robot) -> None:
+    begun = SCENARIOS[0].model_copy(update={"start_phase": 0.3, "fir_ms": 0})
+    whole = SCENARIOS[0].model_copy(update={"fir_ms": 0})
+    later = round(0.3 * whole.cycle_time / CONTROL_PERIOD)
+    angles = desired_angles(robot, begun).angles[:-later]
+    np.testing.assert_allclose(angles, desired_angles(robot, whole).angles[later:], atol=1e-12)
 
 
 def test_slow_trajectories_are_held_between_updates(robot: Robot) -> None:

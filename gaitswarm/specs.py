@@ -47,7 +47,8 @@ class SpecOptions(TypedDict, total=False):
         scenarios: Walks in which every design is judged; one, or several.
         variables: What may be searched: names, with the catalogue's bounds, or `Variable` with
             others. Default: all that the controller has, less `fixed`.
-        fixed: Variables held at one value, by name, in their units.
+        fixed: Variables held at one value, by name, in their units; a categorical one at a choice's
+            name.
         preference: How objectives are weighed.
         optimizer: Settings of the search.
         particles: Size of the swarm, in place of `optimizer`'s.
@@ -60,7 +61,7 @@ class SpecOptions(TypedDict, total=False):
     controller: ControllerName
     scenarios: ScenarioInput | Iterable[ScenarioInput]
     variables: Sequence[str | Variable | Document]
-    fixed: Mapping[str, float]
+    fixed: Mapping[str, float | str]
     preference: PreferenceInput
     optimizer: PsoSettings | Document
     particles: int

@@ -1,4 +1,4 @@
-"""A number that an optimizer may choose: its name, bounds and unit.
+"""What an optimizer may choose, a number or one of several names: its bounds, unit or choices.
 
 Controllers and gaits declare theirs as data, so the design space of a job, the
 form that asks for one and the check of a design file all read the same list.
@@ -6,9 +6,20 @@ form that asks for one and the check of a design file all read the same list.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    Tag,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from sim.choice import NAME, OWN, alternatives
 
@@ -24,23 +35,98 @@ VariableName = Annotated[
 ]
 
 
-class Variable(BaseModel):
-    """One coordinate of a design: closed box bounds, a unit, continuous or integer."""
+ChoiceName = Annotated[
+    str,
+    Field(min_length=1, max_length=60, pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$", examples=["stick"]),
+]
+"""Name of one of a categorical variable's choices."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+_NUMBER: Final = "<number>"
+
+
+def _number_or_name(value: Any) -> str:
+    """The tag of a value. Text that reads as a number is one."""
+    if not isinstance(value, str):
+        return _NUMBER
+    try:
+        float(value)
+    except ValueError:
+        return NAME
+    return _NUMBER
+
+
+VariableValue = Annotated[
+    Annotated[FiniteFloat, Tag(_NUMBER)] | Annotated[ChoiceName, Tag(NAME)],
+    Discriminator(_number_or_name),
+]
+"""A variable's value as people give it: a number, or the name of a categorical one's choice."""
+
+
+def _with_bounds(schema: dict[str, Any]) -> None:
+    """Every variable that is shown has bounds; that a categorical one may omit them is in words."""
+    schema["required"] = ["name", "low", "high"]
+    for bound in ("low", "high"):
+        del schema["properties"][bound]["default"]
+
+
+class Variable(BaseModel):
+    """One coordinate of a design: closed box bounds, a unit; continuous, integer or categorical."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_with_bounds)
 
     name: VariableName
-    low: FiniteFloat = Field(description="Lower bound, in `unit`.", examples=[1500.0])
-    high: FiniteFloat = Field(description="Upper bound, in `unit`.", examples=[6000.0])
+    low: FiniteFloat = Field(
+        default=None,
+        validate_default=True,
+        description="Lower bound, in `unit`. A categorical variable's is 0, and may be left out.",
+        examples=[1500.0],
+    )
+    high: FiniteFloat = Field(
+        default=None,
+        validate_default=True,
+        description="Upper bound, in `unit`. A categorical variable's is its last index, and may be"
+        " left out.",
+        examples=[6000.0],
+    )
     unit: str = Field(default="1", description="Unit of value and bounds.", examples=["counts"])
-    kind: Literal["continuous", "integer"] = Field(
+    kind: Literal["continuous", "integer", "categorical"] = Field(
         default="continuous",
-        description="An `integer` variable is rounded to the nearest integer when it is evaluated.",
+        description="An `integer` variable is rounded to the nearest integer when it is evaluated."
+        " A `categorical` one is one of `choices`, each with an equal share of the range that is"
+        " searched.",
+    )
+    choices: tuple[ChoiceName, ...] = Field(
+        default=(),
+        max_length=64,
+        description="Of a categorical variable: what it may be. Its number is the choice's index,"
+        " from 0.",
+        examples=[["linear_zone", "karnopp", "stick"]],
     )
     description: str = Field(default="", description="What the variable does.")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _bound_the_indices(cls, document: Any) -> Any:
+        if not isinstance(document, dict) or document.get("kind") != "categorical":
+            return document
+        choices = document.get("choices", ())
+        if not isinstance(choices, list | tuple):
+            return document
+        return {"low": 0.0, "high": len(choices) - 1.0, **document}
+
+    @field_validator("low", "high", mode="before")
+    @classmethod
+    def _is_given(cls, bound: Any) -> Any:
+        if bound is None:
+            raise PydanticCustomError("missing", "Field required")
+        return bound
+
     @model_validator(mode="after")
     def _bounds_enclose_a_value(self) -> Variable:
+        if self.kind == "categorical":
+            return self._has_choices()
+        if self.choices:
+            raise ValueError(f"choices of {self.name}: only a categorical variable has any")
         if not self.low < self.high:
             raise ValueError(
                 f"bounds of {self.name} are inverted or empty: low {self.low:g} must be less than"
@@ -49,6 +135,61 @@ class Variable(BaseModel):
         if self.kind == "integer" and not (self.low.is_integer() and self.high.is_integer()):
             raise ValueError(f"bounds of the integer variable {self.name} must be integers")
         return self
+
+    def _has_choices(self) -> Variable:
+        if len(self.choices) < 2:
+            raise ValueError(
+                f"choices of {self.name}: two at least; to hold it at one, name it in `fixed`"
+                " instead"
+            )
+        for choice in self.choices:
+            if self.choices.count(choice) > 1:
+                raise ValueError(f"choices of {self.name}: {choice!r} is named twice")
+        if (self.low, self.high) != (0.0, len(self.choices) - 1.0):
+            raise ValueError(
+                f"bounds of the categorical variable {self.name} are 0 and {len(self.choices) - 1},"
+                " or left out; to search fewer choices, name those in `choices`"
+            )
+        return self
+
+    def number(self, value: float | str) -> float:
+        """A value as arrays of designs hold it.
+
+        Args:
+            value: A number in the variable's unit; of a categorical variable a choice's name, or
+                its index.
+
+        Returns:
+            The number; of a categorical variable the index of the choice.
+
+        Raises:
+            ValueError: A name of no choice, or an index of none; names the choices.
+        """
+        if self.kind == "categorical":
+            if value in self.choices:
+                return float(self.choices.index(str(value)))
+            if not isinstance(value, str) and value in range(len(self.choices)):
+                return float(value)
+            shown = repr(value) if isinstance(value, str) else f"{value:g}"
+            raise ValueError(
+                f"{self.name}: {shown} is none of its choices {', '.join(self.choices)}"
+            )
+        if isinstance(value, str):
+            raise ValueError(f"{self.name}: {value!r} is not a number")  # noqa: TRY004
+        return float(value)
+
+    def shown(self, number: float) -> float | str:
+        """A number of an array of designs as people read it; the inverse of `number`.
+
+        Args:
+            number: In the variable's unit; of a categorical variable the index of a choice.
+
+        Returns:
+            The choice's name of a categorical variable, else the number.
+        """
+        if self.kind != "categorical" or math.isnan(number):
+            return number
+        return self.choices[round(number)]
 
 
 VariableChoice = Annotated[

@@ -11,14 +11,20 @@ from sim.variables import Variable
 GAIN = Variable(name="gain", low=0.0, high=2.0, unit="1")
 SHAPE = Variable(name="shape", low=1, high=3, kind="integer", unit="index")
 STRIDE = Variable(name="stride", low=0.1, high=0.2, unit="m")
+LAW = Variable(name="law", kind="categorical", choices=("linear", "stick", "jump"))
 
 
 def build(
-    chosen: list[str | Variable] | None = None, fixed: dict[str, float] | None = None
+    chosen: list[str | Variable] | None = None, fixed: dict[str, float | str] | None = None
 ) -> DesignSpace:
     return DesignSpace.build(
-        required=(GAIN, SHAPE), optional=(STRIDE,), chosen=chosen, fixed=fixed or {}
+        required=(GAIN, SHAPE), optional=(STRIDE, LAW), chosen=chosen, fixed=fixed or {}
     )
+
+
+def only_law(*choices: str) -> DesignSpace:
+    own = Variable(name="law", kind="categorical", choices=choices) if choices else "law"
+    return build([own], {"gain": 1.0, "shape": 2.0})
 
 
 def test_without_a_choice_all_required_variables_are_searched() -> None:
@@ -55,6 +61,34 @@ def test_own_bounds_keep_the_unit_of_the_catalogue() -> None:
     assert (variable.low, variable.high, variable.unit) == (0.5, 0.6, "1")
 
 
+def test_each_choice_has_an_equal_share_of_the_range_that_is_searched() -> None:
+    space = only_law()
+    positions = np.linspace(space.low[0], space.high[0], 3001).reshape(-1, 1)
+    indices, counts = np.unique(space.designs(positions)[:, 0], return_counts=True)
+    assert indices.tolist() == [0.0, 1.0, 2.0]
+    assert counts.max() - counts.min() <= 1
+
+
+def test_a_choice_may_be_held_by_name_or_index() -> None:
+    for value in ("stick", 1.0):
+        space = build(["gain", "shape"], {"law": value})
+        assert space.fixed == (("law", 1.0),)
+        assert space.shown_fixed == {"law": "stick"}
+
+
+def test_designs_are_shown_with_the_names_of_choices() -> None:
+    assert only_law().shown([2.0, 1.0, 2.0]) == {"law": "jump", "gain": 1.0, "shape": 2.0}
+
+
+def test_fewer_choices_are_searched_in_their_own_order_and_simulated_by_the_catalogues() -> None:
+    space = only_law("jump", "linear")
+    designs = space.designs(np.array([[0.0], [1.0]]))
+    assert designs[:, 0].tolist() == [0.0, 1.0]
+    assert [space.shown(row)["law"] for row in designs] == ["jump", "linear"]
+    assert space.simulated(designs)[:, 0].tolist() == [2.0, 0.0]
+    assert [corner["law"] for corner in space.corners()] == [2.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("chosen", "fixed", "message"),
     [
@@ -65,10 +99,19 @@ def test_own_bounds_keep_the_unit_of_the_catalogue() -> None:
         (None, {"colour": 1.0}, "unknown variable 'colour'"),
         ([], {"gain": 1.0, "shape": 1.0}, "nothing is left to search"),
         (["gain", Variable(name="shape", low=1.0, high=3.0)], {}, "shape is an integer variable"),
+        (["gain", "shape", Variable(name="law", low=0, high=2)], {}, "law is a categorical var"),
+        (
+            ["gain", "shape", Variable(name="law", kind="categorical", choices=("stick", "glue"))],
+            {},
+            "'glue' is none of the choices of law; they are linear, stick, jump",
+        ),
+        (None, {"law": "glue"}, "fixed: law: 'glue' is none of its choices linear, stick, jump"),
+        (None, {"law": 3.0}, "fixed: law: 3 is none of its choices"),
+        (None, {"gain": "stick"}, "fixed: gain: 'stick' is not a number"),
     ],
 )
 def test_a_space_that_makes_no_sense_is_refused_by_name(
-    chosen: list[str | Variable] | None, fixed: dict[str, float], message: str
+    chosen: list[str | Variable] | None, fixed: dict[str, float | str], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
         build(chosen, fixed)

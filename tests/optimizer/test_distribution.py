@@ -20,7 +20,8 @@ from sim.variables import Variable
 from tests.optimizer.columns import columns_of, fitness_only
 
 INF = math.inf
-SPACE = DesignSpace((Variable(name="a", low=0.0, high=10.0),), (("b", 3.0),))
+A, B = (Variable(name=name, low=0.0, high=10.0) for name in "ab")
+SPACE = DesignSpace((A,), (("b", 3.0),), (A, B))
 
 
 @given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=9), st.integers(0, 3))

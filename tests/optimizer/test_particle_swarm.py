@@ -167,14 +167,13 @@ def test_converges_on_the_sphere(seed: int) -> None:
     assert best_of(optimizer, lambda x: np.square(x - 1.0).sum(axis=1), 150) < 1e-4
 
 
-MIXED = DesignSpace(
-    tuple(
-        Variable(name=f"x{k}", low=0, high=10, kind="integer")
-        if k == 6
-        else Variable(name=f"x{k}", low=-1.0, high=1.0)
-        for k in range(1, 8)
-    )
+VARIABLES = tuple(
+    Variable(name=f"x{k}", low=0, high=10, kind="integer")
+    if k == 6
+    else Variable(name=f"x{k}", low=-1.0, high=1.0)
+    for k in range(1, 8)
 )
+MIXED = DesignSpace.build(required=VARIABLES, optional=(), chosen=None, fixed={})
 
 
 def f_d7c0r0i1(positions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,15 +18,19 @@ class DesignSpace:
     """Variables with bounds, and values held fixed.
 
     A *position* is a point of the box, (d,) in the variables' own units. A *design* is what is
-    simulated: integer variables rounded, fixed values appended; its columns are `names`.
+    judged and stored: integer variables rounded, of categorical ones the index of a choice, fixed
+    values appended; its columns are `names`.
 
     Attributes:
         variables: the d that are searched.
         fixed: names and values of the others.
+        catalogue: all of these as the simulator knows them, in the order of `names`; of a
+            categorical variable with all of its choices.
     """
 
     variables: tuple[Variable, ...]
-    fixed: tuple[tuple[str, float], ...] = ()
+    fixed: tuple[tuple[str, float], ...]
+    catalogue: tuple[Variable, ...]
 
     @classmethod
     def build(
@@ -35,7 +39,7 @@ class DesignSpace:
         required: Sequence[Variable],
         optional: Sequence[Variable],
         chosen: Sequence[str | Variable] | None,
-        fixed: Mapping[str, float],
+        fixed: Mapping[str, float | str],
     ) -> DesignSpace:
         """Combine a catalogue with a user's choice.
 
@@ -44,7 +48,7 @@ class DesignSpace:
             optional: variables that may be: the gait's.
             chosen: what is searched, by name with the catalogue's bounds, or with bounds of one's
                 own; None for all that are required, less those that are fixed.
-            fixed: value of each variable that is held, by name.
+            fixed: value of each variable that is held, by name: a number, or a choice's name.
 
         Returns:
             The space, its variables in the order of `chosen`.
@@ -54,6 +58,7 @@ class DesignSpace:
         """
         catalogue = {variable.name: variable for variable in (*required, *optional)}
         known = ", ".join(catalogue)
+        held = _held(fixed, catalogue)
         if chosen is None:
             chosen = [variable for variable in required if variable.name not in fixed]
         variables: list[Variable] = []
@@ -66,9 +71,6 @@ class DesignSpace:
             if name in fixed:
                 raise ValueError(f"fixed: {name!r} is also among the variables; choose one")
             variables.append(_checked(entry, catalogue[name]))
-        for name in fixed:
-            if name not in catalogue:
-                raise ValueError(f"fixed: unknown variable {name!r}; known are {known}")
         covered = {variable.name for variable in variables} | set(fixed)
         missing = [variable.name for variable in required if variable.name not in covered]
         if missing:
@@ -78,7 +80,8 @@ class DesignSpace:
             )
         if not variables:
             raise ValueError("variables: nothing is left to search, every variable is fixed")
-        return cls(tuple(variables), tuple(fixed.items()))
+        names = (*(variable.name for variable in variables), *fixed)
+        return cls(tuple(variables), held, tuple(catalogue[name] for name in names))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -97,27 +100,75 @@ class DesignSpace:
         """(d,) upper bounds."""
         return np.array([variable.high for variable in self.variables])
 
+    @property
+    def columns(self) -> tuple[Variable, ...]:
+        """The variable of each column of a design array, as `names`."""
+        return (*self.variables, *self.catalogue[len(self.variables) :])
+
     def designs(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is simulated for points of the box.
+        """What is judged and stored for points of the box.
 
         Args:
             positions: (n, d), inside the bounds.
 
         Returns:
-            (n, len(names)), integer variables rounded and fixed values appended.
+            (n, len(names)), integer variables rounded, of categorical ones the index of the choice
+            in whose equal share of the bounds the point lies, and fixed values appended.
         """
         columns = np.empty((len(positions), len(self.names)))
         for j, variable in enumerate(self.variables):
             column = positions[:, j]
-            columns[:, j] = np.rint(column) if variable.kind == "integer" else column
+            if variable.kind == "integer":
+                column = np.rint(column)
+            elif variable.kind == "categorical":
+                choices = len(variable.choices)
+                column = np.minimum(np.floor(column * (choices / (choices - 1))), choices - 1)
+            columns[:, j] = column
         for j, (_, value) in enumerate(self.fixed, start=len(self.variables)):
             columns[:, j] = value
         return columns
 
+    def simulated(self, designs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Designs as the simulator takes them, which knows every choice of its catalogue.
+
+        Args:
+            designs: (n, len(names)), in which a categorical variable's index is among the choices
+                that are searched.
+
+        Returns:
+            The same, the index among all choices.
+        """
+        translated = designs.copy()
+        for j, (own, known) in enumerate(zip(self.columns, self.catalogue, strict=True)):
+            if own.choices != known.choices:
+                index = np.array([known.number(choice) for choice in own.choices])
+                translated[:, j] = index[designs[:, j].astype(np.intp)]
+        return translated
+
+    def shown(self, design: Iterable[float]) -> dict[str, float | str]:
+        """A design as people read it.
+
+        Args:
+            design: (len(names),) values.
+
+        Returns:
+            Values by name; of a categorical variable the choice's name.
+        """
+        return {
+            variable.name: variable.shown(value)
+            for variable, value in zip(self.columns, design, strict=True)
+        }
+
+    @property
+    def shown_fixed(self) -> dict[str, float | str]:
+        """The fixed values as people read them, by name."""
+        held = self.catalogue[len(self.variables) :]
+        return {v.name: v.shown(value) for v, (_, value) in zip(held, self.fixed, strict=True)}
+
     def corners(self) -> Iterator[dict[str, float]]:
-        """The designs at the lower and at the upper ends of all bounds, by variable."""
+        """What is simulated at the lower and at the upper ends of all bounds, by variable."""
         for corner in (self.low, self.high):
-            (values,) = self.designs(corner.reshape(1, -1))
+            (values,) = self.simulated(self.designs(corner.reshape(1, -1)))
             yield dict(zip(self.names, values.tolist(), strict=True))
 
     def refusal(self, error: SimulationInputError) -> InvalidRequest:
@@ -135,12 +186,38 @@ class DesignSpace:
         )
 
 
+def _held(
+    fixed: Mapping[str, float | str], catalogue: Mapping[str, Variable]
+) -> tuple[tuple[str, float], ...]:
+    """Names and numbers of fixed values."""
+    held = []
+    for name, value in fixed.items():
+        if name not in catalogue:
+            raise ValueError(f"fixed: unknown variable {name!r}; known are {', '.join(catalogue)}")
+        try:
+            held.append((name, catalogue[name].number(value)))
+        except ValueError as error:
+            raise ValueError(f"fixed: {error}") from error
+    return tuple(held)
+
+
 def _checked(entry: str | Variable, known: Variable) -> Variable:
-    """A user's own bounds keep the catalogue's kind and unit."""
+    """A user's own bounds or choices keep the catalogue's kind and unit."""
     if isinstance(entry, str):
         return known
-    if entry.kind != known.kind and known.kind == "integer":
-        raise ValueError(f"variables: {entry.name} is an integer variable; set kind to 'integer'")
+    # A continuous variable may be searched in whole numbers.
+    if entry.kind != known.kind and (known.kind != "continuous" or entry.kind == "categorical"):
+        article = "an" if known.kind == "integer" else "a"
+        raise ValueError(
+            f"variables: {entry.name} is {article} {known.kind} variable; set kind to"
+            f" {known.kind!r}"
+        )
+    for choice in entry.choices:
+        if choice not in known.choices:
+            raise ValueError(
+                f"variables: {choice!r} is none of the choices of {entry.name}; they are"
+                f" {', '.join(known.choices)}"
+            )
     return entry.model_copy(
         update={"unit": known.unit, "description": entry.description or known.description}
     )

@@ -148,7 +148,8 @@ def _measure(spec: Spec, cases: Sequence[Case]) -> float | None:
     None if none of them can begin to walk.
     """
     positions = create_optimizer(spec).ask()[:_MEASURED]
-    designs = spec.design_space().designs(positions)
+    space = spec.design_space()
+    designs = space.simulated(space.designs(positions))
     case = _shortened(min(cases, key=lambda case: case.duration))
     # The first walk pays for what later ones find ready: tables, and memory that is mapped.
     case.run(designs[:1])

@@ -149,5 +149,5 @@ class IdentificationSpec(Spec):
         """The same job with its variables written out."""
         space = self.design_space()
         return self.model_copy(
-            update={"variables": space.variables, "fixed": dict(space.fixed)},
+            update={"variables": space.variables, "fixed": space.shown_fixed},
         )

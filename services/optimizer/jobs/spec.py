@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
@@ -26,7 +26,7 @@ from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import RobotSource, load_robot
-from sim.variables import VariableChoice, VariableName
+from sim.variables import VariableChoice, VariableName, VariableValue
 
 Floats = NDArray[np.float64]
 
@@ -85,8 +85,11 @@ class Spec(BaseModel):
         description="What the optimizer may choose: names (with the catalogue's bounds) or"
         " variables with bounds of your own. Default: all that the job needs, less `fixed`.",
     )
-    fixed: dict[VariableName, FiniteFloat] = Field(
-        default_factory=dict, description="Variables held at one value, by name."
+    fixed: dict[VariableName, VariableValue] = Field(
+        default_factory=dict,
+        description="Variables held at one value, by name; a categorical one at a choice's name or"
+        " index.",
+        examples=[{"FOMF": 2, "stride": 0.15}],
     )
     optimizer: PsoSettings = Field(
         default_factory=PsoSettings, description="Search algorithm and its settings."

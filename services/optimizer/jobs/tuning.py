@@ -165,7 +165,7 @@ class JobSpec(Spec):
                 "scenarios": self.resolved_scenarios(),
                 "preference": self.resolved_preference(),
                 "variables": space.variables,
-                "fixed": dict(space.fixed),
+                "fixed": space.shown_fixed,
             }
         )
 

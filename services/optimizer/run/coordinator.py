@@ -274,11 +274,12 @@ def _evaluate(state: Coordination) -> Evaluate:
     job, ask = _current(state)
     if state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
+    space = job.spec.design_space()
     return Evaluate(
         EvaluationRequest(
             job_id=job.id,
             cases=job.spec.cases(state.recordings),
-            designs=job.spec.design_space().designs(ask.positions),
+            designs=space.simulated(space.designs(ask.positions)),
             provenance=state.provenance.simulation,
         )
     )

@@ -163,7 +163,7 @@ def _how_to_go_on(job_id: str, place: str) -> str:
 
 def _report(job: JobView, place: str, *, compare: bool) -> None:
     from cli.comparison import published_beside
-    from cli.tables import design_table, number, results_table
+    from cli.tables import design_table, results_table, worth
 
     console = stdout_console()
     if job.best is None:
@@ -174,7 +174,7 @@ def _report(job: JobView, place: str, *, compare: bool) -> None:
         results = {k: e.scenarios for k, e in evaluations.items()}
         console.print(results_table(results, job.objectives))
         for name, evaluation in evaluations.items():
-            console.print(f"fitness of {name}: {number(evaluation.fitness)}", markup=False)
+            console.print(f"fitness of {name}: {worth(evaluation)}", markup=False)
     speed = f" at {job.simulations_per_second:.0f} walks/s" if job.simulations_per_second else ""
     note(f"{job.evaluations} designs in {len(job.spec.case_names)} walks each{speed}")
     note(f"its history: gaitswarm history {job.id}{place}")

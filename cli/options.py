@@ -68,7 +68,7 @@ class SpecOptions:
     particles: Annotated[int | None, typer.Option(help="Size of the swarm.")] = None
     seed: Annotated[int | None, typer.Option(help="Source of all randomness.")] = None
     preference: Annotated[
-        str | None, typer.Option(help="How objectives are weighed: A, B or C.")
+        str | None, typer.Option(help="How objectives are weighed: A, B, C or chapter-3 (eq. 3.1).")
     ] = None
     scenarios: Annotated[
         str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")

@@ -10,12 +10,14 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from gaitswarm.views import (
+        EvaluationView,
         IterationView,
         JobSummaryView,
         JobView,
         ObjectiveView,
         RankingView,
         ScenarioResultView,
+        SimulationView,
     )
     from services.optimizer.jobs.provenance import JobProvenance
     from services.optimizer.jobs.spec import Spec
@@ -127,11 +129,23 @@ def _objective(name: str, value: float | None) -> str:
     return f"{value:.4f}" if name == "height_loss" and value is not None else number(value)
 
 
+def worth(view: EvaluationView | SimulationView, *, digits: int = 4) -> str:
+    """Fitness, which is minimized, and beside it the figure that is maximized, if there is one.
+
+    digits: significant ones of the fitness.
+    """
+    fitness = number(view.fitness, digits)
+    if view.figure_of_merit is None:
+        return fitness
+    return f"{fitness} (F of eq. 3.1, maximized: {number(view.figure_of_merit)})"
+
+
 def ranking_table(ranking: RankingView) -> Table:
     """The best designs by another preference, best first, beside their places before."""
     table = Table(box=None)
-    columns = ("rank", "before", "iteration", "particle", "fitness", "before")
-    for column in columns:
+    columns = ["rank", "before", "iteration", "particle", "fitness", "before"]
+    maximized = any(design.figure_of_merit is not None for design in ranking.top)
+    for column in columns + (["F (eq. 3.1)"] if maximized else []):
         table.add_column(column, justify="right")
     for design in ranking.top:
         table.add_row(
@@ -141,6 +155,7 @@ def ranking_table(ranking: RankingView) -> Table:
             str(design.particle),
             number(design.fitness),
             number(design.fitness_before),
+            *([number(design.figure_of_merit)] if maximized else []),
         )
     return table
 
@@ -186,11 +201,11 @@ def provenance_line(provenance: JobProvenance) -> str:
     )
 
 
-def number(value: float | None) -> str:
-    """Four significant digits, or all before the decimal point."""
+def number(value: float | None, digits: int = 4) -> str:
+    """As many significant digits, or all before the decimal point."""
     if value is None:
         return MISSING
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
+    return f"{value:.0f}" if 10.0**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
 
 
 def duration(seconds: float) -> str:

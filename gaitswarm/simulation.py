@@ -74,7 +74,8 @@ def simulate(
         controller: Motor controller that drives the robot.
         robot: A shipped robot by name, a `RobotVariant`, or the folder that holds robot.toml and
             robot.urdf of another.
-        preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
+            `Preference`.
         log: Whether to record every walk at 500 Hz.
         backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
             first that works on this machine.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.tables import Table
 from gaitswarm.views import SimulationView
-from services.optimizer.jobs.preference import Preference
+from services.optimizer.jobs.preference import Preference, figure_of_merit
 from sim.kernel.observation import WalkLog
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.robot import RobotSource
@@ -30,7 +30,7 @@ class ScenarioResult:
         statuses: How each walk ended; everything but `Status.OK` is a failed walk.
         objectives: (n,) raw objectives by name, to be minimized, NaN where there is none;
             `gaitswarm.OBJECTIVES` has their units.
-        utility: (n,) bias-weighted product of f1..f5 (eq. 4.1), to be minimized; NaN where the
+        utility: (n,) bias-weighted product (eq. 3.8, 4.1), to be minimized; NaN where the
             walk failed.
         logs: Every walk's log at 500 Hz, None for a gait out of reach; empty unless asked for.
     """
@@ -55,7 +55,7 @@ class SimulationResult:
         statuses: (n, K) how each walk ended, values of `Status`.
         objectives: (n, K, 6) raw objectives f1..f6 of table 4.1, to be minimized, in the units of
             `gaitswarm.OBJECTIVES`; NaN where there is none.
-        utilities: (n, K) bias-weighted products of f1..f5 (eq. 4.1), to be minimized; NaN where
+        utilities: (n, K) bias-weighted products (eq. 3.8, 4.1), to be minimized; NaN where
             the walk failed.
         fitness: (n,) geometric means of the utilities (eq. 4.2), to be minimized; NaN where any
             walk failed.
@@ -101,6 +101,12 @@ class SimulationResult:
             fitness=np.array([view.fitness], dtype=np.float64),
             logs=logs if recorded else {},
         )
+
+    @property
+    def figure_of_merit(self) -> Floats:
+        """(n,) F of eq. 3.1, to be maximized; NaN unless the preference is `chapter-3`."""
+        values = [figure_of_merit(fitness, self.preference) for fitness in self.fitness.tolist()]
+        return np.array(values, dtype=np.float64)
 
     def __getitem__(self, scenario: str) -> ScenarioResult:
         k = self.scenarios.index(scenario) if scenario in self.scenarios else None

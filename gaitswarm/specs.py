@@ -30,7 +30,7 @@ ScenarioInput: TypeAlias = str | Scenario | Document
 """A preset by name or number, or one's own."""
 
 PreferenceInput: TypeAlias = PreferenceName | Preference | Document
-"""A, B or C of table 4.5, or one's own."""
+"""A, B or C of table 4.5, chapter-3 (eq. 3.1), or one's own."""
 
 SpecInput: TypeAlias = Spec | Document
 """A job of any kind, as object or as document."""

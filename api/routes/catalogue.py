@@ -46,7 +46,7 @@ def list_scenarios() -> CatalogueView[ScenarioView]:
     responses=problems(),
 )
 def list_preferences() -> CatalogueView[PreferenceView]:
-    """Biases and exponents of thesis table 4.5, by which objectives are weighed."""
+    """Biases and exponents by which objectives are weighed: thesis table 4.5, eq. 3.1."""
     return CatalogueView(items=preference_views())
 
 

@@ -39,7 +39,7 @@ def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json =
 def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show the best design that a job has found so far, scenario by scenario."""
     from cli.output import print_json, stdout_console
-    from cli.tables import design_table, results_table
+    from cli.tables import design_table, results_table, worth
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -50,7 +50,7 @@ def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = Fa
         job = jobs.job(job_id)
         console = stdout_console()
         console.print(
-            f"job {job_id}: fitness {found.fitness:.6g} in iteration {found.iteration},"
+            f"job {job_id}: fitness {worth(found, digits=6)} in iteration {found.iteration},"
             f" particle {found.particle}",
             markup=False,
         )

@@ -23,7 +23,8 @@ def rank(
         str,
         typer.Option(
             metavar="NAME|JSON",
-            help='A, B or C, or your own: {"bias": [five numbers], "exponent": [five numbers]}.',
+            help='A, B, C, chapter-3, or your own: {"bias": [five or six numbers], "exponent": [as'
+            " many]}.",
         ),
     ],
     top: Annotated[int, typer.Option(help="How many of the best designs to show.")] = 20,

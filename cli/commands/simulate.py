@@ -37,7 +37,9 @@ def simulate(
         Path | None,
         typer.Option(metavar="FILE", help="JSON object of gait parameters, beside the design."),
     ] = None,
-    preference: Annotated[str, typer.Option(help="A, B or C: how objectives are weighed.")] = "A",
+    preference: Annotated[
+        str, typer.Option(help="A, B, C or chapter-3: how objectives are weighed.")
+    ] = "A",
     log: Annotated[
         Path | None,
         typer.Option(metavar="FILE.npz", help="Write the walks' 500 Hz logs as NumPy arrays."),
@@ -77,7 +79,7 @@ def simulate(
 
 def _show(view: SimulationView, *, as_json: bool) -> None:
     from cli.output import print_text, stdout_console
-    from cli.tables import number, results_table
+    from cli.tables import results_table, worth
     from sim.outcome import OBJECTIVES
 
     if as_json:
@@ -85,7 +87,7 @@ def _show(view: SimulationView, *, as_json: bool) -> None:
         return
     console = stdout_console()
     console.print(results_table({"": view.scenarios}, OBJECTIVES))
-    console.print(f"fitness {number(view.fitness)}", markup=False)
+    console.print(f"fitness {worth(view)}", markup=False)
     for name, result in view.scenarios.items():
         if result.status != "ok":
             console.print(f"{name}: {result.explanation}", markup=False)

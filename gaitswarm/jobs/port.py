@@ -276,7 +276,8 @@ class Jobs(Walks, ABC):
 
         Args:
             job_id: Identifier of a job that tunes a drive.
-            preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+            preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
+                `Preference`.
             top: How many of the best designs to list, 1 to 1000.
 
         Returns:

@@ -38,7 +38,8 @@ class Walks(ABC):
                 all presets.
             controller: Motor controller that drives the robot.
             robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-            preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+            preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
+                `Preference`.
             log: Whether to record every walk at 500 Hz.
 
         Returns:

@@ -133,7 +133,8 @@ def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
     """By what to judge the designs of a job anew.
 
     Args:
-        preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
+            `Preference`.
         top: How many of the best designs to list.
 
     Returns:
@@ -161,7 +162,8 @@ def simulation(
         scenarios: Names or numbers of presets, or `Scenario`; None for all presets.
         controller: Motor controller that drives the robot.
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        preference: How objectives are weighed: A, B, C of table 4.5, or `Preference`.
+        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
+            `Preference`.
         log: Whether to record every walk at 500 Hz.
 
     Returns:

@@ -132,7 +132,9 @@ class SimulationRequest(WalkRequest):
         examples=[["normal-fast", "2"]],
     )
     preference: PreferenceChoice = Field(
-        default="A", description="How objectives are weighed: A, B, C of table 4.5, or your own."
+        default="A",
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own.",
     )
     log: bool = Field(
         default=False, description="Whether to return the 500 Hz log of every walk; it is large."

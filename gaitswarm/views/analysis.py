@@ -81,7 +81,8 @@ class RankingRequest(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     preference: PreferenceChoice = Field(
-        description="How objectives are weighed: A, B, C of table 4.5, or your own.",
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own.",
         examples=["B"],
     )
     top: int = Field(default=20, ge=1, le=1000, description="How many of the best to list.")
@@ -98,6 +99,11 @@ class RankedDesignView(View):
     iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
     particle: int = Field(description="Particle of the swarm, from 0.", examples=[7])
     fitness: float = Field(description="By the preference that was asked for [1].", examples=[20.8])
+    figure_of_merit: float | None = Field(
+        default=None,
+        description="To be maximized: F of eq. 3.1 [1] if chapter-3 was asked for, else null.",
+        examples=[6.9],
+    )
     rank_before: int | None = Field(
         description="Place by the job's own preference, from 1; null if that has none."
     )
@@ -182,6 +188,7 @@ def _top(
             iteration=view.iteration,
             particle=view.particle,
             fitness=design.fitness,
+            figure_of_merit=view.figure_of_merit,
             rank_before=design.rank_before,
             fitness_before=finite(float(columns.fitness[design.row])),
             design=view.design,

@@ -47,7 +47,7 @@ class ScenarioView(Scenario):
 
 
 class PreferenceView(Preference):
-    """A published preference (thesis table 4.5)."""
+    """A published preference (thesis table 4.5, eq. 3.1)."""
 
     name: PreferenceName = Field(description="Name, as in job specs.", examples=["A"])
 
@@ -80,7 +80,7 @@ def scenario_views() -> list[ScenarioView]:
 
 
 def preference_views() -> list[PreferenceView]:
-    """The preferences of table 4.5, in its order."""
+    """The preferences of table 4.5, in its order, then that of eq. 3.1."""
     return [PreferenceView(name=name, **dict(p)) for name, p in PREFERENCES.items()]
 
 

@@ -57,8 +57,8 @@ class ScenarioResultView(View):
     )
     utility: float | None = Field(
         description="To be minimized; null if the walk failed. A walk's is the bias-weighted"
-        " product of f1..f5 under the job's preference (eq. 4.1) [1], a fit's the mean absolute"
-        " error of currents over the job's links [A].",
+        " product of objectives under the job's preference (eq. 3.8, 4.1) [1], a fit's the mean"
+        " absolute error of currents over the job's links [A].",
         examples=[21.05],
     )
     objectives: dict[str, float | None] = Field(
@@ -100,6 +100,12 @@ class EvaluationView(View):
         description="To be minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or"
         " mean error of the fits (eq. 2.21) [A]; null if the design failed in any case.",
         examples=[20.87],
+    )
+    figure_of_merit: float | None = Field(
+        default=None,
+        description="To be maximized: F of eq. 3.1 [1], which is 1e5 / `fitness` under the"
+        " preference chapter-3; null under any other, and if the design failed.",
+        examples=[6.9],
     )
     design: dict[str, float] = Field(
         description="Value of every variable, searched and fixed, by name; units as in"
@@ -152,6 +158,7 @@ def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[Eval
             iteration=evaluation.iteration,
             particle=evaluation.particle,
             fitness=finite(evaluation.fitness),
+            figure_of_merit=spec.figure_of_merit(evaluation.fitness),
             design=dict(zip(variables, evaluation.design.tolist(), strict=True)),
             scenarios=case_results(
                 spec.case_names,

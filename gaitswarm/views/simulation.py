@@ -11,7 +11,7 @@ from pydantic import Field, WithJsonSchema
 
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ScenarioResultView, case_results
-from services.optimizer.jobs.preference import Preference, judge
+from services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from sim.kernel.observation import WalkLog
 from sim.outcome import OBJECTIVES, Status
 from sim.robot import RobotSource
@@ -105,6 +105,12 @@ class SimulationView(View):
         " null if any walk failed.",
         examples=[20.87],
     )
+    figure_of_merit: float | None = Field(
+        default=None,
+        description="To be maximized: F of eq. 3.1 [1], which is 1e5 / `fitness` under the"
+        " preference chapter-3; null under any other, and if any walk failed.",
+        examples=[6.9],
+    )
     scenarios: dict[str, SimulatedScenarioView] = Field(
         description="Result in each scenario, by the scenario's name."
     )
@@ -143,6 +149,7 @@ class SimulationView(View):
             design=dict(design),
             preference=preference,
             fitness=finite(float(judged.fitness[0])),
+            figure_of_merit=figure_of_merit(float(judged.fitness[0]), preference),
             scenarios={
                 name: SimulatedScenarioView.model_construct(**dict(results[name]), log=log)
                 for name, log in zip(names, recorded or [None] * len(names), strict=True)

@@ -54,7 +54,7 @@ def nothing_is_written(store: SqlStore) -> Iterator[None]:
         ({"fixed": {"warp": 9}}, "fixed", "unknown variable"),
         ({"controller": "telepathy"}, "controller", "fuzzy-pi"),
         ({"robot": "octopus"}, "robot", "szabadka2"),
-        ({"preference": "Z"}, "preference", "'A', 'B' or 'C'"),
+        ({"preference": "Z"}, "preference", "'A', 'B', 'C' or 'chapter-3'"),
         ({"preference": {"bias": BIASES, "exponent": [0.0] * 5}}, "preference", "all zero"),
         ({"iterations": 0}, "iterations", "greater than or equal to 1"),
         ({"iterations": 2.5}, "iterations", "integer"),

@@ -44,6 +44,7 @@ def test_preferences_have_their_biases_and_exponents(client: httpx2.Client) -> N
     assert [item["name"] for item in found] == list(PREFERENCES)
     assert found[1]["bias"] == [0.4, 0.7, 0.3, 0.4, 1.0]
     assert found[2]["exponent"] == [1.0] * 5
+    assert found[3]["bias"] == [0.0, 0.0, 0.0, 0.0, 0.0, 0.03]
 
 
 def test_controllers_have_variables_with_bounds_units_and_published_designs(

@@ -65,7 +65,7 @@ def test_a_robot_file_speaks_for_itself() -> None:
 @pytest.mark.parametrize(
     ("document", "field", "hint"),
     [
-        ({"preference": "D"}, "preference", "'A', 'B' or 'C'"),
+        ({"preference": "D"}, "preference", "'A', 'B', 'C' or 'chapter-3'"),
         ({"scenarios": ["1", "moon"]}, "scenarios.1", "unknown scenario 'moon'"),
         ({"variables": ["I", "1"]}, "variables.1", "pattern"),
         ({"robot": "octopus"}, "robot", "'szabadka2'"),

@@ -232,6 +232,21 @@ def test_designs_are_ranked_by_another_preference(
     assert len(table.splitlines()) == 4
 
 
+def test_a_ranking_by_chapter_3_shows_what_it_maximizes_beside_the_fitness(
+    gaitswarm: Gaitswarm, finished: Finished, place: Place
+) -> None:
+    asked = ("rank", finished.id, "--preference", "chapter-3", *place(finished.db))
+    top = gaitswarm(*asked, "--json").json["top"]
+    for design in top:
+        f1, f2, f3, f4, f5, f6 = design["scenarios"]["short"]["objectives"].values()
+        merit = 1e5 / (f1 * f2 * f3 * f4 * f5**2 * (abs(f6) + 0.03))
+        assert design["figure_of_merit"] == pytest.approx(merit)
+        assert design["fitness"] == pytest.approx(1e5 / merit)
+    merits = [design["figure_of_merit"] for design in top]
+    assert merits == sorted(merits, reverse=True) and len(merits) == 6
+    assert "F (eq. 3.1)" in gaitswarm(*asked).out
+
+
 @pytest.mark.parametrize(
     ("options", "field"),
     [

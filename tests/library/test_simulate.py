@@ -38,6 +38,18 @@ def test_one_design_is_worth_what_a_request_says() -> None:
         assert dict(zip(OBJECTIVE_NAMES, result.objectives[0, k], strict=True)) == walk.objectives
 
 
+def test_by_the_preference_of_chapter_3_a_design_has_a_figure_of_merit() -> None:
+    result = simulate(preference="chapter-3")
+    f1, f2, f3, f4, f5, f6 = result.objectives[0, 0].tolist()
+    merit = 1e5 / (f1 * f2 * f3 * f4 * f5**2 * (abs(f6) + 0.03))
+    assert result.figure_of_merit.tolist() == pytest.approx([merit])
+    request = SimulationRequest(
+        controller="pi", design=PI, scenarios=(FAST,), preference="chapter-3"
+    )
+    assert run_simulation(request).figure_of_merit == pytest.approx(merit)
+    assert np.isnan(simulate(preference="A").figure_of_merit).all()
+
+
 def test_without_a_choice_a_design_walks_in_all_six_scenarios() -> None:
     published = gaitswarm.CONTROLLERS["fuzzy-pi"].published["A"]
     result = gaitswarm.simulate(published)

@@ -1,4 +1,4 @@
-"""Eq. 4.1 and 4.2 against the thesis's published numbers."""
+"""Eq. 3.1, 3.8, 4.1 and 4.2 against the thesis's published numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from services.optimizer.jobs.preference import PREFERENCES, Preference, judge, log_utilities
+from services.optimizer.jobs.preference import (
+    PREFERENCES,
+    Preference,
+    PreferenceName,
+    figure_of_merit,
+    judge,
+    log_utilities,
+)
 from sim.outcome import Outcome, Status
 
 TABLE_3_6 = (8.71, 1.77, 16.09, 41.96)
@@ -20,8 +27,9 @@ HEIGHT_LOSS = -3.8e-3
 
 
 def outcome(*rows: tuple[float, ...], statuses: tuple[int, ...] | None = None) -> Outcome:
+    """Rows of f1..f5 or f1..f6."""
     return Outcome(
-        np.array([[*row, 0.0] for row in rows]),
+        np.array([(*row, 0.0)[:6] for row in rows]),
         np.array(statuses or [Status.OK] * len(rows), dtype=np.uint8),
     )
 
@@ -51,6 +59,50 @@ def test_with_f5_the_speed_itself_the_published_utility_is_missed() -> None:
 def test_preference_c_is_the_plain_product() -> None:
     row = (*TABLE_3_6, 1.0 / SPEED)
     assert utility(row, PREFERENCES["C"]) == pytest.approx(math.prod(row), rel=1e-14)
+
+
+def test_the_published_row_gives_the_published_figure_of_merit_of_chapter_3() -> None:
+    """Printed is 6.887, of inputs that were not rounded."""
+    row = (*TABLE_3_6, 1.0 / SPEED, HEIGHT_LOSS)
+    chapter_3 = PREFERENCES["chapter-3"]
+    fitness, _ = worth([outcome(row)], chapter_3)
+    direct = 1e5 * SPEED**2 / (math.prod(TABLE_3_6) * (abs(HEIGHT_LOSS) + 0.03))
+    assert figure_of_merit(float(fitness[0]), chapter_3) == pytest.approx(direct, rel=1e-12)
+    assert direct == pytest.approx(6.92, abs=0.005)
+
+
+def test_the_figure_of_merit_of_several_walks_is_the_geometric_mean_of_theirs() -> None:
+    rows = [(*TABLE_3_6, 6.4, HEIGHT_LOSS), (1.0, 2.0, 3.0, 4.0, 5.0, 0.01)]
+    chapter_3 = PREFERENCES["chapter-3"]
+    fitness, utilities = worth([outcome(row) for row in rows], chapter_3)
+    each = [1e5 / value for value in utilities[0].tolist()]
+    together = figure_of_merit(float(fitness[0]), chapter_3)
+    assert together == pytest.approx(math.sqrt(each[0] * each[1]), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C"])
+def test_only_chapter_3_has_a_figure_of_merit(name: PreferenceName) -> None:
+    assert figure_of_merit(20.0, PREFERENCES[name]) is None
+
+
+@pytest.mark.parametrize("fitness", [math.inf, math.nan, 0.0, 5e-324])
+def test_a_failed_or_impossible_fitness_has_no_figure_of_merit(fitness: float) -> None:
+    assert figure_of_merit(fitness, PREFERENCES["chapter-3"]) is None
+
+
+def test_a_loss_of_height_counts_by_its_size_whatever_its_sign() -> None:
+    rising, sinking = ((*TABLE_3_6, 6.4, sign * 0.01) for sign in (1.0, -1.0))
+    level = (*TABLE_3_6, 6.4, 0.0)
+    chapter_3 = PREFERENCES["chapter-3"]
+    assert utility(rising, chapter_3) == utility(sinking, chapter_3)
+    assert utility(level, chapter_3) / utility(sinking, chapter_3) == pytest.approx(0.03 / 0.04)
+
+
+def test_a_sixth_objective_without_a_weight_changes_no_bit() -> None:
+    five = PREFERENCES["A"]
+    six = Preference(bias=(*five.bias, 0.03), exponent=(*five.exponent, 0.0))
+    row = (*TABLE_3_6, 6.4, HEIGHT_LOSS)
+    assert utility(row, six) == utility(row, five)
 
 
 def test_fitness_is_the_geometric_mean_over_the_scenarios() -> None:
@@ -113,6 +165,9 @@ def test_a_utility_beyond_a_double_is_infinite_as_that_of_a_failed_walk() -> Non
         ("exponent", (-1.0, 1.0, 1.0, 1.0, 1.0)),
         ("exponent", (math.nan, 1.0, 1.0, 1.0, 1.0)),
         ("exponent", (0.0,) * 5),
+        ("exponent", (1.0,) * 6),
+        ("bias", (0.0,) * 4),
+        ("bias", (0.0,) * 7),
     ],
 )
 def test_a_preference_that_cannot_rank_is_refused(field: str, values: tuple[float, ...]) -> None:

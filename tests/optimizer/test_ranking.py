@@ -19,11 +19,18 @@ from tests.optimizer.columns import columns_of, fitness_only
 objective = st.one_of(
     st.floats(-1.0, 1e6), st.sampled_from([0.0, -0.9, math.nan, math.inf, 1e-300, 5e-324])
 )
-preference = st.builds(
-    Preference,
-    bias=st.tuples(*[st.floats(0.0, 1e6)] * 5),
-    exponent=st.tuples(*[st.one_of(st.just(0.0), st.floats(0.01, 10.0))] * 5).filter(any),
-)
+
+
+def preferences(entries: int) -> st.SearchStrategy[Preference]:
+    """Preferences of so many objectives."""
+    return st.builds(
+        Preference,
+        bias=st.tuples(*[st.floats(0.0, 1e6)] * entries),
+        exponent=st.tuples(*[st.one_of(st.just(0.0), st.floats(0.01, 10.0))] * entries).filter(any),
+    )
+
+
+preference = st.one_of(preferences(5), preferences(6))
 
 
 @given(
@@ -76,6 +83,15 @@ def test_another_preference_puts_other_designs_first() -> None:
     assert [d.fitness for d in ranking.top] == pytest.approx([7.0, 8.0])
     assert ranking.present_best == pytest.approx(9.0)
     assert ranking.correlation == pytest.approx(-1.0)
+
+
+def test_a_preference_of_six_objectives_ranks_by_the_size_of_the_height_loss() -> None:
+    objectives = two_objectives((1, 1), (2, 2), (3, 3))
+    objectives[:, 0, 5] = (-0.03, 0.02, 0.01)
+    height = Preference(bias=(0.0,) * 6, exponent=(0.0,) * 5 + (1.0,))
+    ranking = rank(columns_of(objectives, preference=TORQUE), height, top=3)
+    assert [(d.row, d.rank_before) for d in ranking.top] == [(2, 3), (1, 2), (0, 1)]
+    assert [d.fitness for d in ranking.top] == pytest.approx([0.01, 0.02, 0.03])
 
 
 def test_the_jobs_own_preference_changes_nothing() -> None:

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import type { Preference, ScenarioResult } from '../src/api/types'
-import { analyse, utilityOf } from '../src/job/preference'
+import { analyse, utilityOf, weighed } from '../src/job/preference'
 
 const PREFERENCE: Preference = { bias: [0, 0, 0, 0, 1], exponent: [1, 0, 0, 2, 1] }
 
@@ -14,6 +14,16 @@ const walked = (torque: number, energy: number, reciprocal_speed: number): Scena
 describe('the utility', () => {
   test('is the product of (b + f) ** e', () => {
     expect(utilityOf(walked(3, 2, 4), PREFERENCE)).toBeCloseTo(3 * 2 ** 2 * 5, 12)
+  })
+
+  test('weighs as many objectives as the preference has, and a loss of height by its size', () => {
+    const six = { bias: [...PREFERENCE.bias, 0.03], exponent: [...PREFERENCE.exponent, 1] }
+    const sunk = walked(3, 2, 4)
+    const result = { ...sunk, objectives: { ...sunk.objectives, height_loss: -0.01 } }
+    expect(utilityOf(result, PREFERENCE)).toBeCloseTo(60, 12)
+    expect(utilityOf(result, six)).toBeCloseTo(60 * 0.04, 12)
+    expect(weighed(PREFERENCE)).toHaveLength(5)
+    expect(weighed(six)).toHaveLength(6)
   })
 
   test('of a failed walk there is none', () => {

@@ -1,4 +1,4 @@
-"""Bias-weighted product and geometric mean (thesis eq. 4.1, 4.2) of many designs at once.
+"""Bias-weighted product and geometric mean (eq. 3.8, 4.1, 4.2) of many designs at once.
 
 The same numbers as `services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
 differ from Python's in the last bit, so that nothing that is stored is computed here.
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.preference import Preference
+from services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
 
@@ -23,7 +23,7 @@ _BLOCK: Final = 4096
 
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
-    """Logarithm of the bias-weighted product (eq. 4.1).
+    """Logarithm of the bias-weighted product (eq. 3.8, 4.1).
 
     Args:
         columns: r evaluations of walks in K scenarios.
@@ -44,7 +44,8 @@ def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
         total = np.zeros(objectives.shape[:2])
         missing = columns.statuses[rows] != 0
         for m, bias, exponent in weighted:
-            factor = bias + objectives[:, :, m]
+            column = objectives[:, :, m]
+            factor = bias + (np.abs(column) if m == HEIGHT_LOSS else column)
             missing |= ~np.isfinite(factor)
             # A factor of zero or less cannot be improved upon, as in `preference`.
             with np.errstate(divide="ignore", invalid="ignore"):

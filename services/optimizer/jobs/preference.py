@@ -1,4 +1,4 @@
-"""Bias-weighted product and geometric mean (thesis eq. 4.1, 4.2), in logarithms."""
+"""Bias-weighted product and geometric mean (eq. 3.8, 4.1, 4.2)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,17 @@ from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 from services.optimizer.jobs.spec import Judgement, exponential
 from sim.choice import NAME, OWN, alternatives
 
-# f6 belongs to the fitness of chapter 3, which is of a single scenario.
-_FIELDS: Final = ("torque", "acceleration", "angular_acceleration", "energy", "reciprocal_speed")
+_FIELDS: Final = (
+    "torque",
+    "acceleration",
+    "angular_acceleration",
+    "energy",
+    "reciprocal_speed",
+    "height_loss",
+)
 
+HEIGHT_LOSS: Final = _FIELDS.index("height_loss")
+"""Index of f6, which preferences weigh by its absolute value."""
 
 # At an exponent of ten, five factors of a million are still within a double; beyond, a utility is
 # infinite, as that of a failed walk.
@@ -23,19 +31,27 @@ Exponent = Annotated[float, Field(ge=0.0, le=10.0)]
 
 
 class Preference(BaseModel):
-    """Biases b and exponents e of the five objectives, in the order f1..f5 of table 4.1.
+    """Biases b and exponents e of the objectives, in the order f1..f6 of table 4.1.
 
-    A scenario's utility is prod_m (b_m + f_m) ** e_m, to be minimized.
+    A scenario's utility is prod_m (b_m + f_m) ** e_m, to be minimized: with five entries the
+    bias-weighted product of chapter 4 (eq. 4.1), with six that of chapter 3 (eq. 3.8). The loss of
+    height f6 has a sign, and enters by its absolute value, as in eq. 3.1.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    bias: tuple[Bias, Bias, Bias, Bias, Bias] = Field(
-        description="b_m >= 0, in the unit of f_m: " + ", ".join(_FIELDS),
+    bias: tuple[Bias, ...] = Field(
+        min_length=5,
+        max_length=6,
+        description="b_m >= 0, in the unit of f_m: "
+        + ", ".join(_FIELDS)
+        + "; five, or six to weigh the last as well.",
         examples=[(0.9, 0.8, 0.24, 0.5, 0.8)],
     )
-    exponent: tuple[Exponent, Exponent, Exponent, Exponent, Exponent] = Field(
-        description="e_m >= 0: weight of each objective; not all of them zero.",
+    exponent: tuple[Exponent, ...] = Field(
+        min_length=5,
+        max_length=6,
+        description="e_m >= 0: weight of each objective, as many as biases; not all of them zero.",
         examples=[(0.1, 0.7, 0.3, 0.3, 0.1)],
     )
 
@@ -43,14 +59,19 @@ class Preference(BaseModel):
     def _ranks_designs(self) -> Preference:
         if not any(self.exponent):
             raise ValueError("exponents are all zero, so every design would be worth the same")
+        if len(self.bias) != len(self.exponent):
+            raise ValueError(
+                f"{len(self.bias)} biases and {len(self.exponent)} exponents; each objective has"
+                " one of both"
+            )
         return self
 
 
-PreferenceName = Literal["A", "B", "C"]
+PreferenceName = Literal["A", "B", "C", "chapter-3"]
 
 PreferenceChoice = Annotated[
     Annotated[PreferenceName, Tag(NAME)] | Annotated[Preference, Tag(OWN)],
-    alternatives("must be 'A', 'B' or 'C', or an object: a preference of your own"),
+    alternatives("must be 'A', 'B', 'C' or 'chapter-3', or an object: a preference of your own"),
 ]
 """How jobs and requests choose a preference."""
 
@@ -58,8 +79,32 @@ PREFERENCES: Final[dict[PreferenceName, Preference]] = {
     "A": Preference(bias=(0.9, 0.8, 0.24, 0.5, 0.8), exponent=(0.1, 0.7, 0.3, 0.3, 0.1)),
     "B": Preference(bias=(0.4, 0.7, 0.3, 0.4, 1.0), exponent=(0.2, 0.6, 0.8, 0.1, 0.2)),
     "C": Preference(bias=(0.0, 0.0, 0.0, 0.0, 0.0), exponent=(1.0, 1.0, 1.0, 1.0, 1.0)),
+    "chapter-3": Preference(
+        bias=(0.0, 0.0, 0.0, 0.0, 0.0, 0.03), exponent=(1.0, 1.0, 1.0, 1.0, 2.0, 1.0)
+    ),
 }
-"""Table 4.5."""
+"""A, B, C of table 4.5; and chapter 3's, whose utility is 1e5 / F with F of eq. 3.1."""
+
+_NUMERATOR: Final = 1e5
+
+
+def figure_of_merit(fitness: float, preference: Preference) -> float | None:
+    """F of eq. 3.1, which chapter 3 maximizes: 1e5 V^2 / (E F_GEAR F_ACC F_ANGACC (|Z| + 0.03)).
+
+    Of several scenarios it is the geometric mean of theirs.
+
+    Args:
+        fitness: by the preference, +inf where a walk failed.
+        preference: that the fitness is by.
+
+    Returns:
+        1e5 / fitness under the preference `chapter-3`; None under any other, and for a fitness
+        that has no finite reciprocal.
+    """
+    if preference != PREFERENCES["chapter-3"] or not 0.0 < fitness < math.inf:
+        return None
+    value = _NUMERATOR / fitness
+    return value if math.isfinite(value) else None
 
 
 def judge(
@@ -68,8 +113,8 @@ def judge(
     """Judge designs by the bias-weighted product and the geometric mean (eq. 4.1, 4.2).
 
     Args:
-        objectives: (n, K, >= 5) raw objectives of n designs in K scenarios, f1..f5 of table 4.1
-            first, in their units.
+        objectives: (n, K, 6) raw objectives of n designs in K scenarios, f1..f6 of table 4.1, in
+            their units.
         failed: (n, K), true where a walk has no utility.
         preference: biases and exponents.
 
@@ -83,10 +128,10 @@ def judge(
 def log_utilities(
     objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
 ) -> NDArray[np.float64]:
-    """Logarithm of the bias-weighted product (eq. 4.1).
+    """Logarithm of the bias-weighted product (eq. 3.8, 4.1).
 
     Args:
-        objectives: (..., >= 5) raw objectives, f1..f5 of table 4.1 first, in their units.
+        objectives: (..., 6) raw objectives, f1..f6 of table 4.1, in their units.
         failed: (...), true where a walk has no utility.
         preference: biases and exponents.
 
@@ -118,10 +163,10 @@ def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _log_product(row: list[float], preference: Preference) -> float:
     terms = []
-    for f, b, e in zip(row, preference.bias, preference.exponent, strict=False):
+    for m, (b, e) in enumerate(zip(preference.bias, preference.exponent, strict=True)):
         if e == 0.0:
             continue
-        factor = b + f
+        factor = b + (abs(row[m]) if m == HEIGHT_LOSS else row[m])
         if not math.isfinite(factor):
             return math.inf
         # A factor of zero or less cannot be improved upon.

@@ -176,6 +176,17 @@ class Spec(BaseModel):
             Fitness and utilities of the n designs.
         """
 
+    def figure_of_merit(self, fitness: float) -> float | None:  # noqa: ARG002 - kinds may have one
+        """What a fitness is in a figure that is maximized, where the job has one.
+
+        Args:
+            fitness: of a design, minimized.
+
+        Returns:
+            The figure, None for a job that has none.
+        """
+        return None
+
     @abstractmethod
     def resolved(self) -> Self:
         """The same job with presets written out, so that it stays what it was when they change.

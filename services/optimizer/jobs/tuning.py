@@ -11,7 +11,13 @@ from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice, judge
+from services.optimizer.jobs.preference import (
+    PREFERENCES,
+    Preference,
+    PreferenceChoice,
+    figure_of_merit,
+    judge,
+)
 from services.optimizer.jobs.spec import Judgement, Spec
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
@@ -64,7 +70,9 @@ class JobSpec(Spec):
         " /v1/scenarios), or scenarios of your own.",
     )
     preference: PreferenceChoice = Field(
-        default="A", description="How objectives are weighed: A, B, C of table 4.5, or your own."
+        default="A",
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own.",
     )
 
     @model_validator(mode="after")
@@ -146,7 +154,7 @@ class JobSpec(Spec):
         )
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by the preference (eq. 4.1, 4.2).
+        """Judge designs by the preference (eq. 3.8, 4.1, 4.2).
 
         Args:
             objectives: (n, K, 6) raw objectives, in their units.
@@ -156,6 +164,17 @@ class JobSpec(Spec):
             Fitness and utilities of the n designs.
         """
         return judge(objectives, failed, self.resolved_preference())
+
+    def figure_of_merit(self, fitness: float) -> float | None:
+        """F of eq. 3.1, to be maximized.
+
+        Args:
+            fitness: of a design, by the job's preference.
+
+        Returns:
+            F if the preference is that of chapter 3, else None.
+        """
+        return figure_of_merit(fitness, self.resolved_preference())
 
     def resolved(self) -> JobSpec:
         """The same job with scenarios, preference and variables written out."""

@@ -5,7 +5,7 @@ import { useNow } from '../api/resource'
 import type { StoredJob } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
-import { formatCount, quantity } from '../format/number'
+import { formatCount, formatNumber, quantity } from '../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../format/time'
 import { JobActions } from './actions'
 import { fitnessUnit } from './fitness'
@@ -56,6 +56,7 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
 function Figures({ job, committed }: { job: StoredJob; committed: number }) {
   const now = useNow(1000)
   const unit = fitnessUnit(job)
+  const merit = job.best?.figure_of_merit ?? null
   return (
     <dl class="figures">
       <Figure
@@ -63,6 +64,7 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
         value={`${formatCount(committed)} of ${formatCount(job.iterations_planned)}`}
       />
       <Figure label="Best fitness" value={quantity(job.best_fitness, unit, 5)} />
+      {merit !== null && <Figure label="F of eq. 3.1, maximized" value={formatNumber(merit, 5)} />}
       <Figure
         label="Found in iteration"
         value={job.best_iteration === null ? '–' : formatCount(job.best_iteration)}

@@ -1,10 +1,10 @@
-/** Biases and exponents of the five objectives to move, and the published preferences. */
+/** Biases and exponents of the objectives to move, and the published preferences. */
 
 import { useState } from 'preact/hooks'
 import type { Preference, PreferencePreset } from '../api/types'
 import { writtenUnit } from '../format/number'
 import { inWords } from '../format/words'
-import { PREFERRED } from './preference'
+import { weighed } from './preference'
 
 type Part = 'bias' | 'exponent'
 
@@ -54,7 +54,7 @@ export function PreferenceSliders({
             />
           ))}
         </fieldset>
-        {PREFERRED.map((objective, index) => (
+        {weighed(preference).map((objective, index) => (
           <fieldset key={objective} class="weights">
             <legend>{inWords(objective)}</legend>
             <Weight
@@ -137,6 +137,7 @@ function Choice({
 }
 
 export function same(a: Preference, b: Preference): boolean {
-  const equal = (x: readonly number[], y: readonly number[]) => x.every((v, k) => v === y[k])
+  const equal = (x: readonly number[], y: readonly number[]) =>
+    x.length === y.length && x.every((v, k) => v === y[k])
   return equal(a.bias, b.bias) && equal(a.exponent, b.exponent)
 }

@@ -1,15 +1,21 @@
-/** The bias-weighted product and its parts (thesis eq. 4.1, 4.2), to explain what limits a design. */
+/** The bias-weighted product and its parts (eq. 3.8, 4.1, 4.2), to explain what limits a design. */
 
 import type { Preference, ScenarioResult } from '../api/types'
 
-/** The objectives that a preference weighs, in its order: f1..f5 of table 4.1. */
-export const PREFERRED = [
+/** The objectives that a preference may weigh, in its order: f1..f6 of table 4.1. */
+const PREFERRED = [
   'torque',
   'acceleration',
   'angular_acceleration',
   'energy',
   'reciprocal_speed',
+  'height_loss',
 ] as const
+
+/** The objectives that a preference of so many entries weighs. */
+export function weighed({ bias }: { readonly bias: readonly unknown[] }): readonly string[] {
+  return PREFERRED.slice(0, bias.length)
+}
 
 /** One factor (b + f)^e of a scenario's utility. */
 export interface Factor {
@@ -73,14 +79,17 @@ function factorsOf(
 ): Factor[] | null {
   if (result.status !== 'ok') return null
   const factors: Factor[] = []
-  for (const [m, objective] of PREFERRED.entries()) {
-    const [b, e, f] = [bias[m], exponent[m], result.objectives[objective]]
+  for (const [m, objective] of weighed({ bias }).entries()) {
+    const [b, e, value] = [bias[m], exponent[m], result.objectives[objective]]
     if (e === 0) continue
-    if (f === null || f === undefined || !(b + f > 0)) return null
+    if (value === null || value === undefined) return null
+    // The loss of height has a sign, and counts by its size.
+    const f = objective === 'height_loss' ? Math.abs(value) : value
+    if (!(b + f > 0)) return null
     factors.push({
       scenario,
       objective,
-      value: f,
+      value,
       contribution: e * Math.log(b + f),
       sensitivity: (e * f) / (b + f) / scenarios,
     })

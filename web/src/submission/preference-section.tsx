@@ -2,7 +2,7 @@
 
 import { formatExact } from '../format/number'
 import { inWords } from '../format/words'
-import { PREFERRED } from '../job/preference'
+import { weighed } from '../job/preference'
 import { type PreferenceDraft, preferenceDraft } from './draft'
 import { Problems } from './number-field'
 import type { SectionProps } from './section'
@@ -49,7 +49,7 @@ export function PreferenceSection({ draft, catalogue, errors, onChange }: Sectio
               </tr>
             </thead>
             <tbody>
-              {PREFERRED.map((objective, index) => (
+              {weighed(preference).map((objective, index) => (
                 <tr key={objective}>
                   <th scope="row">{inWords(objective)}</th>
                   {(['bias', 'exponent'] as const).map((part) => (

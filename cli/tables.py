@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         RankingView,
         ScenarioResultView,
         SimulationView,
+        SimulatedScenarioView,
     )
     from services.optimizer.jobs.provenance import JobProvenance
     from services.optimizer.jobs.spec import Spec
@@ -121,6 +122,21 @@ def results_table(
                 number(result.utility),
                 *(_objective(name, value) for name, value in result.objectives.items()),
             )
+    return table
+
+
+def measurements_table(results: Mapping[str, SimulatedScenarioView]) -> Table:
+    """Scenarios as rows, what their walks tell beside the objectives as columns."""
+    from sim.outcome import MEASUREMENTS
+
+    table = Table(title="Measured", title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("scenario", no_wrap=True)
+    for measurement in MEASUREMENTS:
+        heading = measurement.name.replace("_", " ")
+        table.add_column(f"{heading}\n{measurement.unit}", justify="right")
+    for scenario, result in results.items():
+        values = (getattr(result.measurements, m.name) for m in MEASUREMENTS)
+        table.add_row(scenario, *map(number, values))
     return table
 
 

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from sim.controllers import CONTROLLERS
     from sim.identification.recorded_walk import RecordedWalk
     from sim.kernel.observation import WalkLog
-    from sim.outcome import OBJECTIVES, Status
+    from sim.outcome import MEASUREMENTS, OBJECTIVES, Status
     from sim.robot import RobotFiles, RobotVariant
     from sim.scenario import PRESETS, SCENARIOS, Scenario
     from sim.variables import Variable
@@ -75,6 +75,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CONTROLLERS",
+    "MEASUREMENTS",
     "OBJECTIVES",
     "PREFERENCES",
     "PRESETS",
@@ -170,7 +171,7 @@ _MODULES: Final = {
     "sim.controllers": ("CONTROLLERS",),
     "sim.identification.recorded_walk": ("RecordedWalk",),
     "sim.kernel.observation": ("WalkLog",),
-    "sim.outcome": ("OBJECTIVES", "Status"),
+    "sim.outcome": ("MEASUREMENTS", "OBJECTIVES", "Status"),
     "sim.robot": ("RobotFiles", "RobotVariant"),
     "sim.scenario": ("PRESETS", "SCENARIOS", "Scenario"),
     "sim.variables": ("Variable",),

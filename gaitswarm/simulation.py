@@ -22,10 +22,10 @@ from services.optimizer.jobs.preference import judge
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.runtime import open_evaluator
 from sim.assembly import Backend
-from sim.case import Walk
+from sim.case import MeasuredWalk
 from sim.controllers import ControllerName
 from sim.kernel.observation import WalkLog
-from sim.outcome import Outcome, Status
+from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.provenance import provenance_of
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate as simulate_walk
@@ -165,7 +165,7 @@ def _simulated(
     scenarios = request.resolved_scenarios()
     logs: dict[str, tuple[WalkLog | None, ...]] = {}
     if len(designs) == 1 or request.log or backend != "auto":
-        outcomes = []
+        parts = []
         for scenario in scenarios:
             walk = simulate_walk(
                 scenario,
@@ -176,13 +176,15 @@ def _simulated(
                 log=request.log,
                 backend=backend,
             )
-            outcomes.append(walk.outcome)
+            columns = [walk.outcome.objectives, walk.measurements.array()]
+            parts.append(Outcome(np.concatenate(columns, axis=1), walk.outcome.statuses))
             if request.log:
                 logs[scenario.name] = walk.logs
     else:
-        outcomes = list(_in_parallel(request, scenarios, variables, designs, cpus))
-    statuses = np.stack([outcome.statuses for outcome in outcomes], axis=1)
-    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+        parts = list(_in_parallel(request, scenarios, variables, designs, cpus))
+    statuses = np.stack([part.statuses for part in parts], axis=1)
+    columns_by_walk = np.stack([part.objectives for part in parts], axis=1)
+    objectives, measurements = np.split(columns_by_walk, [N_OBJECTIVES], axis=2)
     preference = request.resolved_preference()
     judged = judge(objectives, statuses != Status.OK, preference)
     return SimulationResult(
@@ -194,6 +196,7 @@ def _simulated(
         scenarios=tuple(scenario.name for scenario in scenarios),
         statuses=statuses,
         objectives=objectives,
+        measurements=measurements,
         utilities=_finite(judged.utilities),
         fitness=_finite(judged.fitness),
         logs=logs,
@@ -207,8 +210,8 @@ def _in_parallel(
     designs: Floats,
     cpus: int | None,
 ) -> Sequence[Outcome]:
-    """One outcome for every scenario, computed by threads of this process."""
-    cases = tuple(Walk(request.robot, request.controller, s, variables) for s in scenarios)
+    """Objectives and measurements for every scenario, computed by threads of this process."""
+    cases = tuple(MeasuredWalk(request.robot, request.controller, s, variables) for s in scenarios)
     with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
         asked = EvaluationRequest("", cases, designs, provenance_of(request.robot))
         return evaluator.evaluate(asked, lambda: False)

@@ -13,7 +13,7 @@ from gaitswarm.tables import Table
 from gaitswarm.views import SimulationView
 from services.optimizer.jobs.preference import Preference, figure_of_merit
 from sim.kernel.observation import WalkLog
-from sim.outcome import OBJECTIVE_NAMES, Status
+from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
 from sim.robot import RobotSource
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ class ScenarioResult:
         statuses: How each walk ended; everything but `Status.OK` is a failed walk.
         objectives: (n,) raw objectives by name, to be minimized, NaN where there is none;
             `gaitswarm.OBJECTIVES` has their units.
+        measurements: (n,) what the walks tell beside their objectives, by name, NaN where a walk
+            ended early; `gaitswarm.MEASUREMENTS` has their units.
         utility: (n,) bias-weighted product (eq. 3.8, 4.1), to be minimized; NaN where the
             walk failed.
         logs: Every walk's log at 500 Hz, None for a gait out of reach; empty unless asked for.
@@ -37,6 +39,7 @@ class ScenarioResult:
 
     statuses: tuple[Status, ...]
     objectives: Mapping[str, Floats]
+    measurements: Mapping[str, Floats]
     utility: Floats
     logs: tuple[WalkLog | None, ...]
 
@@ -55,6 +58,8 @@ class SimulationResult:
         statuses: (n, K) how each walk ended, values of `Status`.
         objectives: (n, K, 6) raw objectives f1..f6 of table 4.1, to be minimized, in the units of
             `gaitswarm.OBJECTIVES`; NaN where there is none.
+        measurements: (n, K, 5) peak and mean current, motor heat, power and speed, in the order and
+            units of `gaitswarm.MEASUREMENTS`; NaN for a walk that ended early.
         utilities: (n, K) bias-weighted products (eq. 3.8, 4.1), to be minimized; NaN where
             the walk failed.
         fitness: (n,) geometric means of the utilities (eq. 4.2), to be minimized; NaN where any
@@ -70,6 +75,7 @@ class SimulationResult:
     scenarios: tuple[str, ...]
     statuses: NDArray[np.uint8]
     objectives: Floats
+    measurements: Floats
     utilities: Floats
     fitness: Floats
     logs: Mapping[str, tuple[WalkLog | None, ...]] = field(repr=False, default_factory=dict)
@@ -83,6 +89,7 @@ class SimulationResult:
         """
         results = list(view.scenarios.values())
         values = [[list(result.objectives.values()) for result in results]]
+        measured = [[getattr(r.measurements, m) for m in MEASUREMENT_NAMES] for r in results]
         logs = {
             name: (None if result.log is None else _log(result.log.columns),)
             for name, result in view.scenarios.items()
@@ -97,6 +104,7 @@ class SimulationResult:
             scenarios=tuple(view.scenarios),
             statuses=np.array([[Status.from_label(r.status) for r in results]], dtype=np.uint8),
             objectives=np.array(values, dtype=np.float64),
+            measurements=np.array([measured], dtype=np.float64),
             utilities=np.array([[result.utility for result in results]], dtype=np.float64),
             fitness=np.array([view.fitness], dtype=np.float64),
             logs=logs if recorded else {},
@@ -115,6 +123,7 @@ class SimulationResult:
         return ScenarioResult(
             statuses=tuple(Status(status) for status in self.statuses[:, k].tolist()),
             objectives=dict(zip(OBJECTIVE_NAMES, self.objectives[:, k].T, strict=True)),
+            measurements=dict(zip(MEASUREMENT_NAMES, self.measurements[:, k].T, strict=True)),
             utility=self.utilities[:, k],
             logs=self.logs.get(scenario, ()),
         )
@@ -124,7 +133,7 @@ class SimulationResult:
 
         Returns:
             A table with the columns design (index from 0), scenario, status, utility, the
-            objectives by name, and `design.<variable>`.
+            objectives and measurements by name, and `design.<variable>`.
         """
         n, k = self.statuses.shape
         columns: dict[str, NDArray[Any]] = {
@@ -135,6 +144,9 @@ class SimulationResult:
         }
         columns |= {
             name: self.objectives[:, :, m].ravel() for m, name in enumerate(OBJECTIVE_NAMES)
+        }
+        columns |= {
+            name: self.measurements[:, :, m].ravel() for m, name in enumerate(MEASUREMENT_NAMES)
         }
         for name, values in zip(self.variables, self.designs.T, strict=True):
             columns[f"design.{name}"] = np.repeat(values, k)

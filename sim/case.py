@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.outcome import OBJECTIVES, Objective, Outcome
+from sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
 from sim.robot import RobotSource
 from sim.scenario import Scenario
 from sim.simulate import simulate
@@ -85,3 +85,20 @@ class Walk:
         """Let every design walk."""
         walked = simulate(self.scenario, self.controller, self.variables, designs, robot=self.robot)
         return walked.outcome
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredWalk(Walk):
+    """The same walk with its measurements, as further columns behind its objectives."""
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """f1 to f6 of table 4.1, then `MEASUREMENTS`."""
+        told = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
+        return (*OBJECTIVES, *told)
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        """Let every design walk."""
+        walked = simulate(self.scenario, self.controller, self.variables, designs, robot=self.robot)
+        columns = [walked.outcome.objectives, walked.measurements.array()]
+        return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)

@@ -79,7 +79,7 @@ def simulate(
 
 def _show(view: SimulationView, *, as_json: bool) -> None:
     from cli.output import print_text, stdout_console
-    from cli.tables import results_table, worth
+    from cli.tables import measurements_table, results_table, worth
     from sim.outcome import OBJECTIVES
 
     if as_json:
@@ -87,6 +87,7 @@ def _show(view: SimulationView, *, as_json: bool) -> None:
         return
     console = stdout_console()
     console.print(results_table({"": view.scenarios}, OBJECTIVES))
+    console.print(measurements_table(view.scenarios))
     console.print(f"fitness {worth(view)}", markup=False)
     for name, result in view.scenarios.items():
         if result.status != "ok":

@@ -205,5 +205,6 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
         names=[scenario.name for scenario in scenarios],
         statuses=np.concatenate([walk.outcome.statuses for walk in walks]),
         objectives=np.concatenate([walk.outcome.objectives for walk in walks]),
+        measurements=np.concatenate([walk.measurements.array() for walk in walks]),
         logs=[log for walk in walks for log in walk.logs],
     )

@@ -42,7 +42,12 @@ from gaitswarm.views.job import (
 )
 from gaitswarm.views.particles import ParticlesHeaderView, encoded_particles
 from gaitswarm.views.problem import FieldErrorView, ProblemView, field_errors
-from gaitswarm.views.simulation import SimulatedScenarioView, SimulationView, WalkLogView
+from gaitswarm.views.simulation import (
+    MeasurementsView,
+    SimulatedScenarioView,
+    SimulationView,
+    WalkLogView,
+)
 
 __all__ = [
     "PREFIX",
@@ -59,6 +64,7 @@ __all__ = [
     "IterationView",
     "JobSummaryView",
     "JobView",
+    "MeasurementsView",
     "ObjectiveView",
     "PageView",
     "ParticlesHeaderView",

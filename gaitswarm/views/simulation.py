@@ -13,7 +13,7 @@ from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ScenarioResultView, case_results
 from services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from sim.kernel.observation import WalkLog
-from sim.outcome import OBJECTIVES, Status
+from sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
 from sim.robot import RobotSource
 
 LOG_RATE: Final = 500
@@ -80,8 +80,50 @@ class WalkLogView(View):
         )
 
 
+class MeasurementsView(View):
+    """What a walk tells beside its objectives; null where it ended early."""
+
+    peak_current: float | None = Field(
+        default=None,
+        description="Largest absolute current of any motor at any physics step [A].",
+        examples=[0.83],
+    )
+    mean_current: float | None = Field(
+        default=None,
+        description="Mean over time and motors of the absolute current [A].",
+        examples=[0.12],
+    )
+    motor_heat: float | None = Field(
+        default=None,
+        description="Mean of what the windings of all motors turn to heat, R I^2 [W].",
+        examples=[1.6],
+    )
+    power: float | None = Field(
+        default=None,
+        description="Mean electrical power of all motors, as far as it counts as spent [W].",
+        examples=[12.4],
+    )
+    speed: float | None = Field(
+        default=None, description="Mean forward speed [m/s].", examples=[0.187]
+    )
+
+    @classmethod
+    def from_row(cls, row: NDArray[np.float64]) -> MeasurementsView:
+        """Make a view of one walk's measurements.
+
+        Args:
+            row: (5,) in the order of `sim.outcome.MEASUREMENTS`, NaN where there is none.
+        """
+        return cls(**dict(zip(MEASUREMENT_NAMES, map(finite, row.tolist()), strict=True)))
+
+
 class SimulatedScenarioView(ScenarioResultView):
     """How the design did in one scenario, with its log if it was asked for."""
+
+    measurements: MeasurementsView = Field(
+        default_factory=MeasurementsView,
+        description="Currents, heat, power and speed of the walk.",
+    )
 
     log: WalkLogView | None = Field(
         default=None,
@@ -126,6 +168,7 @@ class SimulationView(View):
         names: Sequence[str],
         statuses: NDArray[np.uint8],
         objectives: NDArray[np.float64],
+        measurements: NDArray[np.float64],
         logs: Sequence[WalkLog | None],
     ) -> SimulationView:
         """Make a view of one design's walks, one in each of K scenarios.
@@ -138,6 +181,7 @@ class SimulationView(View):
             names: K names of the scenarios.
             statuses: (K,) values of `sim.outcome.Status`.
             objectives: (K, 6) raw objectives f1..f6, in their units, NaN where there is none.
+            measurements: (K, 5) as in `sim.outcome.MEASUREMENTS`, NaN where there is none.
             logs: K, or none if they were not asked for; None for a robot that never moved.
         """
         judged = judge(objectives[None], (statuses != Status.OK)[None], preference)
@@ -151,8 +195,12 @@ class SimulationView(View):
             fitness=finite(float(judged.fitness[0])),
             figure_of_merit=figure_of_merit(float(judged.fitness[0]), preference),
             scenarios={
-                name: SimulatedScenarioView.model_construct(**dict(results[name]), log=log)
-                for name, log in zip(names, recorded or [None] * len(names), strict=True)
+                name: SimulatedScenarioView.model_construct(
+                    **dict(results[name]), measurements=MeasurementsView.from_row(row), log=log
+                )
+                for name, row, log in zip(
+                    names, measurements, recorded or [None] * len(names), strict=True
+                )
             },
         )
 

@@ -21,7 +21,7 @@ from services.optimizer.jobs.job import Evaluation, Job
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
 from sim.kernel.observation import WalkLog
-from sim.outcome import N_OBJECTIVES, OBJECTIVES, Status
+from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Status
 from tests.api.conftest import Commit
 from tests.examples.processes import loaded_by
 
@@ -76,10 +76,12 @@ def test_a_design_that_was_never_walked_has_no_log() -> None:
         names=["only"],
         statuses=np.array([Status.UNREACHABLE], dtype=np.uint8),
         objectives=np.full((1, N_OBJECTIVES), np.nan),
+        measurements=np.full((1, N_MEASUREMENTS), np.nan),
         logs=[None],
     )
 
     assert view.scenarios["only"].log is None
+    assert set(dict(view.scenarios["only"].measurements).values()) == {None}
     assert view.fitness is None
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.outcome import OBJECTIVE_NAMES
+from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
 from sim.scenario import SCENARIOS
 from tests.cli.conftest import Gaitswarm, WriteJson
 from tests.examples.walks import PUBLISHED_A
@@ -29,7 +29,20 @@ def test_every_scenario_has_a_status_and_objectives(
     for walk in result.json["scenarios"].values():
         assert walk["status"] == "ok"
         assert list(walk["objectives"]) == list(OBJECTIVE_NAMES)
+        assert list(walk["measurements"]) == list(MEASUREMENT_NAMES)
+        assert None not in walk["measurements"].values()
         assert "log" not in walk
+
+
+def test_measurements_are_printed_in_their_units(
+    gaitswarm: Gaitswarm, write_json: WriteJson
+) -> None:
+    design = write_json(PUBLISHED_A)
+    result = gaitswarm("simulate", "--design", design, *FAST)
+    told = gaitswarm("simulate", "--design", design, *FAST, "--json").json
+    measurements = told["scenarios"]["normal-fast"]["measurements"]
+    assert "peak current" in result.out
+    assert f"{measurements['motor_heat']:.4g}" in result.out
 
 
 def test_a_design_comes_from_a_file_from_best_or_from_the_literature(

@@ -11,7 +11,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
-from sim.outcome import OBJECTIVE_NAMES
+from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
 from tests.examples.paths import QUADRUPED
 
 pytestmark = pytest.mark.slow
@@ -36,6 +36,8 @@ def test_one_design_is_worth_what_a_request_says() -> None:
     for k, walk in enumerate(view.scenarios.values()):
         assert result.utilities[0, k] == walk.utility
         assert dict(zip(OBJECTIVE_NAMES, result.objectives[0, k], strict=True)) == walk.objectives
+        told = dict(zip(MEASUREMENT_NAMES, result.measurements[0, k], strict=True))
+        assert told == dict(walk.measurements)
 
 
 def test_by_the_preference_of_chapter_3_a_design_has_a_figure_of_merit() -> None:
@@ -71,6 +73,7 @@ def test_many_designs_are_worth_what_each_is_worth_alone(designs: Any) -> None:
     assert together.variables == ("P", "I")
     assert together.designs.tolist() == [[gain, 0.1] for gain in GAINS]
     assert together.objectives.tolist() == [one.objectives.tolist()[0] for one in alone]
+    assert together.measurements.tolist() == [one.measurements.tolist()[0] for one in alone]
     assert together.fitness.tolist() == [one.fitness.tolist()[0] for one in alone]
 
 
@@ -105,6 +108,7 @@ def test_the_table_has_a_row_for_every_walk() -> None:
     assert table["design.P"].tolist() == [0.2, 0.2, 0.45, 0.45, 0.9, 0.9]
     assert table["status"].tolist() == ["ok"] * 6
     assert table["energy"].tolist() == result.objectives[:, :, 3].ravel().tolist()
+    assert table["speed"].tolist() == result.measurements[:, :, 4].ravel().tolist()
     assert table["utility"].tolist() == result.utilities.ravel().tolist()
 
 

@@ -143,7 +143,7 @@ def plan_walk(
         WalkSetup,
         np.concatenate([base, joints]),
         internal_state,
-        pack_parameters(robot, scenario, timestep),
+        pack_parameters(robot, scenario, timestep, start=joints),
         codes.astype(np.int32),
         fall_height=0.5 * scenario.hip_height,
         energy=robot.description.supply.energy,

@@ -12,12 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.robot import Robot
-from sim.robot.description import ContactLaw
+from sim.robot.description import JOINTS_PER_LEG, ContactLaw
 from sim.robot.inertia import parallel_axis
 from sim.scenario import Scenario
 
 GRAVITY = 9.81
 """[m/s2], table 5."""
+
+JAM_STIFFNESS: Final = 2000.0
+"""Of the obstacle that holds a jammed coxa [N m/rad]: a stalled motor moves it by 0.3 degrees."""
+
+JAM_DAMPING: Final = 10.0
+"""Of the same [N m s/rad]: about half of what damps a coxa's rotor on it critically."""
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +73,8 @@ class Layout:
 
     field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
-    supply_resistance (1), backlash (J, if the robot has any), and by foot (L each) the parameters
+    supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every coxa
+    (L each), backlash (J, if the robot has any), and by foot (L each) the parameters
     of the contact law.
 
     Args:
@@ -90,6 +97,9 @@ class Layout:
             "viscous": n_joints,
             "supply_voltage": 1,
             "supply_resistance": 1,
+            "jam_stiffness": n_feet,
+            "jam_damping": n_feet,
+            "jam_angle": n_feet,
             "backlash": n_joints if robot.has_backlash else 0,
             **dict.fromkeys(law.parameters, n_feet),
         }
@@ -141,7 +151,9 @@ def gravity_on(slope: float, direction: float = 0.0) -> Floats:
     )
 
 
-def pack_parameters(robot: Robot, scenario: Scenario, timestep: float) -> Floats:
+def pack_parameters(
+    robot: Robot, scenario: Scenario, timestep: float, *, start: Floats | None = None
+) -> Floats:
     """The kernel's parameters for one robot in one scenario.
 
     A load is a point mass at `load_height` over the body's centre.
@@ -150,10 +162,14 @@ def pack_parameters(robot: Robot, scenario: Scenario, timestep: float) -> Floats
         robot: The robot.
         scenario: Its load and slope count.
         timestep: Of the physics [s].
+        start: Angles at which the walk begins, where a jammed coxa is held, (J,) [rad]; zero if
+            left out.
 
     Returns:
         (Layout.size,).
     """
+    jammed = np.array([leg.name == scenario.stuck_leg for leg in robot.legs], dtype=np.float64)
+    angles = np.zeros(robot.n_joints) if start is None else start
     d, body = robot.description, robot.body
     actuators, contacts = robot.actuators(), robot.contacts()
     at = np.array([0.0, 0.0, d.load_height])
@@ -173,6 +189,9 @@ def pack_parameters(robot: Robot, scenario: Scenario, timestep: float) -> Floats
         viscous=actuators.viscous,
         supply_voltage=d.supply.voltage,
         supply_resistance=d.supply.resistance,
+        jam_stiffness=JAM_STIFFNESS * jammed,
+        jam_damping=JAM_DAMPING * jammed,
+        jam_angle=angles[::JOINTS_PER_LEG] * jammed,
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         **by_foot,
     )

@@ -37,6 +37,7 @@ from sim.kernel.spatial import (
     vector,
 )
 from sim.robot import Robot
+from sim.robot.description import JOINTS_PER_LEG
 
 INTEGRANDS: Final = (
     "torque",
@@ -171,7 +172,7 @@ def _dynamics(robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
         states,
         rotations,
         s.v[6:],
-        actuation.torques,
+        _with_obstacles(actuation.torques, s),
         actuation.armature,
         ground_forces,
         apply(transpose(attitude), _triple(s.p["gravity"])),
@@ -286,6 +287,18 @@ def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
     ]
     torques = [a + b for a, b in zip(shafts, s.disturbance, strict=True)]
     return _Actuation(motors, torques, [0.0] * n, [*further, *faster])
+
+
+def _with_obstacles(torques: Sequence[Scalar], s: _Symbols) -> list[Scalar]:
+    """Torques on the links with those of jams at the coxae, which no gearhead passes on."""
+    blocked = list(torques)
+    for leg, (stiffness, damping, angle) in enumerate(
+        zip(s.p["jam_stiffness"], s.p["jam_damping"], s.p["jam_angle"], strict=True)
+    ):
+        joint = leg * JOINTS_PER_LEG
+        held = stiffness * (s.q[7 + joint] - angle) + damping * s.v[6 + joint]
+        blocked[joint] = blocked[joint] - held
+    return blocked
 
 
 def _feet(

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 from sim.errors import SimulationInputError
+from sim.kernel.parameters import Layout, pack_parameters
 from sim.outcome import Status
+from sim.robot import RobotVariant, load_robot
 from sim.simulate import check_reach
 from tests.examples.walks import logged_walk, short_walk, walk
+
+JAMMED = 2
+"""Index of the right middle leg."""
 
 PI = {"P": 0.45, "I": 0.1}
 
@@ -23,6 +31,55 @@ def test_a_drop_is_no_loss_of_height() -> None:
     outcome = walk(short_walk(drop=0.05), PI, "pi").outcome
     assert outcome.statuses.tolist() == [Status.OK]
     assert abs(outcome.objectives[0, 5]) < 0.01
+
+
+def coxa_travel(leg: str, **options: Any) -> float:
+    """Range of a coxa's angle [rad] over a short walk with the right middle leg jammed."""
+    log = logged_walk(short_walk(stuck_leg="right_middle"), PI, "pi", **options)
+    robot = load_robot("szabadka2")
+    return float(np.ptp(log.joint_angle[:, robot.joint_names.index(f"{leg}_coxa")]))
+
+
+def test_a_jammed_coxa_stays_where_it_was_and_the_others_walk() -> None:
+    assert coxa_travel("right_middle") < 0.02
+    assert coxa_travel("left_middle") > 0.3
+
+
+def test_a_motor_that_pushes_at_an_obstacle_is_hot_and_loads_its_gear() -> None:
+    free, stuck = (short_walk(stuck_leg=leg) for leg in (None, "right_middle"))
+    calm, strained = (walk(scenario, PI, "pi").measurements for scenario in (free, stuck))
+    assert strained.motor_heat[0] > 1.5 * calm.motor_heat[0]
+    assert strained.peak_current[0] > calm.peak_current[0]
+    log = logged_walk(stuck, PI, "pi")
+    actuators, joint = load_robot("szabadka2").actuators(), 3 * JAMMED
+    pushed = actuators.torque[joint] * log.current[:, joint]
+    at_its_worst = int(np.argmax(np.abs(pushed)))
+    # All that the motor gives passes through the gearhead, whatever holds the link.
+    assert log.load_torque[at_its_worst, joint] == pytest.approx(pushed[at_its_worst], rel=0.1)
+    assert abs(pushed[at_its_worst]) > 2.0
+
+
+@pytest.mark.parametrize("variant", [RobotVariant(), RobotVariant(backlash=(2.5, 1.0, 1.0))])
+def test_kernels_agree_on_a_jammed_leg_that_is_dropped(variant: RobotVariant) -> None:
+    scenario = short_walk(stuck_leg="left_rear", drop=0.01, cycle_time=0.4)
+    fast, slow = (
+        walk(scenario, PI, "pi", robot=variant, backend=backend)
+        for backend in ("native", "reference")
+    )
+    assert fast.outcome.statuses.tolist() == slow.outcome.statuses.tolist() == [Status.OK]
+    np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-7)
+    np.testing.assert_allclose(fast.measurements.array(), slow.measurements.array(), rtol=1e-7)
+
+
+def test_all_scenarios_of_a_robot_share_a_kernel_jammed_or_not() -> None:
+    robot = load_robot("szabadka2")
+    free, stuck = (
+        pack_parameters(robot, short_walk(stuck_leg=leg), 2e-4) for leg in (None, "left_rear")
+    )
+    held = Layout(robot).slices["jam_stiffness"]
+    assert free.shape == stuck.shape
+    assert not free[held].any()
+    assert np.flatnonzero(stuck[held]).tolist() == [5]
 
 
 def test_a_leg_that_the_robot_does_not_have_cannot_be_jammed() -> None:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
         ObjectiveView,
         RankingView,
         ScenarioResultView,
-        SimulationView,
         SimulatedScenarioView,
+        SimulationView,
     )
     from services.optimizer.jobs.provenance import JobProvenance
     from services.optimizer.jobs.spec import Spec

@@ -174,7 +174,33 @@ def stick(
     return foot.on_link(force), tuple(share * longer for longer in stretched)
 
 
+def dead_zone(
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
+) -> tuple[Force, InternalState]:
+    """F_t = -mu F_z min(1, (|v| - v_d) / (v_lin - v_d)) v / |v|, none below v_d (table 2.6).
+
+    Args:
+        foot: The foot.
+        ground: Its `friction`, `stick_velocity` v_d and `slip_velocity` v_lin.
+        internal_state: Nothing.
+        timestep: Not needed.
+
+    Returns:
+        Force on the link; nothing.
+    """
+    del internal_state, timestep
+    threshold = ground["stick_velocity"]
+    # Identified speeds may cross: the friction then jumps at v_d.
+    width = ca.fmax(ground["slip_velocity"] - threshold, 1e-9)
+    squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
+    slip = ca.sqrt(ca.fmax(squared, threshold * threshold))
+    share = ca.fmin((slip - threshold) / width, 1.0)
+    drag = ground["friction"] * foot.normal * share / slip
+    force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
+    return foot.on_link(force), ()
+
+
 FRICTION: Final[Mapping[ContactLaw, Friction]] = MappingProxyType(
-    {"linear_zone": linear_zone, "karnopp": karnopp, "stick": stick}
+    {"linear_zone": linear_zone, "karnopp": karnopp, "stick": stick, "dead_zone": dead_zone}
 )
 """By name."""

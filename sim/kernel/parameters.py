@@ -48,6 +48,7 @@ CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
         "linear_zone": ContactData((*_NORMAL, "slip_velocity")),
         "karnopp": ContactData((*_NORMAL, "stick_velocity")),
         "stick": ContactData((*_NORMAL, "stick_stiffness", "stick_damping"), 2),
+        "dead_zone": ContactData((*_NORMAL, "slip_velocity", "stick_velocity")),
     }
 )
 """By name; their formulas are in `sim.kernel.contact`."""

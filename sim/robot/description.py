@@ -106,7 +106,7 @@ class Sensors(_Data):
     current_step: int = Field(default=16, ge=1, description="resolution of the ADC [counts]")
 
 
-ContactLaw = Literal["linear_zone", "karnopp", "stick"]
+ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
 """How a sole rubs on the ground; see `sim.kernel.contact`."""
 
 
@@ -118,10 +118,10 @@ class Contact(_Data):
     sole: float = Field(ge=0.0, description="length of the sole's spring below the tibia [m]")
     friction: float = Field(ge=0.0, description="mu [1]")
     slip_velocity: float = Field(
-        gt=0.0, description="linear_zone: v_lin, full friction from here on [m/s]"
+        gt=0.0, description="linear_zone, dead_zone: v_lin, full friction from here on [m/s]"
     )
     stick_velocity: float = Field(
-        default=0.005, gt=0.0, description="karnopp: v_d, no friction below [m/s]"
+        default=0.005, gt=0.0, description="karnopp, dead_zone: v_d, no friction below [m/s]"
     )
     stick_stiffness: float = Field(
         default=10000.0, gt=0.0, description="stick: of the sole along the ground [N/m]"
@@ -195,5 +195,17 @@ class RobotDescription(_Data):
                 if actuator_name not in self.actuators:
                     raise ValueError(
                         f"legs.{k}.actuators: no actuator {actuator_name!r} is described"
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _dead_zone_lies_below_the_linear_one(self) -> RobotDescription:
+        if self.contact_law == "dead_zone":
+            feet = {f"legs.{k}.contact": leg.contact for k, leg in enumerate(self.legs)}
+            for where, contact in {"contact": self.contact, **feet}.items():
+                if contact is not None and contact.stick_velocity >= contact.slip_velocity:
+                    raise ValueError(
+                        f"{where}.stick_velocity: must be less than slip_velocity"
+                        f" ({contact.slip_velocity:g} m/s) under the contact law dead_zone"
                     )
         return self

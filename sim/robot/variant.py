@@ -29,7 +29,7 @@ class RobotVariant(BaseModel):
     name: RobotName = Field(default="szabadka2", description="Robot to start from.")
     contact_law: ContactLaw = Field(
         default="linear_zone",
-        description="How soles rub: linear_zone, karnopp or stick.",
+        description="How soles rub: linear_zone, karnopp, stick or dead_zone.",
     )
     backlash: Degrees = Field(
         default=(0.0, 0.0, 0.0),

@@ -75,6 +75,24 @@ class Karnopp(Ground):
         return np.where(slides, -np.sign(slip) * limit[:, None], 0.0)
 
 
+class DeadZone(Ground):
+    """Friction against the slip: none below one velocity, full from another one on."""
+
+    def __init__(self, robot: Robot, timestep: float) -> None:
+        super().__init__(robot, timestep)
+        self._none, self._full = self._by_foot("stick_velocity"), self._by_foot("slip_velocity")
+
+    def friction(self, touching: NDArray[np.bool_], limit: Floats, slip: Floats) -> Floats:
+        """The share of mu F_z grows linearly between the two, against the motion."""
+        del touching
+        speed = np.hypot(slip[:, 0], slip[:, 1])
+        share = np.clip((speed - self._none) / (self._full - self._none), 0.0, 1.0)
+        direction = np.divide(
+            slip, speed[:, None], out=np.zeros_like(slip), where=speed[:, None] > 0.0
+        )
+        return -(share * limit)[:, None] * direction
+
+
 class Stick(Ground):
     """A spring and damper along the ground that slips where it would pull more than mu F_z.
 
@@ -106,6 +124,7 @@ GROUNDS: Mapping[str, type[Ground]] = {
     "linear_zone": LinearZone,
     "karnopp": Karnopp,
     "stick": Stick,
+    "dead_zone": DeadZone,
 }
 
 

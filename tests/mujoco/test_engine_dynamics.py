@@ -21,6 +21,7 @@ TIMESTEP = 2e-4
 VARIANTS = {
     "linear zone": RobotVariant(),
     "karnopp": RobotVariant(contact_law="karnopp"),
+    "dead zone": RobotVariant(contact_law="dead_zone"),
     "stick": RobotVariant(contact_law="stick"),
     "stick and backlash": RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
 }

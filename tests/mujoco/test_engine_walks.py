@@ -20,6 +20,7 @@ from tests.mujoco.walker import Controller, Floats, Trace, drag_of, walk
 pytestmark = pytest.mark.slow
 
 PLAIN = RobotVariant()
+DEAD_ZONE = RobotVariant(contact_law="dead_zone")
 KARNOPP, STICK = RobotVariant(contact_law="karnopp"), RobotVariant(contact_law="stick")
 LOOSE = RobotVariant(backlash=(2.5, 1.0, 1.0))
 NORMAL_FAST, LOADED_FAST, LOADED_SLOW, SLOPE_FAST = (SCENARIOS[k] for k in (0, 2, 3, 4))
@@ -77,6 +78,7 @@ def deviations(trace: Trace, log: WalkLog, seconds: float = np.inf) -> dict[str,
         (PLAIN, "published optimum A", LOADED_FAST),
         (PLAIN, "stiff PI", SLOPE_FAST),
         (KARNOPP, "stiff PI", NORMAL_FAST),
+        (DEAD_ZONE, "stiff PI", NORMAL_FAST),
         (STICK, "published optimum A", SLOPE_FAST),
         # Impacts in the gears amplify rounding, so this walk is compared for one cycle.
         (LOOSE, "published optimum A", SLOPE_FAST.model_copy(update={"cycles": 1.0})),

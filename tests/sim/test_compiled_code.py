@@ -37,11 +37,12 @@ def quadruped() -> RobotFiles:
     [
         "szabadka2",
         RobotVariant(contact_law="karnopp"),
+        RobotVariant(contact_law="dead_zone"),
         RobotVariant(contact_law="stick"),
         RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
         quadruped(),
     ],
-    ids=["linear zone", "karnopp", "stick", "stick and backlash", "quadruped"],
+    ids=["linear zone", "karnopp", "dead zone", "stick", "stick and backlash", "quadruped"],
 )
 def test_every_robots_kernel_compiles_without_a_warning(
     robot: str | RobotVariant | RobotFiles,

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from sim.assembly import plan_walk
 from sim.controllers import CONTROLLERS
@@ -21,15 +22,17 @@ from sim.robot import RobotVariant, load_robot
 from sim.robot.description import ContactLaw
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate
+from tests.examples.robots import changed
 
 pytestmark = pytest.mark.slow
 
 PI = np.array([[0.45, 0.1]])
 BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
 KARNOPP = RobotVariant(contact_law="karnopp")
+DEAD_ZONE = RobotVariant(contact_law="dead_zone")
 STICK = RobotVariant(contact_law="stick")
 LASH = RobotVariant(backlash=(2.5, 1.0, 1.0))
-VARIANTS = pytest.mark.parametrize("variant", [KARNOPP, STICK, LASH], ids=str)
+VARIANTS = pytest.mark.parametrize("variant", [KARNOPP, STICK, DEAD_ZONE, LASH], ids=str)
 
 
 @VARIANTS
@@ -70,6 +73,31 @@ def test_karnopp_is_full_friction_against_each_axis_beyond_its_threshold() -> No
         assert (forces[:, 2] > 0).all()
         seen.add(tuple(sign))
     assert len(seen) > 4
+
+
+def test_dead_zone_is_friction_that_rises_between_two_speeds_against_the_motion() -> None:
+    robot = load_robot(DEAD_ZONE)
+    model, rng = physics_model(robot), np.random.default_rng(2)
+    p = pack_parameters(robot, SCENARIOS[0], 2e-4)
+    still = np.zeros(18)
+    for speed in (0.0, 0.001, 0.005, 0.006, 0.0275, 0.049, 0.05, 0.3):
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        slip = speed * np.array([np.cos(angle), np.sin(angle)])
+        q = np.concatenate([[0, 0, 0.138, 0, 0, 0, 1], np.tile([0.0, -0.2, -1.6], 6)])
+        v = np.concatenate([slip, np.zeros(22)])
+        forces = np.array(model.observe(q, v, [], still, still, p)[3]).reshape(6, 3)
+        share = min(max((speed - 0.005) / (0.05 - 0.005), 0.0), 1.0)
+        expected = -share * slip / speed if speed else slip
+        np.testing.assert_allclose(forces[:, :2], np.outer(forces[:, 2], expected), atol=1e-9)
+        assert (forces[:, 2] > 0).all()
+
+
+def test_a_dead_zone_that_reaches_beyond_the_linear_one_is_refused() -> None:
+    robot = load_robot("szabadka2")
+    wide = {"stick_velocity": 0.06}
+    assert changed(robot, contact=wide).description.contact.stick_velocity == 0.06
+    with pytest.raises(ValidationError, match=r"contact\.stick_velocity: must be less than"):
+        changed(robot, contact_law="dead_zone", contact=wide)
 
 
 def resting_creep(law: ContactLaw) -> float:

@@ -147,6 +147,7 @@ def plan_walk(
         codes.astype(np.int32),
         fall_height=0.5 * scenario.hip_height,
         energy=robot.description.supply.energy,
+        direction=-1 if scenario.direction == "backward" else 1,
         drop=scenario.drop,
         disturbance=None if noise is None else noise.torques(ticks, n_joints),
     )
@@ -172,7 +173,7 @@ def judge(
     steps = setup.ticks * substeps
     objectives[:3] = np.sqrt(result.sums[:3] / steps)
     objectives[5] = result.end[2] - (setup.start[2] - setup.drop)
-    distance = result.sums[4] * timestep
+    distance = setup.direction * result.sums[4] * timestep
     if distance < SHORTEST_WALK:
         return Status.STALLED, objectives
     objectives[3] = _energy_sum(setup, result) * timestep / distance
@@ -201,7 +202,7 @@ def measure(setup: WalkSetup, result: WalkResult, substeps: int) -> NDArray[np.f
             absolute_current / (steps * motors),
             heat / steps,
             _energy_sum(setup, result) / steps,
-            forward_speed / steps,
+            setup.direction * forward_speed / steps,
         ]
     )
 

@@ -105,7 +105,7 @@ MEASUREMENTS: Final[tuple[Measurement, ...]] = (
     Measurement("mean_current", "A", "mean over time and motors of the absolute current"),
     Measurement("motor_heat", "W", "mean of what all windings turn to heat, R I^2"),
     Measurement("power", "W", "mean electrical power of all motors, what f4 counts as spent"),
-    Measurement("speed", "m/s", "mean forward speed"),
+    Measurement("speed", "m/s", "mean speed in the direction of the walk"),
 )
 """What a walk tells beside its objectives: columns of a measurements array, in order."""
 
@@ -148,7 +148,7 @@ class Measurements:
         motor_heat: mean of what all windings turn to heat, R I^2, (n,) [W].
         power: mean electrical power of all motors, as far as it counts as spent
             (`sim.robot.description.Supply.energy`), (n,) [W].
-        speed: mean forward speed, (n,) [m/s].
+        speed: mean, in the direction of the walk, (n,) [m/s].
     """
 
     peak_current: NDArray[np.float64]

@@ -60,6 +60,10 @@ class Scenario(BaseModel):
     load: float = Field(
         default=0.0, ge=0.0, le=50.0, description="Extra mass carried on the body [kg]."
     )
+    direction: Literal["forward", "backward"] = Field(
+        default="forward",
+        description="Way that the robot walks; distance and speed count along it.",
+    )
     turn: float = Field(
         default=0.0,
         ge=-1.0,
@@ -220,10 +224,12 @@ SCENARIOS: Final[tuple[Scenario, ...]] = (
 PRESETS: Final[tuple[Scenario, ...]] = (
     *SCENARIOS,
     Scenario(name="straight", cycle_time=1.5, radius=0.16, hip_height=0.15),
+    Scenario(name="backward", cycle_time=1.5, radius=0.16, hip_height=0.15, direction="backward"),
 )
 """All scenarios that have a name and, by their order, a number from 1 on.
 
-`straight` is the walk of chapter 3 (section 3.1), whose designs bring a gait of their own.
+`straight` is the walk of chapter 3 (section 3.1), whose designs bring a gait of their own, and
+`backward` that of figs. 2.7 and 2.8.
 """
 
 

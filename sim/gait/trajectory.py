@@ -78,6 +78,8 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
             height=scenario.height,
             duty_factor=scenario.support_share,
         )
+        if scenario.direction == "backward":
+            forward = -forward
         sole = (data.contact or robot.description.contact).sole
         angles, miss = leg_angles(
             leg,

@@ -88,6 +88,7 @@ class WalkSetup:
         fall_cosine: of the tilt; below it the robot has fallen.
         disturbance: torques on the links, (T, J) [N m], or None.
         energy: what of a motor's electrical power counts as spent.
+        direction: of travel along the heading, 1 forward and -1 backward.
         drop: height of the start above the stance at which the soles carry the weight [m].
     """
 
@@ -100,6 +101,7 @@ class WalkSetup:
     fall_cosine: float = 0.5**0.5
     disturbance: Floats | None = None
     energy: EnergyConvention = "signed"
+    direction: int = 1
     drop: float = 0.0
 
     @property

@@ -142,6 +142,18 @@ def test_a_gait_begins_with_the_pose_that_it_has_at_its_start_phase(robot: Robot
     np.testing.assert_allclose(angles, desired_angles(robot, whole).angles[later:], atol=1e-12)
 
 
+@pytest.mark.parametrize("curve", ["half_ellipse", "quadratic_spline"])
+def test_feet_of_a_backward_walk_are_those_of_a_forward_one_in_a_mirror(
+    robot: Robot, curve: str
+) -> None:
+    ahead = SCENARIOS[0].model_copy(update={"curve": curve})
+    angles = desired_angles(robot, ahead).angles
+    mirrored = desired_angles(robot, ahead.model_copy(update={"direction": "backward"})).angles
+    np.testing.assert_allclose(mirrored[:, ::3], -angles[:, ::3], atol=1e-12)
+    for joint in (1, 2):
+        np.testing.assert_allclose(mirrored[:, joint::3], angles[:, joint::3], atol=1e-12)
+
+
 def test_slow_trajectories_are_held_between_updates(robot: Robot) -> None:
     slow = SCENARIOS[0].model_copy(update={"trajectory_rate": 20.0, "fir_ms": 0})
     angles = desired_angles(robot, slow).angles[:, 0]

@@ -77,6 +77,28 @@ def test_a_turn_bends_to_its_side_and_distance_follows_the_heading(turn: float) 
     assert speed > chord
 
 
+def test_a_backward_walk_goes_backwards_and_is_judged_along_its_way() -> None:
+    drive = {"P": 0.45, "I": 0.1}
+    ahead, back = (walk(find_scenario(n), drive, "pi", log=True) for n in ("straight", "backward"))
+    (log,) = back.logs
+    assert log is not None
+    assert back.outcome.statuses.tolist() == [Status.OK]
+    speed = 1.0 / back.outcome.objectives[0, 4]
+    covered = -float(log.base_position[-1, 0])
+    assert speed == pytest.approx(covered / find_scenario("backward").duration, rel=0.01)
+    assert speed == pytest.approx(1.0 / ahead.outcome.objectives[0, 4], rel=0.1)
+    assert back.measurements.speed[0] == pytest.approx(speed)
+    assert back.outcome.objectives[0, 3] > 0.0
+
+
+def test_a_walk_that_goes_the_other_way_than_it_should_has_stalled() -> None:
+    steep = find_scenario("backward").model_copy(
+        update={"slope": -25.0, "stride": 0.01, "height": 0.0}
+    )
+    outcome = walk(steep, {"P": 0.45, "I": 0.1}, "pi").outcome
+    assert outcome.statuses.tolist() == [Status.STALLED]
+
+
 def test_a_gait_of_the_design_replaces_the_scenarios() -> None:
     slow = walk(SCENARIOS[0], PUBLISHED_A | {"cycle_time": 2.2}).outcome
     expected = walk(SCENARIOS[1]).outcome

@@ -46,10 +46,12 @@ export function ScenarioPicker({
 }
 
 /** A scenario's name with what sets it apart. */
-function described({ name, cycle_time, load, slope, turn }: Scenario | ScenarioPreset): string {
+function described(scenario: Scenario | ScenarioPreset): string {
+  const { name, cycle_time, load, slope, turn, direction } = scenario
   const parts = [`cycle ${formatExact(cycle_time)} s`]
   if (load) parts.push(`load ${formatExact(load)} kg`)
   if (slope) parts.push(`slope ${formatExact(slope)}°`)
+  if (direction === 'backward') parts.push('backward')
   if (turn) parts.push(`turn ${formatExact(turn)}`)
   return `${name} (${parts.join(', ')})`
 }

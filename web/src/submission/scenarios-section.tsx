@@ -72,7 +72,7 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
   )
 }
 
-/** Only what tells the presets apart: the numbers that they do not all share. */
+/** Only what tells the presets apart: the fields that they do not all share. */
 function PresetTable({
   catalogue,
   chosen,
@@ -82,9 +82,13 @@ function PresetTable({
   chosen: readonly string[]
   onToggle: (name: string) => void
 }) {
-  const fields = [...catalogue.fields.scenario.values()].filter(({ name }) => name !== 'name')
+  const differs = (field: SchemaField) =>
+    new Set(catalogue.scenarios.map((scenario) => value(scenario, field))).size > 1
   const value = (scenario: ScenarioPreset, field: SchemaField) =>
     scenario[field.name as keyof ScenarioPreset]
+  const fields = [...catalogue.fields.scenario.values()].filter(
+    (field) => field.name !== 'name' && differs(field),
+  )
   return (
     <div class="table-scroll">
       <table>
@@ -117,7 +121,7 @@ function PresetTable({
                 const shown = value(scenario, field)
                 return (
                   <td key={field.name} class="numeric">
-                    {typeof shown === 'number' ? formatExact(shown) : inWords(String(shown))}
+                    {typeof shown === 'number' ? formatExact(shown) : inWords(shown ?? '')}
                   </td>
                 )
               })}

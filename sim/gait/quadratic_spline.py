@@ -1,7 +1,7 @@
 """The foot's curve of 2011: a straight support and a swing by a quadratic spline.
 
-Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. The robot of 2011 was sent 40
-points a step, and took 25.2 / w_S seconds for one at the speed w_S = 7.5, 10, 12, 15 or 20.
+Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. `sim.gait.driving_2011`
+says when its points were sent.
 """
 
 from __future__ import annotations

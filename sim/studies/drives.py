@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
+from sim.gait.driving_2011 import driven_as_in_2011
 from sim.outcome import Status
 from sim.robot import RobotChoice
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
 from sim.simulate import simulate
+
+
+def _in_the_scenarios_own_gait(scenario: Scenario) -> Scenario:
+    return scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,14 +31,14 @@ class NamedDrive:
         description: with its source.
         controller: name of the motor controller.
         design: by variable, controller and gait alike.
-        trajectory: fields of `Scenario`.
+        driven: from a scenario to the same one with the drive's own trajectory.
     """
 
     name: str
     description: str
     controller: ControllerName
     design: Mapping[str, float]
-    trajectory: Mapping[str, Any] = field(default_factory=dict)
+    driven: Callable[[Scenario], Scenario] = _in_the_scenarios_own_gait
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +74,10 @@ DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
         for drive in (
             NamedDrive(
                 "2011",
-                "P = 0.25, spline trajectory in steps at 20 Hz, no filter (section 5.4)",
+                "P = 0.25, spline trajectory in 42 steps a cycle, no filter (appendix .2.1)",
                 "p",
                 _published("p", "2011"),
-                {"curve": "quadratic_spline", "trajectory_rate": 20.0, "fir_ms": 0},
+                driven_as_in_2011,
             ),
             NamedDrive(
                 "2016",
@@ -144,8 +149,8 @@ def walk_figures(
     Returns:
         Its figures.
     """
-    gait = {k: v for k, v in drive.trajectory.items() if k not in drive.design}
-    walked = Scenario.model_validate(scenario.model_dump() | gait)
+    gait = {name: v for name, v in drive.design.items() if name in GAIT_VARIABLE_NAMES}
+    walked = drive.driven(with_gait(scenario, gait))
     names = list(drive.design)
     outcome = simulate(
         walked, drive.controller, names, np.array([list(drive.design.values())]), robot=robot

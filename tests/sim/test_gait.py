@@ -9,6 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.errors import SimulationInputError
+from sim.gait.driving_2011 import SPEEDS, driven_as_in_2011, scenario_2011
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import leg_angles
 from sim.gait.low_pass import FirWindow, fir_gains, low_pass
@@ -223,6 +225,57 @@ def test_a_hamming_filter_convolves_the_angles_from_rest_and_delays_by_half_its_
     unfiltered = desired_angles(robot, rough.model_copy(update={"fir_ms": 0})).angles
     np.testing.assert_array_equal(averaged, low_pass(unfiltered, 100))
     np.testing.assert_array_equal(hamming, low_pass(unfiltered, 100, "hamming"))
+
+
+@pytest.mark.parametrize(
+    ("w_s", "cycle_time", "rate"), [(7.5, 3.36, 12.5), (10, 2.52, 16.7), (20, 1.26, 33.3)]
+)
+def test_the_robot_of_2011_was_sent_42_targets_a_cycle(
+    w_s: float, cycle_time: float, rate: float
+) -> None:
+    scenario = scenario_2011(w_s)
+    assert scenario.cycle_time == pytest.approx(cycle_time)
+    assert scenario.trajectory_rate == pytest.approx(rate, abs=0.05)
+
+
+@pytest.mark.parametrize("w_s", SPEEDS)
+def test_twenty_of_them_are_of_swing_twenty_of_support_and_two_end_the_stride(
+    robot: Robot, w_s: float
+) -> None:
+    scenario = scenario_2011(w_s)
+    angles = desired_angles(robot, scenario).angles[: round(scenario.cycle_time / CONTROL_PERIOD)]
+    targets = angles[np.append(True, np.diff(angles[:, 0]) != 0.0)]
+    assert len(targets) == 42
+    heights = np.array([feet_below_body(robot, joints) for joints in targets])
+    lift = heights - heights.min()
+    forward = np.tan(targets[:, ::3]) * (scenario.radius - 0.07)
+    for leg in range(6):
+        ends = np.isclose(abs(forward[:, leg]), 0.08)
+        assert ends.sum() == 2
+        assert (lift[ends, leg] < 1e-9).all()
+        assert (lift[~ends, leg] > 1e-4).sum() == 20
+        assert (lift[~ends, leg] < 1e-9).sum() == 20
+    assert np.flatnonzero(lift[5] > 1e-4).tolist() == [0, 3, 4], "legs 1, 4, 5 swing first"
+
+
+def test_in_2011_a_turn_shortened_one_sides_stride_and_lengthened_the_others() -> None:
+    scenario = scenario_2011(10, 0.25)
+    assert scenario.stride_of(-1) == 0.75 * scenario.stride
+    assert scenario.stride_of(1) == 1.25 * scenario.stride
+
+
+def test_only_commands_that_there_were_make_a_scenario_of_2011() -> None:
+    with pytest.raises(SimulationInputError, match=r"w_s: 11 is none of 7\.5, 10, 12, 15, 20"):
+        scenario_2011(11)
+    with pytest.raises(SimulationInputError, match=r"w_d: 1\.5 is not between -1 and 1"):
+        scenario_2011(10, 1.5)
+
+
+def test_any_scenario_may_be_driven_as_in_2011_in_its_own_cycle() -> None:
+    slow = driven_as_in_2011(SCENARIOS[3])
+    assert (slow.cycle_time, slow.trajectory_rate) == (2.2, 42 / 2.2)
+    kept = ("name", "radius", "hip_height", "load", "stride", "height", "cycles")
+    assert [getattr(slow, name) for name in kept] == [getattr(SCENARIOS[3], name) for name in kept]
 
 
 def test_at_rest_the_springs_carry_the_weight(robot: Robot) -> None:

@@ -20,7 +20,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     from pydantic import TypeAdapter, ValidationError
 
     from sim.robot import RobotSource
-    from sim.robot.robot import SHIPPED
+    from sim.robot.shipped import SHIPPED
 
     data = robot_data(text)
     if isinstance(data, str) and data not in SHIPPED:

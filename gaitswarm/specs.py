@@ -16,7 +16,7 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.search.pso import PsoSettings
 from sim.controllers import ControllerName
 from sim.robot import RobotFiles, RobotVariant
-from sim.robot.robot import SHIPPED
+from sim.robot.shipped import SHIPPED
 from sim.scenario import Scenario
 from sim.variables import Variable
 

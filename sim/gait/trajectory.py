@@ -71,7 +71,8 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
         updates / scenario.trajectory_rate,
     )
     columns, misses = [], []
-    for leg, data in zip(robot.legs, robot.description.legs, strict=True):
+    legs = zip(robot.legs, robot.description.legs, robot.planned_soles(), strict=True)
+    for leg, data, sole in legs:
         forward, lift = _CURVES[scenario.curve](
             np.mod(time / scenario.cycle_time + (data.phase + scenario.start_phase), 1.0),
             stride=scenario.stride_of(leg.side),
@@ -80,7 +81,6 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
         )
         if scenario.direction == "backward":
             forward = -forward
-        sole = (data.contact or robot.description.contact).sole
         angles, miss = leg_angles(
             leg,
             forward,

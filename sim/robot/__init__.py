@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from sim.robot.robot import Robot, parse_robot
+from sim.robot.shipped import SHIPPED, RobotName
 from sim.robot.variant import (
     RobotChoice,
     RobotFiles,
-    RobotName,
     RobotSource,
     RobotVariant,
     load_robot,
 )
 
 __all__ = [
+    "SHIPPED",
     "Robot",
     "RobotChoice",
     "RobotFiles",

@@ -110,6 +110,10 @@ ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
 """How a sole rubs on the ground; see `sim.kernel.contact`."""
 
 
+PlannedSoles = Literal["nominal", "own"]
+"""Soles that a gait is planned for: the robot's common one, or each leg's."""
+
+
 class Contact(_Data):
     """Sole on ground (thesis 2.2.6): spring and damper, and parameters of the friction laws."""
 
@@ -162,6 +166,11 @@ class RobotDescription(_Data):
     description: str = ""
     load_height: float = Field(description="height of a load over the body's centre [m]")
     contact_law: ContactLaw = Field(default="linear_zone", description="friction of all feet")
+    planned_soles: PlannedSoles = Field(
+        default="nominal",
+        description="soles that the gait is planned for: nominal, the common contact's, since a"
+        " controller does not know them better; or own, each leg's",
+    )
     body_mass: float | None = Field(
         default=None,
         gt=0.0,

@@ -13,8 +13,8 @@ from typing import Final, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from sim.errors import SimulationInputError
-from sim.robot import Robot
 from sim.robot.description import Leg, RobotDescription
+from sim.robot.robot import Robot
 from sim.variables import Variable
 
 _WHOLE: Final = (
@@ -36,7 +36,7 @@ _WHOLE: Final = (
 )
 
 _EFFICIENCY: Final = Variable(
-    name="efficiency", low=0.3, high=0.98, unit="1", description="Efficiency of the gearhead of"
+    name="efficiency", low=0.25, high=0.98, unit="1", description="Efficiency of the gearhead of"
 )  # fmt: skip
 
 _CONTACT: Final = {
@@ -54,14 +54,14 @@ _CONTACT: Final = {
         name="sole", low=0.004, high=0.016, unit="m", description="Length of the sole's spring of"
     ),
     "friction": Variable(
-        name="friction", low=0.1, high=3.0, unit="1", description="Friction of the foot of"
+        name="friction", low=0.05, high=3.0, unit="1", description="Friction of the foot of"
     ),
 }
 
 
 @lru_cache(maxsize=32)
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
-    """All parameters in the order of table 2.7, bounds around its trial and identified values.
+    """All parameters in the order of table 2.7, bounds around its trial values and intervals.
 
     Args:
         robot: Whose joints and legs name them: efficiency_<joint> for every joint; stiffness_,

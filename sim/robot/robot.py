@@ -6,21 +6,16 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from importlib import resources
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from sim.errors import RobotFileError, SimulationInputError
+from sim.errors import RobotFileError
 from sim.robot.description import JOINTS_PER_LEG, Contact, RobotDescription
 from sim.robot.inertia import BodyInertia
 from sim.robot.toml_errors import first_problem
 from sim.robot.urdf import Joint, Urdf, parse_urdf
-
-SHIPPED: Final = ("szabadka2",)
 
 Floats = NDArray[np.float64]
 
@@ -136,6 +131,12 @@ class Robot:
         """Each foot's contact parameters, its own or the robot's."""
         return tuple(leg.contact or self.description.contact for leg in self.description.legs)
 
+    def planned_soles(self) -> tuple[float, ...]:
+        """Length of the sole that each leg's gait is planned for [m]."""
+        if self.description.planned_soles == "own":
+            return tuple(contact.sole for contact in self.contacts())
+        return (self.description.contact.sole,) * len(self.legs)
+
     def actuators(self) -> JointActuators:
         """Motor and gear numbers by joint."""
         d = self.description
@@ -160,28 +161,6 @@ class Robot:
                     )
                 )
         return JointActuators(*np.array(rows).T.copy())
-
-
-@lru_cache(maxsize=8)
-def shipped_robot(name: str) -> Robot:
-    """A robot that ships with gaitswarm.
-
-    Args:
-        name: One of `SHIPPED`.
-
-    Returns:
-        The robot.
-
-    Raises:
-        SimulationInputError: No robot of that name is shipped.
-    """
-    if name not in SHIPPED:
-        raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
-    folder = resources.files("sim.robot") / name
-    return parse_robot(
-        (folder / "robot.toml").read_text(encoding="utf-8"),
-        (folder / "robot.urdf").read_text(encoding="utf-8"),
-    )
 
 
 def parse_robot(toml: str, urdf: str) -> Robot:

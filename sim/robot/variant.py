@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
 from sim import former_names
 from sim.choice import NAME, alternatives
 from sim.former_names import current_names
-from sim.robot.description import Actuator, ContactLaw, Leg
-from sim.robot.robot import Robot, parse_robot, shipped_robot
-
-RobotName = Literal["szabadka2"]
-"""Robots that ship with gaitswarm."""
+from sim.robot.description import Actuator, ContactLaw, Leg, PlannedSoles
+from sim.robot.robot import Robot, parse_robot
+from sim.robot.shipped import RobotName, shipped_robot
 
 Degrees = tuple[float, float, float]
 
@@ -27,15 +25,21 @@ class RobotVariant(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: RobotName = Field(default="szabadka2", description="Robot to start from.")
-    contact_law: ContactLaw = Field(
-        default="linear_zone",
-        description="How soles rub: linear_zone, karnopp, stick or dead_zone.",
+    contact_law: ContactLaw | None = Field(
+        default=None,
+        description="How soles rub: linear_zone, karnopp, stick or dead_zone; null is the robot's own law.",
     )
     backlash: Degrees = Field(
         default=(0.0, 0.0, 0.0),
         description="Play between gearhead and link of coxa, femur and tibia, end to end [deg];"
         " measured at 2 to 3 on the robot. Simulated at 20 kHz, so four times as slow.",
         examples=[(2.5, 1.0, 1.0)],
+    )
+
+    planned_soles: PlannedSoles | None = Field(
+        default=None,
+        description="Soles that the gait is planned for: nominal, all as the datasheet has them, or"
+        " own, each leg's; null is the robot's own choice, nominal.",
     )
 
     @model_validator(mode="before")
@@ -115,7 +119,8 @@ def _load_files(files: RobotFiles) -> Robot:
 @lru_cache(maxsize=32)
 def _load_variant(variant: RobotVariant) -> Robot:
     robot = shipped_robot(variant.name)
-    description = robot.description.model_copy(update={"contact_law": variant.contact_law})
+    chosen = variant.model_dump(include={"contact_law", "planned_soles"}, exclude_none=True)
+    description = robot.description.model_copy(update=chosen)
     if any(variant.backlash):
         actuators: dict[str, Actuator] = {}
         legs: list[Leg] = []

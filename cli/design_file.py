@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from cli.spec_file import read_json_object
 from services.optimizer.errors import InvalidRequest
-from sim.controllers import CONTROLLERS, Controller
+from sim.controllers import CONTROLLERS, Controller, names_of
 from sim.scenario import GAIT_VARIABLE_NAMES
 
 _PUBLISHED: Final = "published:"
@@ -22,8 +22,7 @@ def read_design(design: str, controller: str, trajectory: Path | None = None) ->
     Raises InvalidRequest that names the field.
     """
     values = _read_values(design, controller)
-    known = {variable.name for variable in _controller(controller).variables}
-    _check_names(values, known | GAIT_VARIABLE_NAMES, "design")
+    _check_names(values, names_of(_controller(controller)) | GAIT_VARIABLE_NAMES, "design")
     if trajectory is None:
         return values
     gait = read_json_object(trajectory, "trajectory")
@@ -62,7 +61,7 @@ def _controller(name: str) -> Controller:
     )
 
 
-def _check_names(values: dict[str, Any], known: set[str] | frozenset[str], field: str) -> None:
+def _check_names(values: dict[str, Any], known: frozenset[str], field: str) -> None:
     for name in values:
         if name not in known:
             raise InvalidRequest(

@@ -19,7 +19,7 @@ from sim.assembly import (
     plan_walk,
 )
 from sim.compiler.compilation import target
-from sim.controllers import CONTROLLERS, ControlLaw
+from sim.controllers import CONTROLLERS, ControlLaw, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles, require_reachable
@@ -65,8 +65,8 @@ def simulate(
     Args:
         scenario: Gait, posture, load and ground.
         controller: Name of the motor controller, one of `CONTROLLERS`.
-        variables: Columns of the designs: all variables of the controller, and any of
-            `GAIT_VARIABLES`, which replace the scenario's values.
+        variables: Columns of the designs: all variables of the controller, any of its conventions,
+            and any of `GAIT_VARIABLES`, which replace the scenario's values.
         designs: (n, len(variables)), in the variables' units.
         robot: A shipped robot by name, a variant of one, or a `Robot` of your own; with backlash
             it is simulated at `BACKLASH_PHYSICS_RATE` at least.
@@ -177,7 +177,7 @@ def _check_arguments(
         raise SimulationInputError(
             f"controller: unknown {controller!r}; known are {', '.join(CONTROLLERS)}"
         )
-    known = {v.name for v in CONTROLLERS[controller].variables} | GAIT_VARIABLE_NAMES
+    known = names_of(CONTROLLERS[controller]) | GAIT_VARIABLE_NAMES
     for name in variables:
         if name not in known:
             raise SimulationInputError(

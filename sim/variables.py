@@ -102,6 +102,11 @@ class Variable(BaseModel):
         " from 0.",
         examples=[["linear_zone", "karnopp", "stick"]],
     )
+    default: FiniteFloat | None = Field(
+        default=None,
+        description="Used where a design does not give the variable; null if a design must, or if"
+        " the default depends on something else.",
+    )
     description: str = Field(default="", description="What the variable does.")
 
     @model_validator(mode="before")

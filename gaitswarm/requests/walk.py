@@ -90,7 +90,7 @@ class WalkRequest(BaseModel):
 
 
 def check_names(controller: ControllerName, design: Mapping[str, float]) -> None:
-    """Check that a design has all variables of a controller, and no others but the gait's.
+    """Check that a design has all variables of a controller, and beside them only optional ones.
 
     Args:
         controller: Name of the controller.
@@ -99,10 +99,12 @@ def check_names(controller: ControllerName, design: Mapping[str, float]) -> None
     Raises:
         ValueError: A variable is unknown or missing; names it.
     """
-    needed = [variable.name for variable in CONTROLLERS[controller].variables]
+    family = CONTROLLERS[controller]
+    needed = [variable.name for variable in family.variables]
+    optional = [*(variable.name for variable in family.conventions), *sorted(GAIT_VARIABLE_NAMES)]
     for name in design:
-        if name not in needed and name not in GAIT_VARIABLE_NAMES:
-            known = ", ".join([*needed, *sorted(GAIT_VARIABLE_NAMES)])
+        if name not in needed and name not in optional:
+            known = ", ".join([*needed, *optional])
             raise ValueError(f"design: unknown variable {name!r}; known are {known}")
     missing = [name for name in needed if name not in design]
     if missing:

@@ -62,6 +62,10 @@ class ControllerView(View):
     variables: list[Variable] = Field(
         description="Design variables; a job searches all that it does not hold fixed."
     )
+    conventions: list[Variable] = Field(
+        description="What the thesis leaves open; a design that does not set one has its default,"
+        " and a job may search it or hold it fixed."
+    )
     gait_variables: list[Variable] = Field(
         description="Gait parameters that a design may set as well, in place of the scenario's."
     )
@@ -91,6 +95,7 @@ def controller_views() -> list[ControllerView]:
             name=controller.name,
             description=controller.description,
             variables=list(controller.variables),
+            conventions=list(controller.conventions),
             gait_variables=list(GAIT_VARIABLES),
             published={study: dict(design) for study, design in controller.published.items()},
         )

@@ -29,7 +29,8 @@ class UniverseView(View):
     name: str = Field(description="error, current or velocity.", examples=["error"])
     unit: str = Field(description="Unit of range and values.", examples=["counts"])
     range: tuple[float, float] = Field(
-        description="What the inference and the table are made for; beyond it they saturate.",
+        description="Where the universe ends: inputs saturate there, and an output's centroid is"
+        " taken over it, which may reach beyond the output's range.",
         examples=[[-5837.0, 5837.0]],
     )
     values: list[float] = Field(
@@ -168,7 +169,7 @@ def _universe(memberships: Memberships) -> UniverseView:
     return UniverseView(
         name=universe.name,
         unit=universe.unit,
-        range=(-universe.full_range if memberships.centred else 0.0, universe.full_range),
+        range=memberships.limits,
         values=memberships.values.tolist(),
         memberships=[
             MembershipView(name=name, degrees=np.asarray(degrees).tolist())

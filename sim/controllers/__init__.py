@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable
+from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, names_of
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.fuzzy_pi_3 import FuzzyPi3
 from sim.controllers.linear import PI, PID, P
@@ -20,4 +20,12 @@ CONTROLLERS: Final[dict[ControllerName, Controller]] = {
 }
 """By name, as in job specs and on the command line."""
 
-__all__ = ["CONTROLLERS", "ControlLaw", "Controller", "ControllerName", "Inference", "LookupTable"]
+__all__ = [
+    "CONTROLLERS",
+    "ControlLaw",
+    "Controller",
+    "ControllerName",
+    "Inference",
+    "LookupTable",
+    "names_of",
+]

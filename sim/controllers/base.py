@@ -90,11 +90,11 @@ class ControlLaw:
 
     With change the error's over one tick, the direct part is the sum of error * proportional_gain,
     change * derivative_gain and what `direct` answers, >> 16; the integral part is the sum over
-    ticks of error * integral_gain and what `integrated` answers, clamped to the PWM's range, >> 20.
+    ticks of error * integral_gain and what `integrated` answers, clamped to the PWM's range, >> 32.
 
     Attributes:
         proportional_gain: with 16 fraction bits.
-        integral_gain: with 20 fraction bits.
+        integral_gain: with 32 fraction bits.
         derivative_gain: with 16 fraction bits.
         direct: adds to the direct part.
         integrated: adds to the integral part.
@@ -143,6 +143,18 @@ class Inference:
     table: LookupTable
 
 
+def names_of(controller: Controller) -> frozenset[str]:
+    """All that a design may give a controller.
+
+    Args:
+        controller: The controller.
+
+    Returns:
+        Names of its variables and conventions.
+    """
+    return frozenset(v.name for v in (*controller.variables, *controller.conventions))
+
+
 class Controller(Protocol):
     """A family of controllers, parametrised by design variables."""
 
@@ -156,7 +168,11 @@ class Controller(Protocol):
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """Design variables with bounds and units."""
+        """Design variables with bounds and units, of which a design gives every one."""
+
+    @property
+    def conventions(self) -> tuple[Variable, ...]:
+        """What the thesis leaves open, each with the default for designs that do not give it."""
 
     @property
     def published(self) -> Mapping[str, Mapping[str, float]]:

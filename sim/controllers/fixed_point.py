@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from enum import IntEnum
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import SimulationInputError
+from sim.variables import Variable
 
 FRACTION_BITS: Final = 16
 """Fractional bits of proportional gains and table index scales."""
 
-INTEGRAL_BITS: Final = 20
-"""Fractional bits of the integrator: at 500 Hz the smallest gain still keeps three digits."""
+INTEGRAL_BITS: Final = 32
+"""Fractional bits of the integrator: in the least of its units the smallest gain still keeps three
+digits."""
 
 CONTROL_PERIOD: Final = 0.002
 """One control tick [s]."""
@@ -23,6 +27,35 @@ CONTROL_PERIOD: Final = 0.002
 
 CURRENT_COUNTS: Final = 2079.0
 """Code of one ampere [counts/A], table 4.4."""
+
+ANGLE_COUNTS: Final = 10430.0
+"""Code of one radian [counts/rad], table 4.4."""
+
+VOLT_COUNTS: Final = 511.0 / 11.3
+"""PWM counts of one volt at the nominal supply [counts/V], table 4.4."""
+
+
+class IntegratorUnit(IntEnum):
+    """What an integrator's gain is counted in; the thesis's table 4.4 says V/rad."""
+
+    COUNTS = 0
+    """PWM counts per (error count x second)."""
+    VOLT_PER_RADIAN = 1
+    """V/rad, added up at every control tick."""
+    VOLT_PER_RADIAN_SECOND = 2
+    """V/(rad s)."""
+
+
+_DEFAULT_UNIT: Final = IntegratorUnit.COUNTS
+
+INTEGRATOR_UNIT: Final = Variable(
+    name="integrator_unit",
+    low=0,
+    high=2,
+    kind="integer",
+    default=float(_DEFAULT_UNIT),
+    description="Unit of I: 0 PWM counts/(count s); 1 V/rad at every control tick; 2 V/(rad s).",
+)
 
 
 def required(design: Mapping[str, float], name: str, *, low: float, high: float) -> float:
@@ -74,6 +107,28 @@ def required_integer(design: Mapping[str, float], name: str, *, low: int, high: 
     return int(value)
 
 
+def given_or_default(
+    design: Mapping[str, float], variable: Variable, low: float, high: float
+) -> float:
+    """A convention's value, checked against what the controller can represent.
+
+    Args:
+        design: Values by name.
+        variable: The convention; its default serves where the design does not give it.
+        low: Least value.
+        high: Largest value.
+
+    Returns:
+        The value.
+
+    Raises:
+        SimulationInputError: It is no number, or out of bounds.
+    """
+    if variable.name not in design and variable.default is not None:
+        return variable.default
+    return required(design, variable.name, low=low, high=high)
+
+
 def to_fixed(value: float, fraction_bits: int) -> int:
     """Nearest fixed-point number.
 
@@ -101,13 +156,30 @@ def descale(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
     return integer
 
 
-def integral_gain(gain: float) -> int:
+def integral_gain(design: Mapping[str, float]) -> int:
     """Gain of the integrator in fixed point.
 
     Args:
-        gain: PWM counts per (error count x second).
+        design: Values by name, with the gain `I` and, if it is not the default, its unit.
 
     Returns:
         PWM counts per (error count x tick), with `INTEGRAL_BITS` fraction bits.
+
+    Raises:
+        SimulationInputError: A value is missing or cannot be represented; names the variable.
     """
-    return to_fixed(gain * CONTROL_PERIOD, INTEGRAL_BITS)
+    gain = required(design, "I", low=0.0, high=100.0)
+    unit = _DEFAULT_UNIT
+    if INTEGRATOR_UNIT.name in design:
+        unit = IntegratorUnit(required_integer(design, INTEGRATOR_UNIT.name, low=0, high=2))
+    return to_fixed(gain * _COUNTS_PER_TICK[unit], INTEGRAL_BITS)
+
+
+_COUNTS_PER_TICK: Final[Mapping[IntegratorUnit, float]] = MappingProxyType(
+    {
+        IntegratorUnit.COUNTS: CONTROL_PERIOD,
+        IntegratorUnit.VOLT_PER_RADIAN: VOLT_COUNTS / ANGLE_COUNTS,
+        IntegratorUnit.VOLT_PER_RADIAN_SECOND: VOLT_COUNTS / ANGLE_COUNTS * CONTROL_PERIOD,
+    }
+)
+"""One of the unit in PWM counts per (error count x tick)."""

@@ -14,26 +14,52 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
 from sim.controllers.fixed_point import (
     FRACTION_BITS,
+    INTEGRATOR_UNIT,
     integral_gain,
     required,
     required_integer,
     to_fixed,
 )
-from sim.controllers.fuzzy_sets import AMOUNT, EXTREME, OUTPUT, SIGNED
+from sim.controllers.fuzzy_sets import (
+    EXTREME_PEAK,
+    LARGE_BEGINS,
+    POSITIVE_PEAK,
+    SIGNED,
+    SMALL_ENDS,
+    UNIVERSE,
+    MembershipSets,
+)
 from sim.controllers.mamdani import Mamdani, Rule, Shape
-from sim.controllers.quantisation import OUTPUT_SCALE, Axis, ExactInference, quantised
+from sim.controllers.quantisation import Axis, ExactInference, Quantised, quantised
 from sim.variables import Variable
 
 ERROR: Final = Axis(bits=10, centred=True)
 CURRENT: Final = Axis(bits=6, centred=False)
 
+_CONVENTIONS: Final = (
+    INTEGRATOR_UNIT,
+    LARGE_BEGINS,
+    SMALL_ENDS,
+    POSITIVE_PEAK,
+    EXTREME_PEAK,
+    UNIVERSE,
+)
 
-def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Shape) -> Mamdani:
+DEFAULT_SETS: Final = MembershipSets.of({}, _CONVENTIONS)
+
+
+def inference_system(
+    fw1: float,
+    fw23: float,
+    fw4: float,
+    fw56: float,
+    shape: Shape,
+    sets: MembershipSets = DEFAULT_SETS,
+) -> Mamdani:
     """The rules of table 4.3, over normalised error, current and output.
 
     Args:
@@ -42,6 +68,7 @@ def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Sh
         fw4: Weight of rule 4.
         fw56: Weight of rules 5 and 6.
         shape: Of the output's sets.
+        sets: Of current and output.
 
     Returns:
         The inference.
@@ -54,8 +81,8 @@ def inference_system(fw1: float, fw23: float, fw4: float, fw56: float, shape: Sh
         Rule({"error": "negative", "current": "large"}, "positive-extreme", fw56),
         Rule({"error": "positive", "current": "large"}, "negative-extreme", fw56),
     )
-    inputs = {"error": SIGNED, "current": AMOUNT}
-    return Mamdani(inputs, {**OUTPUT, **EXTREME}, rules, shape)
+    inputs = {"error": SIGNED, "current": sets.amount}
+    return Mamdani(inputs, sets.output, rules, shape, sets.universe)
 
 
 @lru_cache(maxsize=256)
@@ -65,9 +92,10 @@ def quantised_table(
     fw4: float,
     fw56: float,
     shape: Shape,
+    sets: MembershipSets = DEFAULT_SETS,
     error: Axis = ERROR,
     current: Axis = CURRENT,
-) -> NDArray[np.int8]:
+) -> Quantised:
     """The inference of `inference_system` on the axes' grid.
 
     Args:
@@ -76,13 +104,14 @@ def quantised_table(
         fw4: Weight of rule 4.
         fw56: Weight of rules 5 and 6.
         shape: Of the output's sets.
+        sets: Of current and output.
         error: Axis of the angle error.
         current: Axis of the current.
 
     Returns:
-        (n_error, n_current) in 1/127ths of the output range, read-only.
+        (n_error, n_current) in 8 bits.
     """
-    system = inference_system(fw1, fw23, fw4, fw56, shape)
+    system = inference_system(fw1, fw23, fw4, fw56, shape, sets)
     return quantised(system, {"error": error, "current": current})
 
 
@@ -151,6 +180,7 @@ class FuzzyPi:
             description="Weight of rules 5, 6: current large -> reverse.",
         ),
     )
+    conventions: Final = _CONVENTIONS
     published: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
         {
             "A": MappingProxyType(
@@ -199,7 +229,7 @@ class FuzzyPi:
                 "error": Universe("error", "counts", p.error_range),
                 "current": Universe("current", "counts", p.current_range),
             },
-            system=inference_system(*p.weights, p.shape),
+            system=inference_system(*p.weights, p.shape, p.sets),
             axes={"error": ERROR, "current": CURRENT},
             table=p.table(ERROR, CURRENT),
         )
@@ -218,7 +248,7 @@ class FuzzyPi:
             SimulationInputError: A value is missing or cannot be represented; names the variable.
         """
         p = _Parameters.of(design)
-        system = inference_system(*p.weights, p.shape)
+        system = inference_system(*p.weights, p.shape, p.sets)
         exact = ExactInference(system, p.error_range, p.current_range, p.output_range)
         return ControlLaw(integral_gain=p.integral, direct=exact)
 
@@ -233,6 +263,7 @@ class _Parameters:
     output_range: float
     weights: tuple[float, float, float, float]
     shape: Shape
+    sets: MembershipSets
 
     @classmethod
     def of(cls, design: Mapping[str, float]) -> _Parameters:
@@ -240,19 +271,21 @@ class _Parameters:
             required(design, name, low=0.0, high=1.0) for name in ("FW1", "FW23", "FW4", "FW56")
         )
         return cls(
-            integral=integral_gain(required(design, "I", low=0.0, high=100.0)),
+            integral=integral_gain(design),
             error_range=required(design, "FI1R", low=64.0, high=65535.0),
             current_range=required(design, "FI2R", low=64.0, high=65535.0),
             output_range=required(design, "FOR", low=1.0, high=32767.0),
             weights=(fw1, fw23, fw4, fw56),
             shape=Shape(required_integer(design, "FOMF", low=1, high=3)),
+            sets=MembershipSets.of(design, _CONVENTIONS),
         )
 
     def table(self, error: Axis, current: Axis) -> LookupTable:
         """The proportional part as the microcontroller has it."""
+        table = quantised_table(*self.weights, self.shape, self.sets, error, current)
         return LookupTable(
-            values=quantised_table(*self.weights, self.shape, error, current)[:, :, np.newaxis],
-            output_gain=to_fixed(self.output_range / OUTPUT_SCALE, FRACTION_BITS),
+            values=table.values[:, :, np.newaxis],
+            output_gain=to_fixed(self.output_range * table.step, FRACTION_BITS),
             error_gain=error.gain(self.error_range),
             current_gain=current.gain(self.current_range),
         )

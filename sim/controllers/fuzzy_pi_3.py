@@ -12,7 +12,6 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
 from sim.controllers.fixed_point import (
@@ -24,9 +23,16 @@ from sim.controllers.fixed_point import (
     required_integer,
     to_fixed,
 )
-from sim.controllers.fuzzy_sets import AMOUNT, OUTPUT, SIGNED
+from sim.controllers.fuzzy_sets import (
+    LARGE_BEGINS,
+    POSITIVE_PEAK,
+    SIGNED,
+    SMALL_ENDS,
+    UNIVERSE,
+    MembershipSets,
+)
 from sim.controllers.mamdani import Mamdani, Rule, Shape
-from sim.controllers.quantisation import OUTPUT_SCALE, Axis, quantised
+from sim.controllers.quantisation import Axis, Quantised, quantised
 from sim.variables import Variable
 
 ERROR: Final = Axis(bits=10, centred=True)
@@ -38,8 +44,14 @@ VELOCITY: Final = Axis(bits=6, centred=True)
 
 _INTEGRAL_AXES: Final = {"error": COARSE_ERROR, "current": COARSE_CURRENT, "velocity": VELOCITY}
 
+_CONVENTIONS: Final = (LARGE_BEGINS, SMALL_ENDS, POSITIVE_PEAK, UNIVERSE)
 
-def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
+DEFAULT_SETS: Final = MembershipSets.of({}, _CONVENTIONS)
+
+
+def voltage_system(
+    w1: float, w34: float, w56: float, shape: Shape, sets: MembershipSets = DEFAULT_SETS
+) -> Mamdani:
     """FzzP of angle error and current: rules 1 and 3 to 6.
 
     Args:
@@ -47,6 +59,7 @@ def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
         w34: Weight of rules 3 and 4.
         w56: Weight of rules 5 and 6.
         shape: Of the output's sets.
+        sets: Of current and output.
 
     Returns:
         The inference.
@@ -58,10 +71,13 @@ def voltage_system(w1: float, w34: float, w56: float, shape: Shape) -> Mamdani:
         Rule({"error": "positive", "current": "large"}, "negative", w56),
         Rule({"error": "negative", "current": "large"}, "positive", w56),
     )
-    return Mamdani({"error": SIGNED, "current": AMOUNT}, OUTPUT, rules, shape)
+    inputs = {"error": SIGNED, "current": sets.amount}
+    return Mamdani(inputs, sets.output, rules, shape, sets.universe)
 
 
-def integral_system(w1: float, w2: float, w78: float, shape: Shape) -> Mamdani:
+def integral_system(
+    w1: float, w2: float, w78: float, shape: Shape, sets: MembershipSets = DEFAULT_SETS
+) -> Mamdani:
     """FzzI of angle error, current and velocity error: rules 1, 2, 7 and 8.
 
     Args:
@@ -69,6 +85,7 @@ def integral_system(w1: float, w2: float, w78: float, shape: Shape) -> Mamdani:
         w2: Weight of rule 2.
         w78: Weight of rules 7 and 8.
         shape: Of the output's sets.
+        sets: Of current and output.
 
     Returns:
         The inference.
@@ -79,18 +96,23 @@ def integral_system(w1: float, w2: float, w78: float, shape: Shape) -> Mamdani:
         Rule({"velocity": "positive", "current": "small"}, "positive", w78),
         Rule({"velocity": "negative", "current": "small"}, "negative", w78),
     )
-    inputs = {"error": SIGNED, "current": AMOUNT, "velocity": SIGNED}
-    return Mamdani(inputs, OUTPUT, rules, shape)
+    inputs = {"error": SIGNED, "current": sets.amount, "velocity": SIGNED}
+    return Mamdani(inputs, sets.output, rules, shape, sets.universe)
 
 
 @lru_cache(maxsize=256)
-def _voltage_table(w1: float, w34: float, w56: float, shape: Shape) -> NDArray[np.int8]:
-    return quantised(voltage_system(w1, w34, w56, shape), {"error": ERROR, "current": CURRENT})
+def _voltage_table(
+    w1: float, w34: float, w56: float, shape: Shape, sets: MembershipSets
+) -> Quantised:
+    system = voltage_system(w1, w34, w56, shape, sets)
+    return quantised(system, {"error": ERROR, "current": CURRENT})
 
 
 @lru_cache(maxsize=256)
-def _integral_table(w1: float, w2: float, w78: float, shape: Shape) -> NDArray[np.int8]:
-    return quantised(integral_system(w1, w2, w78, shape), _INTEGRAL_AXES)
+def _integral_table(
+    w1: float, w2: float, w78: float, shape: Shape, sets: MembershipSets
+) -> Quantised:
+    return quantised(integral_system(w1, w2, w78, shape, sets), _INTEGRAL_AXES)
 
 
 class FuzzyPi3:
@@ -182,6 +204,7 @@ class FuzzyPi3:
             description="Weight of rules 7, 8: follow the velocity.",
         ),
     )
+    conventions: Final = _CONVENTIONS
     published: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
         {
             "PSO-PS": MappingProxyType(
@@ -233,14 +256,16 @@ def _voltage(
     w1, _, w34, w56, _ = weights
     full_range = required(design, "FzzP", low=1.0, high=32767.0)
     shape = Shape(required_integer(design, "FzzP_MF", low=1, high=3))
+    sets = MembershipSets.of(design, _CONVENTIONS)
+    table = _voltage_table(w1, w34, w56, shape, sets)
     return Inference(
         output=Universe("FzzP", "PWM counts", full_range, counts=1 << FRACTION_BITS),
         inputs={"error": error, "current": current},
-        system=voltage_system(w1, w34, w56, shape),
+        system=voltage_system(w1, w34, w56, shape, sets),
         axes={"error": ERROR, "current": CURRENT},
         table=LookupTable(
-            values=_voltage_table(w1, w34, w56, shape)[:, :, np.newaxis],
-            output_gain=to_fixed(full_range / OUTPUT_SCALE, FRACTION_BITS),
+            values=table.values[:, :, np.newaxis],
+            output_gain=to_fixed(full_range * table.step, FRACTION_BITS),
             error_gain=ERROR.gain(error.full_range),
             current_gain=CURRENT.gain(current.full_range * current.counts),
         ),
@@ -258,15 +283,17 @@ def _integral(
     w1, w2, _, _, w78 = weights
     full_range = required(design, "FzzI", low=1.0, high=1e6)
     shape = Shape(required_integer(design, "FzzI_MF", low=1, high=3))
+    sets = MembershipSets.of(design, _CONVENTIONS)
+    table = _integral_table(w1, w2, w78, shape, sets)
     counts = CONTROL_PERIOD * (1 << INTEGRAL_BITS)
     return Inference(
         output=Universe("FzzI", "PWM counts/s", full_range, counts=counts),
         inputs={"error": error, "current": current, "velocity": velocity},
-        system=integral_system(w1, w2, w78, shape),
+        system=integral_system(w1, w2, w78, shape, sets),
         axes=_INTEGRAL_AXES,
         table=LookupTable(
-            values=_integral_table(w1, w2, w78, shape),
-            output_gain=to_fixed(full_range * CONTROL_PERIOD / OUTPUT_SCALE, INTEGRAL_BITS),
+            values=table.values,
+            output_gain=to_fixed(full_range * CONTROL_PERIOD * table.step, INTEGRAL_BITS),
             error_gain=COARSE_ERROR.gain(error.full_range),
             current_gain=COARSE_CURRENT.gain(current.full_range * current.counts),
             velocity_gain=VELOCITY.gain(velocity.full_range * velocity.counts),

@@ -1,15 +1,19 @@
 """Membership functions that the fuzzy controllers share, on normalised universes.
 
-Assumed, since the thesis draws but does not list them; see docs/model.md.
+The thesis draws but does not list them. What its drawings leave open are conventions, which a
+design may set; see docs/model.md for the defaults.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from sim.controllers.fixed_point import given_or_default
 from sim.controllers.mamdani import FuzzySet
+from sim.variables import Variable
 
 SIGNED: Final[Mapping[str, FuzzySet]] = MappingProxyType(
     {
@@ -20,23 +24,114 @@ SIGNED: Final[Mapping[str, FuzzySet]] = MappingProxyType(
 )
 """Of an error, angle or velocity."""
 
-AMOUNT: Final[Mapping[str, FuzzySet]] = MappingProxyType(
-    {"small": FuzzySet(0.0, 1.0), "large": FuzzySet(1.0, 1.0)}
+LARGE_BEGINS: Final = Variable(
+    name="large_begins",
+    low=0.0,
+    high=0.9,
+    default=0.0,
+    description="Share of the current's range from which a current is large.",
 )
-"""Of a current's absolute value."""
+SMALL_ENDS: Final = Variable(
+    name="small_ends",
+    low=0.1,
+    high=1.0,
+    default=1.0,
+    description="Share of the current's range up to which a current is small.",
+)
+POSITIVE_PEAK: Final = Variable(
+    name="positive_peak",
+    low=0.25,
+    high=1.5,
+    default=0.5,
+    description="Share of the output's range at which the positive output peaks.",
+)
+EXTREME_PEAK: Final = Variable(
+    name="extreme_peak",
+    low=0.5,
+    high=3.0,
+    default=1.0,
+    description="Share of the output's range at which the extreme positive output peaks.",
+)
+UNIVERSE: Final = Variable(
+    name="universe",
+    low=0.5,
+    high=4.5,
+    default=1.0,
+    description="Share of the output's range up to which the output's centroid is taken; sets that"
+    " reach beyond are cut there.",
+)
 
-OUTPUT: Final[Mapping[str, FuzzySet]] = MappingProxyType(
+
+_LIMITS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
     {
-        "null": FuzzySet(0.0, 0.5),
-        "positive": FuzzySet(0.5, 0.5),
-        "negative": FuzzySet(-0.5, 0.5),
+        "large_begins": (0.0, 0.99),
+        "small_ends": (0.01, 10.0),
+        "positive_peak": (0.01, 10.0),
+        "extreme_peak": (0.01, 10.0),
+        "universe": (0.1, 10.0),
     }
 )
+"""What can be inferred with, which is more than what is worth searching."""
 
-EXTREME: Final[Mapping[str, FuzzySet]] = MappingProxyType(
-    {
-        "positive-extreme": FuzzySet(1.0, 0.5),
-        "negative-extreme": FuzzySet(-1.0, 0.5),
-    }
-)
-"""Of an output that can be reversed at full strength."""
+
+@dataclass(frozen=True, slots=True)
+class MembershipSets:
+    """Sets of a current's absolute value and of an output.
+
+    Attributes:
+        large_begins: share of the current's range from which a current is large.
+        small_ends: share of the current's range up to which a current is small.
+        positive_peak: share of the output's range at which the positive output peaks.
+        universe: share of the output's range up to which the centroid is taken.
+        extreme_peak: share of the output's range at which the extreme positive output peaks; None
+            for an output without extremes.
+    """
+
+    large_begins: float
+    small_ends: float
+    positive_peak: float
+    universe: float
+    extreme_peak: float | None = None
+
+    @classmethod
+    def of(cls, design: Mapping[str, float], conventions: Iterable[Variable]) -> MembershipSets:
+        """The sets that a design asks for.
+
+        Args:
+            design: Values by name; what it does not have is taken from the conventions' defaults.
+            conventions: Those of `LARGE_BEGINS` to `UNIVERSE` that the controller has, and others.
+
+        Returns:
+            The sets.
+
+        Raises:
+            SimulationInputError: A value cannot be inferred with; names it.
+        """
+        return cls(
+            **{
+                variable.name: given_or_default(design, variable, *_LIMITS[variable.name])
+                for variable in conventions
+                if variable.name in _LIMITS
+            }
+        )
+
+    @property
+    def amount(self) -> dict[str, FuzzySet]:
+        """Sets of a current's absolute value."""
+        return {
+            "small": FuzzySet(0.0, self.small_ends),
+            "large": FuzzySet(1.0, 1.0 - self.large_begins),
+        }
+
+    @property
+    def output(self) -> dict[str, FuzzySet]:
+        """Sets of the output.
+
+        All are equally wide: from a peak to its foot is as far as from null to positive, so that
+        these are spread as Matlab spreads sets, each ending where its neighbour peaks.
+        """
+        peaks = {"null": 0.0, "positive": self.positive_peak, "negative": -self.positive_peak}
+        if self.extreme_peak is not None:
+            peaks["positive-extreme"] = self.extreme_peak
+            peaks["negative-extreme"] = -self.extreme_peak
+        return {name: FuzzySet(peak, self.positive_peak) for name, peak in peaks.items()}

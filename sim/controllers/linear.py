@@ -11,6 +11,7 @@ from sim.controllers.base import ControlLaw, Inference
 from sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     FRACTION_BITS,
+    INTEGRATOR_UNIT,
     integral_gain,
     required,
     to_fixed,
@@ -48,12 +49,14 @@ class LinearController:
         name: as in job specs and on the command line.
         description: what it is, with its source.
         variables: its gains.
+        conventions: the unit of the integrator's, if it has one.
         published: designs from the literature, by study.
     """
 
     name: str
     description: str
     variables: tuple[Variable, ...]
+    conventions: tuple[Variable, ...]
     published: Mapping[str, Mapping[str, float]]
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
@@ -61,7 +64,7 @@ class LinearController:
         gains = {v.name: required(design, v.name, low=0.0, high=100.0) for v in self.variables}
         return ControlLaw(
             proportional_gain=to_fixed(gains["P"], FRACTION_BITS),
-            integral_gain=integral_gain(gains.get("I", 0.0)),
+            integral_gain=integral_gain(design) if "I" in gains else 0,
             derivative_gain=to_fixed(gains.get("D", 0.0) / CONTROL_PERIOD, FRACTION_BITS),
         )
 
@@ -75,17 +78,20 @@ P: Final = LinearController(
     "p",
     "P on the angle error, in coded units (thesis 2.2.2); the robot's drive of 2011.",
     (_P,),
+    (),
     MappingProxyType({"2011": MappingProxyType({"P": 0.25})}),
 )
 PI: Final = LinearController(
     "pi",
     "PI on the angle error, in coded units (thesis 2.2.2, 3.4).",
     (_P, _I),
+    (INTEGRATOR_UNIT,),
     MappingProxyType({"validation": MappingProxyType({"P": 0.25, "I": 0.0})}),
 )
 PID: Final = LinearController(
     "pid",
     "PID on the angle error, in coded units (thesis 2.2.2, 3.4).",
     (_P, _I, _D),
+    (INTEGRATOR_UNIT,),
     MappingProxyType({}),
 )

@@ -1,8 +1,8 @@
 """Mamdani inference as in Matlab's Fuzzy Logic Toolbox (optimization page, section 3).
 
 min AND, max aggregation, min implication of the firing strength times the rule's weight, centroid
-on 101 points; where no rule fires, the mean of the output range. Universes are normalised: inputs
-and output are given as shares of their range.
+on 101 points; where no rule fires, the mean of the output range. Inputs and output are given as
+shares of their range; the output's universe may reach beyond it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 N_POINTS: Final = 101
-"""Samples of the output universe, from -1 to 1."""
+"""Samples of the output universe."""
 
 Floats = NDArray[np.float64]
 
@@ -88,12 +88,14 @@ class Mamdani:
         outputs: the output's sets by name, all of one shape.
         rules: all of them.
         output_shape: of the output's sets.
+        universe: where the output's universe ends on either side.
     """
 
     inputs: Mapping[str, Mapping[str, FuzzySet]]
     outputs: Mapping[str, FuzzySet]
     rules: Sequence[Rule]
     output_shape: Shape = Shape.TRIANGLE
+    universe: float = 1.0
 
     def degrees(self, grid: Mapping[str, Floats]) -> list[Floats]:
         """How far each rule's antecedents hold.
@@ -123,8 +125,13 @@ class Mamdani:
 
     def output_memberships(self) -> Floats:
         """(n_sets, 101) membership of the points of the output universe."""
-        points = output_points()
+        points = self.output_points()
         return np.stack([s.membership(points, self.output_shape) for s in self.outputs.values()])
+
+    def output_points(self) -> Floats:
+        """(101,) samples of the output universe, symmetric to the bit."""
+        half = N_POINTS // 2
+        return np.arange(-half, half + 1) / half * self.universe
 
     def infer(self, grid: Mapping[str, Floats]) -> Floats:
         """Crisp output over the product of the inputs' values.
@@ -133,7 +140,7 @@ class Mamdani:
             grid: By input, in the order of `inputs`, its values inside the range, (n_i,).
 
         Returns:
-            (n_1, n_2, ...) in [-1, 1].
+            (n_1, n_2, ...), inside the universe.
         """
         degrees = self.degrees(grid)
         along = [
@@ -149,7 +156,7 @@ class Mamdani:
             points: By input, in the order of `inputs`, its coordinates inside the range, (n,).
 
         Returns:
-            (n,) in [-1, 1].
+            (n,), inside the universe.
         """
         degrees = self.degrees(points)
         return self._crisp(degrees, degrees[0].shape[1:])
@@ -160,22 +167,18 @@ class Mamdani:
         for k, (rule, target) in enumerate(zip(self.rules, self.consequents(), strict=True)):
             strength = reduce(np.minimum, [degree[k] for degree in degrees])
             np.maximum(levels[target], strength * rule.weight, out=levels[target])
-        return centroid(levels, self.output_memberships())
+        return centroid(levels, self.output_memberships(), self.output_points())
 
 
-def output_points() -> Floats:
-    """(101,) samples of the output universe, symmetric to the bit."""
-    return np.arange(-(N_POINTS // 2), N_POINTS // 2 + 1) / (N_POINTS // 2)
-
-
-def centroid(levels: Floats, memberships: Floats) -> Floats:
+def centroid(levels: Floats, memberships: Floats, points: Floats) -> Floats:
     """Centre of area of the clipped sets' union.
 
     Sums run over the points in order, so that the compiled version gives the same bits.
 
     Args:
         levels: At which the sets are clipped, (n_sets, ...).
-        memberships: Of the points of the output universe, (n_sets, 101).
+        memberships: Of the points of the output universe, (n_sets, n_points).
+        points: Of the output universe, (n_points,).
 
     Returns:
         (...), 0 where nothing fires.
@@ -183,7 +186,7 @@ def centroid(levels: Floats, memberships: Floats) -> Floats:
     flat = levels.reshape(len(levels), -1)
     moment = np.zeros(flat.shape[1])
     area = np.zeros(flat.shape[1])
-    for k, point in enumerate(output_points()):
+    for k, point in enumerate(points):
         union = np.minimum(flat[0], memberships[0, k])
         for level, membership in zip(flat[1:], memberships[1:, k], strict=True):
             np.maximum(union, np.minimum(level, membership), out=union)

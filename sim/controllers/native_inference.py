@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.compiler.compilation import load_library, vector_header
-from sim.controllers.mamdani import Mamdani, output_points
+from sim.controllers.mamdani import Mamdani
 
 
 def infer(
@@ -28,7 +28,7 @@ def infer(
         library: `inference_source` compiled; the usual one if left out.
 
     Returns:
-        Crisp output in [-1, 1] over the product of the inputs' values, (n_1, n_2, ...).
+        Crisp output, inside its universe, over the product of the inputs' values, (n_1, n_2, ...).
 
     Raises:
         KernelBuildError: The library cannot be compiled, stored or loaded.
@@ -48,7 +48,7 @@ def infer(
         np.array([rule.weight for rule in system.rules], dtype=np.float64),
         np.array(system.consequents(), dtype=np.int64),
         np.ascontiguousarray(system.output_memberships()),
-        output_points(),
+        system.output_points(),
         np.empty((outer.shape[1], inner.shape[1])),
     )
     sizes = (
@@ -56,7 +56,7 @@ def infer(
         inner.shape[1],
         len(system.rules),
         len(system.outputs),
-        len(output_points()),
+        len(system.output_points()),
     )
     library.gaitswarm_infer(
         *(ctypes.c_int64(size) for size in sizes),

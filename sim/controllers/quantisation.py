@@ -15,7 +15,7 @@ from sim.controllers.native_inference import infer
 
 OUTPUT_BITS: Final = 8
 OUTPUT_SCALE: Final = 127
-"""Table value of the full output range."""
+"""Table value of the largest output in the table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,17 +99,39 @@ def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1)
     return outputs * output_bits * (1 << sum(input_bits)) // 8
 
 
-def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> NDArray[np.int8]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Quantised:
+    """An inference in 8 bits.
+
+    Attributes:
+        values: (2 ** bits of each axis) in 1/127ths of the largest output, read-only.
+        largest: output anywhere in the table, as a share of the output's range.
+    """
+
+    values: NDArray[np.int8]
+    largest: float
+
+    @property
+    def step(self) -> float:
+        """Share of the output's range that one table value stands for."""
+        return self.largest / OUTPUT_SCALE
+
+
+def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
     """An inference on the axes' grid.
+
+    An output that reaches beyond its range is covered, and none loses resolution to a universe that
+    the centroid never comes near the ends of.
 
     Args:
         system: The inference.
         axes: By input of the system, in its order.
 
     Returns:
-        (2 ** bits of each axis) in 1/127ths of the output range, read-only.
+        Its values, and the largest output, which they are shares of.
     """
     crisp = infer(system, {name: axis.grid() for name, axis in axes.items()})
-    table = np.rint(crisp * OUTPUT_SCALE).astype(np.int8)
-    table.flags.writeable = False
-    return table
+    largest = float(np.abs(crisp).max())
+    values = np.rint(crisp * (OUTPUT_SCALE / (largest or 1.0))).astype(np.int8)
+    values.flags.writeable = False
+    return Quantised(values, largest)

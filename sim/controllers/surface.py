@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.base import Inference, Universe
-from sim.controllers.mamdani import FuzzySet, output_points
+from sim.controllers.mamdani import FuzzySet
 from sim.controllers.quantisation import OUTPUT_BITS, Axis, table_bytes
 
 Floats = NDArray[np.float64]
@@ -25,13 +25,13 @@ class Memberships:
 
     Attributes:
         universe: of the input or output.
-        centred: about zero; else from zero up.
+        limits: where the universe ends, in its unit; an output's may lie beyond its range.
         values: (n,), in its unit.
         degrees: by set, (n,) [1].
     """
 
     universe: Universe
-    centred: bool
+    limits: tuple[float, float]
     values: Floats
     degrees: Mapping[str, Floats]
 
@@ -111,19 +111,21 @@ def _input(
     universe: Universe, axis: Axis, points: int, sets: Mapping[str, FuzzySet]
 ) -> Memberships:
     """Evenly over the range; what is measured is whole counts."""
-    full = universe.full_range * universe.counts
-    counts = np.rint(np.linspace(-full if axis.centred else 0.0, full, points))
+    limits = (-universe.full_range if axis.centred else 0.0, universe.full_range)
+    low, high = (limit * universe.counts for limit in limits)
+    counts = np.rint(np.linspace(low, high, points))
     values = counts / universe.counts
     shares = _shares(universe, values)
     degrees = {name: fuzzy_set.membership(shares) for name, fuzzy_set in sets.items()}
-    return Memberships(universe, axis.centred, values, degrees)
+    return Memberships(universe, limits, values, degrees)
 
 
 def _output(source: Inference) -> Memberships:
-    values = output_points() * source.output.full_range
+    values = source.system.output_points() * source.output.full_range
     memberships = source.system.output_memberships()
     degrees = dict(zip(source.system.outputs, memberships, strict=True))
-    return Memberships(source.output, centred=True, values=values, degrees=degrees)
+    limits = (float(values[0]), float(values[-1]))
+    return Memberships(source.output, limits, values=values, degrees=degrees)
 
 
 def _inferred(source: Inference, values: Mapping[str, Floats]) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from sim.controllers import CONTROLLERS, ControllerName
+from sim.controllers import CONTROLLERS, ControllerName, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.robot import RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
@@ -63,12 +63,13 @@ class RecordedWalk(BaseModel):
                 raise ValueError(
                     f"current.{number}: {len(row)} numbers for {len(self.joints)} joints"
                 )
-        needed = {variable.name for variable in CONTROLLERS[self.controller].variables}
+        controller = CONTROLLERS[self.controller]
+        needed = {variable.name for variable in controller.variables}
         missing = sorted(needed - self.design.keys())
         if missing:
             raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
         for name in self.design:
-            if name not in needed and name not in GAIT_VARIABLE_NAMES:
+            if name not in names_of(controller) | GAIT_VARIABLE_NAMES:
                 raise ValueError(f"design: unknown variable {name!r}")
         last, walked = self.first_tick + len(self.current), self.walked_seconds
         if last > round(walked / CONTROL_PERIOD):

@@ -10,7 +10,7 @@
 
 enum { OK = 0, DIVERGED = 1, FELL = 2 };
 
-enum { FRACTION_BITS = 16, INTEGRAL_BITS = 20 };
+enum { FRACTION_BITS = 16, INTEGRAL_BITS = 32 };
 #define CODE_LIMIT 65535
 
 /* Sensors and PWM in coded integers, and the rates; one for a whole batch. */

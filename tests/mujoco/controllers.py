@@ -25,17 +25,17 @@ class Coded(ABC):
         self._sensors, self._pwm = d.sensors, d.pwm
         self._full_duty = d.pwm.full_scale / d.supply.nominal_voltage
         self._desired = np.rint(log.desired_angle * d.sensors.angle_counts).astype(np.int64)
-        # 20 fractional bits.
-        self._integral_gain = round(design["I"] * CONTROL_PERIOD * 2**20)
+        # 32 fractional bits.
+        self._integral_gain = round(design["I"] * CONTROL_PERIOD * 2**32)
         self._integral = np.zeros(robot.n_joints, dtype=np.int64)
 
     def __call__(self, tick: int, angles: Floats, current: Floats) -> Floats:
         s, full = self._sensors, self._pwm.counts
         error = self._desired[tick] - _stepped(np.rint(angles * s.angle_counts), s.angle_step)
         load = _stepped(np.rint(np.abs(current) * s.current_counts), s.current_step)
-        limit = full << 20
+        limit = full << 32
         self._integral = np.clip(self._integral + error * self._integral_gain, -limit, limit)
-        output = self.proportional(error, load) + _shifted(self._integral, 20)
+        output = self.proportional(error, load) + _shifted(self._integral, 32)
         counts = _stepped(np.clip(output, -full, full), self._pwm.step)
         return np.clip(counts, -full, full).astype(np.float64) * (self._full_duty / full)
 
@@ -61,10 +61,11 @@ class FuzzyPi(Coded):
     def __init__(self, robot: Robot, log: WalkLog, design: Mapping[str, float]) -> None:
         super().__init__(robot, log, design)
         weights = (design[name] for name in ("FW1", "FW23", "FW4", "FW56"))
-        self._table = quantised_table(*weights, Shape(int(design["FOMF"]))).astype(np.int64)
+        quantised = quantised_table(*weights, Shape(int(design["FOMF"])))
+        self._table = quantised.values.astype(np.int64)
         self._row = round(511 / design["FI1R"] * 2**16)
         self._column = round(63 / design["FI2R"] * 2**16)
-        self._output = round(design["FOR"] / 127 * 2**16)
+        self._output = round(design["FOR"] * quantised.largest / 127 * 2**16)
 
     def proportional(self, error: Ints, load: Ints) -> Ints:
         row = np.clip(512 + _shifted(error * self._row, 16), 0, 1023)

@@ -45,7 +45,7 @@ class DesignSpace:
 
         Args:
             required: variables of which every one must be chosen or fixed: the controller's.
-            optional: variables that may be: the gait's.
+            optional: variables that may be: the controller's conventions and the gait's.
             chosen: what is searched, by name with the catalogue's bounds, or with bounds of one's
                 own; None for all that are required, less those that are fixed.
             fixed: value of each variable that is held, by name: a number, or a choice's name.

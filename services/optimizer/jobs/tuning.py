@@ -95,11 +95,11 @@ class JobSpec(Spec):
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def design_space(self) -> DesignSpace:
-        """The controller's variables, and any of the gait's."""
+        """The controller's variables, and any of its conventions and of the gait's."""
         controller = CONTROLLERS[self.controller]
         return DesignSpace.build(
             required=controller.variables,
-            optional=GAIT_VARIABLES,
+            optional=(*controller.conventions, *GAIT_VARIABLES),
             chosen=self.variables,
             fixed=self.fixed,
         )

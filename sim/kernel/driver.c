@@ -17,6 +17,7 @@ enum { FRACTION_BITS = 16, INTEGRAL_BITS = 32 };
 typedef struct {
   double angle_counts, current_counts, duty_per_count;
   int64_t angle_step, current_step, pwm_step, pwm_counts, substeps;
+  double current_smoothing; /* of the analog low-pass, a step; 1 for none */
 } Coding;
 
 /* sim.controllers.base.LookupTable; values is NULL where there is none. */
@@ -135,6 +136,13 @@ static void write_log(Walker *const *lane, const int *walking, int64_t tick, con
   }
 }
 
+/* The current sensors' analog filter, of |I|, over one physics step. */
+static void low_pass(vec *sensed, const vec *current, double smoothing)
+{
+  for (int j = 0; j < NJ; j++)
+    sensed[j] += SPLAT(smoothing) * (vec_abs(current[j]) - sensed[j]);
+}
+
 /* Lanes whose state is finite; x - x is zero for a finite x only. */
 static ivec all_finite(const vec *q, const vec *v, const vec *internal)
 {
@@ -149,6 +157,7 @@ static ivec all_finite(const vec *q, const vec *v, const vec *internal)
 static void walk(Walker *const *lane, const Coding *c)
 {
   vec q[2][NQ], v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
+  vec sensed[NJ];
   vec sums[N_INTEGRANDS], integrands[N_INTEGRANDS], largest, peak = SPLAT(0.0);
   Past past;
   int walking[LANES];
@@ -157,6 +166,7 @@ static void walk(Walker *const *lane, const Coding *c)
   memset(&past, 0, sizeof past);
   memset(v, 0, sizeof v);
   memset(current, 0, sizeof current);
+  memset(sensed, 0, sizeof sensed);
   memset(sums, 0, sizeof sums);
   for (int k = 0; k < LANES; k++) {
     for (int i = 0; i < NQ; i++) q[0][i][k] = lane[k]->q0[i];
@@ -169,7 +179,8 @@ static void walk(Walker *const *lane, const Coding *c)
 
   int now = 0;
   for (int64_t tick = 0; tick < last; tick++) {
-    control_tick(lane, c, tick, ENCODER(q[now], internal[now]), current, &past, duty, disturbance);
+    control_tick(lane, c, tick, ENCODER(q[now], internal[now]),
+                 c->current_smoothing < 1.0 ? sensed : current, &past, duty, disturbance);
     write_log(lane, walking, tick, q[now], v[now], internal[now], duty);
     for (int64_t n = 0; n < c->substeps; n++) {
       step(q[now], v[now], internal[now], duty, disturbance, p, q[1 - now], v[1 - now],
@@ -177,6 +188,7 @@ static void walk(Walker *const *lane, const Coding *c)
       now = 1 - now;
       for (int i = 0; i < N_INTEGRANDS; i++) sums[i] += integrands[i];
       peak = vec_max(peak, largest);
+      if (c->current_smoothing < 1.0) low_pass(sensed, current, c->current_smoothing);
     }
     const vec qx = q[now][3], qy = q[now][4];
     const vec upright = SPLAT(1.0) - SPLAT(2.0) * (qx * qx + qy * qy);

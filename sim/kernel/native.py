@@ -35,6 +35,7 @@ class _Coding(ctypes.Structure):
         ("pwm_step", ctypes.c_int64),
         ("pwm_counts", ctypes.c_int64),
         ("substeps", ctypes.c_int64),
+        ("current_smoothing", ctypes.c_double),
     ]
 
 

@@ -57,12 +57,13 @@ class ReferenceKernel:
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
         step = Stepper(self._model.step, setup)
         past = _Past.of(setup.desired.shape[1])
+        sensed = np.zeros(setup.desired.shape[1])
         sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
         status = Status.OK
         for tick, desired in enumerate(setup.desired):
             encoder = step.internal_state[: len(desired)] if self._has_backlash else step.q[7:]
-            error, load = _read_sensors(encoder, step.current, desired, coding)
+            error, load = _read_sensors(encoder, sensed, desired, coding)
             output = _control(setup.control_law, coding, error, load, past)
             step.duty[:] = output * coding.duty_per_count
             if setup.disturbance is not None:
@@ -71,6 +72,7 @@ class ReferenceKernel:
                 rows.append(np.concatenate([step.q, step.v, step.internal_state, step.duty]))
             for _ in range(coding.substeps):
                 step.advance()
+                sensed = _low_pass(sensed, np.abs(step.current), coding.current_smoothing)
                 sums += step.integrands
                 peak_current = max(peak_current, float(step.largest_current[0]))
             status = _status_of(step, setup)
@@ -130,6 +132,11 @@ class _Past:
     @classmethod
     def of(cls, n_joints: int) -> _Past:
         return cls(np.zeros(n_joints, dtype=np.int64))
+
+
+def _low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
+    """The current sensors' analog filter over one physics step, (J,) [A]."""
+    return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
 
 
 def _read_sensors(

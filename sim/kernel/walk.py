@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.base import ControlLaw
+from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.outcome import Status
 from sim.robot import Robot
@@ -34,6 +36,8 @@ class Coding:
         pwm_step: resolution of the PWM [counts].
         pwm_counts: full scale of the PWM [counts].
         substeps: physics steps a control tick.
+        current_smoothing: share of its distance from the absolute current that the analog
+            low-pass of the current goes in a physics step; 1 for no low-pass [1].
     """
 
     angle_counts: float
@@ -44,6 +48,7 @@ class Coding:
     pwm_step: int
     pwm_counts: int
     substeps: int
+    current_smoothing: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("angle_step", "current_step", "pwm_step", "pwm_counts", "substeps"):
@@ -62,6 +67,7 @@ class Coding:
             The coding.
         """
         d = robot.description
+        timestep, settling = CONTROL_PERIOD / substeps, d.sensors.current_filter
         return cls(
             angle_counts=d.sensors.angle_counts,
             current_counts=d.sensors.current_counts,
@@ -71,6 +77,7 @@ class Coding:
             pwm_step=d.pwm.step,
             pwm_counts=d.pwm.counts,
             substeps=substeps,
+            current_smoothing=-math.expm1(-timestep / settling) if settling > 0.0 else 1.0,
         )
 
 

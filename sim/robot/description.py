@@ -104,6 +104,13 @@ class Sensors(_Data):
     angle_step: int = Field(default=1, ge=1, description="encoder resolution [counts]")
     current_counts: float = Field(gt=0.0, description="code of one ampere [counts/A]")
     current_step: int = Field(default=16, ge=1, description="resolution of the ADC [counts]")
+    current_filter: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1.0,
+        description="time constant of the first-order low-pass of the absolute current before the"
+        " ADC; 0 for none [s]",
+    )
 
 
 ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]

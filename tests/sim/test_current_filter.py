@@ -1,0 +1,87 @@
+"""The analog low-pass of the motors' current before its converter."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from sim.assembly import plan_walk
+from sim.controllers.base import ControlLaw, LookupTable
+from sim.kernel.native import native_kernel
+from sim.kernel.observation import walk_log
+from sim.kernel.reference import reference_kernel
+from sim.kernel.walk import Coding
+from sim.robot import Robot, load_robot
+from tests.examples.robots import changed
+from tests.examples.walks import short_walk, walk
+
+BRIEF = short_walk(cycle_time=0.4)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot("szabadka2")
+
+
+def filtered(robot: Robot, seconds: float) -> Robot:
+    return changed(robot, sensors={"current_filter": seconds})
+
+
+def test_a_filters_time_constant_is_that_of_a_first_order_low_pass(robot: Robot) -> None:
+    assert Coding.of(robot, 10).current_smoothing == 1.0
+    share = Coding.of(filtered(robot, 0.005), 10).current_smoothing
+    # A step of the current is followed to 1 - 1/e after 5 ms, 25 physics steps of 0.2 ms.
+    assert 1.0 - (1.0 - share) ** 25 == pytest.approx(1.0 - math.exp(-1.0), rel=1e-12)
+
+
+def softer_by_current() -> ControlLaw:
+    """PWM that falls by 3 counts with every 32 counts of current, whatever the error."""
+    values = np.arange(127, -1, -1, dtype=np.int8).reshape(1, 128, 1)
+    table = LookupTable(values, output_gain=3 << 16, error_gain=1, current_gain=1 << 11)
+    return ControlLaw(proportional_gain=0, integral_gain=0, derivative_gain=0, direct=table)
+
+
+@pytest.mark.parametrize("kind", ["native", "reference"])
+def test_the_controller_reads_the_filtered_absolute_current(robot: Robot, kind: str) -> None:
+    """With a control tick at every physics step, the log has every current that is filtered."""
+    kernel = native_kernel(robot) if kind == "native" else reference_kernel(robot)
+    plan = plan_walk(robot, BRIEF, 2e-4)
+    assert kernel is not None
+    assert plan is not None
+    setup = plan(softer_by_current())
+    setup = dataclasses.replace(setup, desired=setup.desired[:100])
+    coding = dataclasses.replace(Coding.of(robot, 1), current_smoothing=0.1)
+    (result,) = kernel.walk([setup], coding, log=True)
+    assert result.states is not None
+    current = np.abs(walk_log(robot, setup, result.states).current)
+    sensed = np.zeros_like(current)
+    for tick in range(1, len(current)):
+        sensed[tick] = sensed[tick - 1] + 0.1 * (current[tick - 1] - sensed[tick - 1])
+    code = np.floor((np.rint(sensed * 2079.0) + 8.0) / 16.0) * 16.0
+    counts = 3.0 * (127.0 - np.floor(code / 32.0 + 0.5))
+    duty = result.states[:, -robot.n_joints :]
+    np.testing.assert_allclose(duty / coding.duty_per_count, counts, atol=1e-6)
+    assert np.ptp(counts) > 100.0
+
+
+def test_kernels_agree_on_a_filtered_current(robot: Robot) -> None:
+    slow_sensor = filtered(robot, 0.01)
+    fast, slow = (
+        walk(BRIEF, robot=slow_sensor, backend=backend) for backend in ("native", "reference")
+    )
+    np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
+
+
+def test_a_filter_changes_a_fuzzy_walk_and_none_that_ignores_currents(robot: Robot) -> None:
+    slow_sensor = filtered(robot, 0.01)
+    assert native_kernel(slow_sensor) is native_kernel(robot)
+    filtered_walk, plain = (walk(BRIEF, robot=r).outcome.objectives for r in (slow_sensor, robot))
+    assert (filtered_walk != plain).all()
+    stiff = {"P": 0.45, "I": 0.1}
+    ignoring, unfiltered = (
+        walk(BRIEF, stiff, "pi", robot=r).outcome.objectives for r in (slow_sensor, robot)
+    )
+    np.testing.assert_array_equal(ignoring, unfiltered)

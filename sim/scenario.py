@@ -187,7 +187,26 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         description="Stroke on the ground.",
     ),
     Variable(name="height", low=0.01, high=0.04, unit="m", description="Height of the swing."),
-    Variable(name="duty_factor", low=0.45, high=0.75, unit="1", description="Support share."),
+    Variable(
+        name="duty_factor",
+        low=0.45,
+        high=0.75,
+        unit="1",
+        description="Share of the cycle of the phase that duty_phase names.",
+    ),
+    Variable(
+        name="duty_phase",
+        kind="categorical",
+        choices=("support", "swing"),
+        description="Phase whose share of the cycle duty_factor is.",
+    ),
+    Variable(
+        name="start_phase",
+        low=0.0,
+        high=0.95,
+        unit="1",
+        description="Share of the cycle at which the gait begins: which legs swing first.",
+    ),
     Variable(
         name="fir_ms",
         low=4,
@@ -197,6 +216,12 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         description="Low-pass FIR filter of the desired angles.",
     ),
     Variable(
+        name="fir_window",
+        kind="categorical",
+        choices=("moving_average", "hamming"),
+        description="Coefficients of the filter: all equal, or those of Matlab's fir1.",
+    ),
+    Variable(
         name="trajectory_rate",
         low=20.0,
         high=500.0,
@@ -204,7 +229,7 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         description="Update rate of the desired angles.",
     ),
 )
-"""Gait parameters that a design may set beside the controller's (thesis table 3.2).
+"""Gait parameters that a design may set beside the controller's, after thesis table 3.2.
 
 A value set by a design replaces the scenario's own in every scenario.
 """
@@ -257,7 +282,8 @@ def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
 
     Args:
         scenario: The scenario.
-        gait: Values of some of `GAIT_VARIABLES` by name.
+        gait: Values of some of `GAIT_VARIABLES` by name; of a categorical one the index of a
+            choice.
 
     Returns:
         The scenario, or a copy of it if the gait changes anything.
@@ -267,7 +293,13 @@ def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
     """
     if not gait:
         return scenario
-    values: dict[str, float] = dict(gait)
+    values: dict[str, float | str] = dict(gait)
+    for variable in GAIT_VARIABLES:
+        if variable.kind == "categorical" and variable.name in values:
+            try:
+                values[variable.name] = variable.shown(variable.number(values[variable.name]))
+            except ValueError as error:
+                raise SimulationInputError(str(error)) from error
     if "fir_ms" in values:
         if not float(values["fir_ms"]).is_integer():
             raise SimulationInputError(f"fir_ms: {values['fir_ms']:g} is not a whole number of ms")

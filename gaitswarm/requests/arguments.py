@@ -159,7 +159,7 @@ def simulation(
 
     Args:
         design: Value by variable, in the variables' units.
-        scenarios: Names or numbers of presets, or `Scenario`; None for all presets.
+        scenarios: Names or numbers of presets, or `Scenario`; None for the six of table 4.2.
         controller: Motor controller that drives the robot.
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
         preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or

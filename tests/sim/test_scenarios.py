@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import pickle
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from sim.errors import SimulationInputError, UnreachablePose
 from sim.outcome import OBJECTIVE_NAMES, Status
-from sim.scenario import SCENARIOS, Scenario, find_scenario
+from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, find_scenario, with_gait
 from sim.simulate import check_reach, simulate
 from tests.examples.walks import PUBLISHED_A, walk
 
@@ -103,6 +104,34 @@ def test_a_gait_of_the_design_replaces_the_scenarios() -> None:
     slow = walk(SCENARIOS[0], PUBLISHED_A | {"cycle_time": 2.2}).outcome
     expected = walk(SCENARIOS[1]).outcome
     np.testing.assert_array_equal(slow.objectives, expected.objectives)
+
+
+def test_categorical_gait_variables_have_the_choices_of_the_scenarios_fields() -> None:
+    for variable in GAIT_VARIABLES:
+        field = Scenario.model_fields[variable.name]
+        if variable.kind == "categorical":
+            assert variable.choices == get_args(field.annotation)
+
+
+def test_a_design_names_a_choice_by_its_index() -> None:
+    gait = {"fir_window": 1.0, "duty_phase": 1.0, "start_phase": 0.5}
+    changed = with_gait(SCENARIOS[0], gait)
+    assert (changed.fir_window, changed.duty_phase, changed.start_phase) == (
+        "hamming",
+        "swing",
+        0.5,
+    )
+    design = {"P": 0.45, "I": 0.1}
+    np.testing.assert_array_equal(
+        walk(SCENARIOS[0], design | gait, "pi").outcome.objectives,
+        walk(changed, design, "pi").outcome.objectives,
+    )
+
+
+@pytest.mark.parametrize("index", [2.0, 0.5, -1.0])
+def test_an_index_of_no_choice_is_refused_with_the_choices(index: float) -> None:
+    with pytest.raises(SimulationInputError, match=r"^duty_phase: .*support, swing"):
+        with_gait(SCENARIOS[0], {"duty_phase": index})
 
 
 def test_stepped_signals_shake_the_body() -> None:

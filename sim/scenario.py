@@ -250,11 +250,15 @@ PRESETS: Final[tuple[Scenario, ...]] = (
     *SCENARIOS,
     Scenario(name="straight", cycle_time=1.5, radius=0.16, hip_height=0.15),
     Scenario(name="backward", cycle_time=1.5, radius=0.16, hip_height=0.15, direction="backward"),
+    Scenario(name="drop", cycle_time=1.5, radius=0.16, hip_height=0.15, drop=0.03),
+    Scenario(
+        name="stuck-leg", cycle_time=1.5, radius=0.16, hip_height=0.15, stuck_leg="right_middle"
+    ),
 )
 """All scenarios that have a name and, by their order, a number from 1 on.
 
 `straight` is the walk of chapter 3 (section 3.1), whose designs bring a gait of their own, and
-`backward` that of figs. 2.7 and 2.8.
+`backward` that of figs. 2.7 and 2.8; `drop` and `stuck-leg` are the protection's cases (4.3.2).
 """
 
 

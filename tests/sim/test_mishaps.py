@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
 from sim.errors import SimulationInputError
-from sim.kernel.parameters import Layout, pack_parameters
+from sim.kernel.parameters import GRAVITY, Layout, pack_parameters
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
+from sim.scenario import find_scenario
 from sim.simulate import check_reach
 from tests.examples.walks import logged_walk, short_walk, walk
 
@@ -80,6 +82,27 @@ def test_all_scenarios_of_a_robot_share_a_kernel_jammed_or_not() -> None:
     assert free.shape == stuck.shape
     assert not free[held].any()
     assert np.flatnonzero(stuck[held]).tolist() == [5]
+
+
+def test_the_published_optimum_falls_onto_its_feet_and_walks_on() -> None:
+    drop, straight = find_scenario("drop"), find_scenario("straight")
+    log = logged_walk(drop)
+    landed = int(np.argmax(log.foot_force[:, :, 2].sum(axis=1) > 0.0))
+    fallen = log.base_position[0, 2] - log.base_position[landed, 2]
+    # The springs of a stance are compressed by what carries the weight.
+    assert 0.02 < fallen <= 0.03
+    assert log.time[landed] == pytest.approx(math.sqrt(2.0 * fallen / GRAVITY), abs=0.005)
+    dropped, level = walk(drop), walk(straight)
+    assert dropped.outcome.statuses.tolist() == [Status.OK]
+    assert dropped.outcome.objectives[0, 1] > 2.0 * level.outcome.objectives[0, 1]
+    assert dropped.measurements.speed[0] == pytest.approx(level.measurements.speed[0], rel=0.02)
+
+
+def test_the_published_optimum_walks_slower_and_hotter_with_a_stuck_leg() -> None:
+    stuck, free = (walk(find_scenario(name)) for name in ("stuck-leg", "straight"))
+    assert stuck.outcome.statuses.tolist() == [Status.OK]
+    assert 0.0 < stuck.measurements.speed[0] < 0.9 * free.measurements.speed[0]
+    assert stuck.measurements.motor_heat[0] > 2.0 * free.measurements.motor_heat[0]
 
 
 def test_a_leg_that_the_robot_does_not_have_cannot_be_jammed() -> None:

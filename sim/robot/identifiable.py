@@ -1,6 +1,7 @@
-"""Parameters of a robot that walks can tell (thesis table 2.7): 3 + 3 L efficiencies + 4 L of feet.
+"""Parameters of a robot that walks can tell, and conventions of how it is modelled.
 
-All are inputs of the compiled kernel, so designs that differ in them share one.
+Those of thesis table 2.7 (3 + 3 L efficiencies + 4 L of feet) are inputs of the compiled kernel, so
+designs that differ in them alone share one.
 """
 
 from __future__ import annotations
@@ -8,12 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import Final, TypeVar
+from typing import Final, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from sim.errors import SimulationInputError
-from sim.robot.description import Leg, RobotDescription
+from sim.robot.description import (
+    ContactLaw,
+    EnergyConvention,
+    Leg,
+    PlannedSoles,
+    RobotDescription,
+)
 from sim.robot.robot import Robot
 from sim.variables import Variable
 
@@ -58,6 +65,42 @@ _CONTACT: Final = {
     ),
 }
 
+CONVENTIONAL_VARIABLES: Final = (
+    Variable(
+        name="efficiency",
+        low=_EFFICIENCY.low,
+        high=_EFFICIENCY.high,
+        unit="1",
+        description="Efficiency of every gearhead; that of a single joint goes before it.",
+    ),
+    Variable(
+        name="energy",
+        kind="categorical",
+        choices=get_args(EnergyConvention),
+        description="What of a motor's electrical power counts as spent.",
+    ),
+    Variable(
+        name="contact_law",
+        kind="categorical",
+        choices=get_args(ContactLaw),
+        description="How soles rub on the ground.",
+    ),
+    Variable(
+        name="slip_velocity",
+        low=0.01,
+        high=0.2,
+        unit="m/s",
+        description="Velocity of every foot from which on friction is full (v_lin).",
+    ),
+    Variable(
+        name="planned_soles",
+        kind="categorical",
+        choices=get_args(PlannedSoles),
+        description="Soles that gaits are planned for: nominal, or each leg's own.",
+    ),
+)
+"""Values for the whole robot that the thesis leaves open, or gives more than once."""
+
 
 @lru_cache(maxsize=32)
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
@@ -78,12 +121,13 @@ def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
     )
 
 
-def with_parameters(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """The same robot with some of `identifiable_variables` at other values.
+def with_parameters(robot: Robot, values: Mapping[str, float | str]) -> Robot:
+    """The same robot with some of its parameters and conventions at other values.
 
     Args:
         robot: The robot.
-        values: By name.
+        values: By name, of `identifiable_variables` and `CONVENTIONAL_VARIABLES`; of categorical
+            variables a choice's name or its index. Names of neither are left alone.
 
     Returns:
         The changed robot.
@@ -91,13 +135,60 @@ def with_parameters(robot: Robot, values: Mapping[str, float]) -> Robot:
     Raises:
         SimulationInputError: No robot can have a value; names it.
     """
-    d = robot.description
-    mass = values.get("body_mass", d.body_mass)
+    conventions = _conventions(values)
+    numbers = _numbers({name: v for name, v in values.items() if name not in conventions})
+    d = _with_conventions(robot.description, conventions)
+    mass = numbers.get("body_mass", d.body_mass)
     if mass is not None and not mass > 0.0:
         raise SimulationInputError(f"body_mass: {mass:g} kg is not greater than 0")
     battery = {field: f"battery_{field}" for field in ("voltage", "resistance")}
-    whole = {"body_mass": mass, "supply": _changed(d.supply, battery, values)}
-    return replace(robot, description=_with_legs(d.model_copy(update=whole), values))
+    whole = {"body_mass": mass, "supply": _changed(d.supply, battery, numbers)}
+    return replace(robot, description=_with_legs(d.model_copy(update=whole), numbers))
+
+
+def _conventions(values: Mapping[str, float | str]) -> dict[str, float | str]:
+    """Those of `CONVENTIONAL_VARIABLES` that are given, choices by name."""
+    given = [variable for variable in CONVENTIONAL_VARIABLES if variable.name in values]
+    try:
+        return {v.name: v.shown(v.number(values[v.name])) for v in given}
+    except ValueError as error:
+        raise SimulationInputError(str(error)) from error
+
+
+def _numbers(values: Mapping[str, float | str]) -> dict[str, float]:
+    """Values of variables that have no choices."""
+    for name, value in values.items():
+        if isinstance(value, str):
+            raise SimulationInputError(f"{name}: {value!r} is not a number")
+    return {name: float(value) for name, value in values.items()}
+
+
+def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) -> RobotDescription:
+    """Every gearhead, every foot and the whole robot by `CONVENTIONAL_VARIABLES`."""
+    if not values:
+        return d
+
+    def changed(part: Part, *fields: str) -> Part:
+        return _changed(part, {field: field for field in fields}, values)
+
+    legs = tuple(
+        leg.model_copy(update={"contact": leg.contact and changed(leg.contact, "slip_velocity")})
+        for leg in d.legs
+    )
+    parts = {
+        "gearheads": {name: changed(gear, "efficiency") for name, gear in d.gearheads.items()},
+        "supply": changed(d.supply, "energy"),
+        "contact": changed(d.contact, "slip_velocity"),
+        "legs": legs,
+    }
+    whole = {field: values[field] for field in ("contact_law", "planned_soles") if field in values}
+    described = d.model_copy(update=parts | whole)
+    try:
+        RobotDescription.model_validate(described.model_dump())
+    except ValidationError as error:
+        message = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise SimulationInputError(f"{', '.join(values)}: {message}") from error
+    return described
 
 
 def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescription:
@@ -127,7 +218,7 @@ def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescrip
 Part = TypeVar("Part", bound=BaseModel)
 
 
-def _changed(part: Part, variables: Mapping[str, str], values: Mapping[str, float]) -> Part:
+def _changed(part: Part, variables: Mapping[str, str], values: Mapping[str, float | str]) -> Part:
     """A part of the robot with fields set from those variables that have a value."""
     update = {field: values[name] for field, name in variables.items() if name in values}
     if not update:

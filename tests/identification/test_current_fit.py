@@ -57,7 +57,7 @@ def test_every_link_has_its_own_error(twin: Twin) -> None:
 
 def test_desired_angles_are_those_of_the_described_robot(twin: Twin) -> None:
     long_soles = {f"sole_{leg.name}": 0.016 for leg in twin.robot.legs}
-    changed = with_parameters(twin.robot, long_soles)
+    changed = with_parameters(twin.robot, {**long_soles, "planned_soles": "own"})
     own = logged_walk(SCENARIO, robot=changed)
     planned = logged_walk(SCENARIO, robot=changed, planner=twin.robot)
     described = logged_walk(SCENARIO)

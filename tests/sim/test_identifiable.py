@@ -9,6 +9,7 @@ from sim.errors import SimulationInputError
 from sim.kernel.parameters import Layout, pack_parameters
 from sim.robot import load_robot
 from sim.robot.identifiable import (
+    CONVENTIONAL_VARIABLES,
     identifiable_variables,
     with_parameters,
 )
@@ -127,3 +128,74 @@ def test_efficiency_is_the_named_gearheads_friction_alone() -> None:
 def test_a_value_that_no_robot_has_is_refused_by_name(name: str, value: float) -> None:
     with pytest.raises(SimulationInputError, match=f"^{name}: "):
         with_parameters(load_robot("szabadka2"), {name: value})
+
+
+CHOICES = [
+    (variable.name, index, choice)
+    for variable in CONVENTIONAL_VARIABLES
+    for index, choice in enumerate(variable.choices)
+]
+
+
+def test_conventions_are_beside_the_identified_parameters() -> None:
+    names = {variable.name for variable in CONVENTIONAL_VARIABLES}
+    own = {variable.name for variable in identifiable_variables(load_robot("szabadka2"))}
+    assert len(names) == len(CONVENTIONAL_VARIABLES)
+    assert names.isdisjoint(own)
+
+
+@pytest.mark.parametrize(("name", "index", "choice"), CHOICES)
+def test_a_choice_is_given_by_name_or_index(name: str, index: int, choice: str) -> None:
+    robot = load_robot("szabadka2")
+    named, counted = (with_parameters(robot, {name: value}) for value in (choice, index))
+    d = named.description
+    assert d == counted.description
+    assert getattr(d.supply if name == "energy" else d, name) == choice
+
+
+@pytest.mark.parametrize("name", ["szabadka2", "szabadka2-identified"])
+def test_one_efficiency_is_that_of_every_joint_but_one_with_its_own(name: str) -> None:
+    robot = load_robot(name)
+    values = {"efficiency": 0.93, "efficiency_left_rear_tibia": 0.5}
+    assert (with_parameters(robot, {"efficiency": 0.93}).actuators().efficiency == 0.93).all()
+    efficiency = with_parameters(robot, values).actuators().efficiency
+    assert efficiency.tolist() == [0.93] * 17 + [0.5]
+
+
+@pytest.mark.parametrize("name", ["szabadka2", "szabadka2-identified"])
+def test_the_slip_velocity_is_that_of_every_foot(name: str) -> None:
+    changed = with_parameters(load_robot(name), {"slip_velocity": 0.12, "friction_left_rear": 0.4})
+    assert [contact.slip_velocity for contact in changed.contacts()] == [0.12] * 6
+    assert changed.description.contact.slip_velocity == 0.12
+    assert changed.contacts()[-1].friction == 0.4
+
+
+@pytest.mark.parametrize("name", ["szabadka2", "szabadka2-identified"])
+def test_conventions_leave_all_else(name: str) -> None:
+    robot = load_robot(name)
+    d = robot.description
+    described = {
+        "energy": d.supply.energy,
+        "contact_law": d.contact_law,
+        "slip_velocity": d.contact.slip_velocity,
+        "planned_soles": d.planned_soles,
+    }
+    assert with_parameters(robot, described).description == d
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"contact_law": "ice"}, "contact_law: 'ice' is none of its choices linear_zone, "),
+        ({"energy": 9.0}, "energy: 9 is none of its choices signed, positive, absolute"),
+        ({"efficiency": 1.5}, "efficiency: "),
+        ({"slip_velocity": 0.0}, "slip_velocity: "),
+        ({"body_mass": "heavy"}, "body_mass: 'heavy' is not a number"),
+    ],
+)
+def test_a_convention_that_no_robot_has_is_refused_by_name(
+    values: dict[str, float | str], message: str
+) -> None:
+    with pytest.raises(SimulationInputError) as refused:
+        with_parameters(load_robot("szabadka2-identified"), values)
+    assert str(refused.value).startswith(message)

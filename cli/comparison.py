@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
 from gaitswarm.views import SimulationView
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
 from sim.controllers import CONTROLLERS
+from sim.scenario import GAIT_VARIABLE_NAMES
 
 
 def published_beside(spec: Spec) -> dict[str, SimulationView]:
@@ -21,12 +24,37 @@ def published_beside(spec: Spec) -> dict[str, SimulationView]:
     published = CONTROLLERS[spec.controller].published
     wanted = spec.resolved_preference()
     names = [name for name, known in PREFERENCES.items() if known == wanted and name in published]
-    study = next(iter([*names, *published]))
+    study = next(iter([*names, *published]), None)
+    if study is None:
+        return {}
     request = SimulationRequest(
         robot=spec.robot,
         controller=spec.controller,
-        design=dict(published[study]),
+        design=on_the_jobs_terms(published[study], spec),
         scenarios=spec.scenarios,
         preference=spec.preference,
     )
     return {f"published {study}": run_simulation(request)}
+
+
+def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
+    """A published design for comparison with what a job finds.
+
+    published: a design with or without a gait of its own.
+
+    It walks in its own gait only as far as the job searches the gait; else in the gait that all of
+    the job's designs have. So with conventions that the job holds fixed.
+    """
+    searched = {variable.name for variable in spec.design_space().variables}
+    conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
+    held = {
+        name: value
+        for name, value in spec.fixed.items()
+        if name in conventions | GAIT_VARIABLE_NAMES
+    }
+    own = {
+        name: value
+        for name, value in published.items()
+        if name not in GAIT_VARIABLE_NAMES or name in searched
+    }
+    return own | held

@@ -18,7 +18,8 @@ def read_design(design: str, controller: str, trajectory: Path | None = None) ->
 
     design: a file with a flat object {name: value}, or with one under `design`, as `best --json`
         prints; or `published:NAME` for a design of the literature.
-    trajectory: a file with gait parameters only, none of which the design may set as well.
+    trajectory: a file with gait parameters only, none of which a design file may set as well; a
+        published design walks in this gait in place of its own.
     Raises InvalidRequest that names the field.
     """
     values = _read_values(design, controller)
@@ -28,7 +29,7 @@ def read_design(design: str, controller: str, trajectory: Path | None = None) ->
     gait = read_json_object(trajectory, "trajectory")
     _check_names(gait, GAIT_VARIABLE_NAMES, "trajectory")
     for name in gait:
-        if name in values:
+        if name in values and not design.startswith(_PUBLISHED):
             raise InvalidRequest(
                 "set in the design file too; choose one", field=f"trajectory.{name}"
             )

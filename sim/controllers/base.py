@@ -176,7 +176,10 @@ class Controller(Protocol):
 
     @property
     def published(self) -> Mapping[str, Mapping[str, float]]:
-        """Designs from the literature, by the preference or study that they belong to."""
+        """Designs from the literature, by the preference or study that they belong to.
+
+        One that was tuned together with a gait has the gait's variables, too.
+        """
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """A design as it runs on the robot.

@@ -49,6 +49,20 @@ _CONVENTIONS: Final = (
     UNIVERSE,
 )
 
+_COLUMNS: Final = ("I", "FI1R", "FI2R", "FOR", "FOMF", "FW1", "FW23", "FW4", "FW56")
+
+_PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
+    {
+        name: MappingProxyType(dict(zip(_COLUMNS, row, strict=True)))
+        for name, row in (
+            ("A", (0.171, 5837.0, 20111.0, 781.0, 2.0, 0.187, 0.961, 0.789, 0.927)),
+            ("B", (0.160, 5400.0, 18693.0, 500.0, 3.0, 0.347, 0.972, 0.592, 0.814)),
+            ("C", (0.607, 5629.0, 18242.0, 527.0, 3.0, 0.581, 0.889, 0.702, 0.188)),
+        )
+    }
+)
+"""Optima of table 4.6, by preference."""
+
 DEFAULT_SETS: Final = MembershipSets.of({}, _CONVENTIONS)
 
 
@@ -181,23 +195,7 @@ class FuzzyPi:
         ),
     )
     conventions: Final = _CONVENTIONS
-    published: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
-        {
-            "A": MappingProxyType(
-                {
-                    "I": 0.171,
-                    "FI1R": 5837.0,
-                    "FI2R": 20111.0,
-                    "FOR": 781.0,
-                    "FOMF": 2.0,
-                    "FW1": 0.187,
-                    "FW23": 0.961,
-                    "FW4": 0.789,
-                    "FW56": 0.927,
-                }
-            )
-        }
-    )
+    published: Final[Mapping[str, Mapping[str, float]]] = _PUBLISHED
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """The table of 10 x 6 bits, and the integrator's gain."""

@@ -44,7 +44,61 @@ VELOCITY: Final = Axis(bits=6, centred=True)
 
 _INTEGRAL_AXES: Final = {"error": COARSE_ERROR, "current": COARSE_CURRENT, "velocity": VELOCITY}
 
-_CONVENTIONS: Final = (LARGE_BEGINS, SMALL_ENDS, POSITIVE_PEAK, UNIVERSE)
+_CONVENTIONS: Final = (
+    LARGE_BEGINS,
+    SMALL_ENDS,
+    POSITIVE_PEAK,
+    # Without extreme outputs, this universe holds all sets whole.
+    UNIVERSE.model_copy(update={"default": 2.0}),
+)
+
+_PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
+    {
+        "fuzzy-pso-ps": MappingProxyType(
+            {
+                "A_ERR": 5126.0,
+                "I_MA": 4.4,
+                "V_ERR": 11682.0,
+                "FzzP": 2227.0,
+                "FzzI": 2176.0,
+                "FzzP_MF": 2.0,
+                "FzzI_MF": 1.0,
+                "W1": 0.066,
+                "W2": 0.996,
+                "W34": 0.215,
+                "W56": 0.385,
+                "W78": 0.783,
+                "cycle_time": 1.740,
+                "stride": 0.163,
+                "height": 0.0364,
+                "duty_factor": 0.564,
+                "fir_ms": 12.0,
+            }
+        ),
+        "fuzzy-pso": MappingProxyType(
+            {
+                "A_ERR": 6369.0,
+                "I_MA": 1.465,
+                "V_ERR": 12103.0,
+                "FzzP": 2620.0,
+                "FzzI": 6362.0,
+                "FzzP_MF": 2.0,
+                "FzzI_MF": 2.0,
+                "W1": 0.234,
+                "W2": 0.281,
+                "W34": 0.496,
+                "W56": 0.258,
+                "W78": 0.502,
+                "cycle_time": 1.733,
+                "stride": 0.161,
+                "height": 0.0329,
+                "duty_factor": 0.544,
+                "fir_ms": 33.0,
+            }
+        ),
+    }
+)
+"""Optima of table 3.5, each with the gait that was tuned together with it."""
 
 DEFAULT_SETS: Final = MembershipSets.of({}, _CONVENTIONS)
 
@@ -205,26 +259,7 @@ class FuzzyPi3:
         ),
     )
     conventions: Final = _CONVENTIONS
-    published: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
-        {
-            "PSO-PS": MappingProxyType(
-                {
-                    "A_ERR": 5126.0,
-                    "I_MA": 4.4,
-                    "V_ERR": 11682.0,
-                    "FzzP": 2227.0,
-                    "FzzI": 2176.0,
-                    "FzzP_MF": 2.0,
-                    "FzzI_MF": 1.0,
-                    "W1": 0.066,
-                    "W2": 0.996,
-                    "W34": 0.215,
-                    "W56": 0.385,
-                    "W78": 0.783,
-                }
-            )
-        }
-    )
+    published: Final[Mapping[str, Mapping[str, float]]] = _PUBLISHED
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """A table of the voltage, and one of the integrated voltage's rate."""

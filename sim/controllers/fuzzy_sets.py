@@ -1,7 +1,8 @@
 """Membership functions that the fuzzy controllers share, on normalised universes.
 
 The thesis draws but does not list them. What its drawings leave open are conventions, which a
-design may set; see docs/model.md for the defaults.
+design may set. The defaults are sets with which table 4.3's own weights and the published optima A
+and B reverse the drive at extreme current, as 4.3.2 and fig. 4.5 say; see docs/model.md.
 """
 
 from __future__ import annotations
@@ -28,35 +29,35 @@ LARGE_BEGINS: Final = Variable(
     name="large_begins",
     low=0.0,
     high=0.9,
-    default=0.0,
+    default=0.5,
     description="Share of the current's range from which a current is large.",
 )
 SMALL_ENDS: Final = Variable(
     name="small_ends",
     low=0.1,
     high=1.0,
-    default=1.0,
+    default=0.5,
     description="Share of the current's range up to which a current is small.",
 )
 POSITIVE_PEAK: Final = Variable(
     name="positive_peak",
     low=0.25,
     high=1.5,
-    default=0.5,
+    default=1.0,
     description="Share of the output's range at which the positive output peaks.",
 )
 EXTREME_PEAK: Final = Variable(
     name="extreme_peak",
     low=0.5,
     high=3.0,
-    default=1.0,
+    default=2.0,
     description="Share of the output's range at which the extreme positive output peaks.",
 )
 UNIVERSE: Final = Variable(
     name="universe",
     low=0.5,
     high=4.5,
-    default=1.0,
+    default=3.0,
     description="Share of the output's range up to which the output's centroid is taken; sets that"
     " reach beyond are cut there.",
 )

@@ -86,7 +86,34 @@ PI: Final = LinearController(
     "PI on the angle error, in coded units (thesis 2.2.2, 3.4).",
     (_P, _I),
     (INTEGRATOR_UNIT,),
-    MappingProxyType({"validation": MappingProxyType({"P": 0.25, "I": 0.0})}),
+    MappingProxyType(
+        {
+            # Optima of table 3.5, each with the gait that was tuned together with it.
+            "pi-pso-ps": MappingProxyType(
+                {
+                    "P": 0.454,
+                    "I": 0.147,
+                    "cycle_time": 1.808,
+                    "stride": 0.168,
+                    "height": 0.0397,
+                    "duty_factor": 0.574,
+                    "fir_ms": 93.0,
+                }
+            ),
+            "pi-pso": MappingProxyType(
+                {
+                    "P": 0.340,
+                    "I": 0.534,
+                    "cycle_time": 1.696,
+                    "stride": 0.142,
+                    "height": 0.0366,
+                    "duty_factor": 0.577,
+                    "fir_ms": 9.0,
+                }
+            ),
+            "validation": MappingProxyType({"P": 0.25, "I": 0.0}),
+        }
+    ),
 )
 PID: Final = LinearController(
     "pid",

@@ -27,7 +27,8 @@ class RobotVariant(BaseModel):
     name: RobotName = Field(default="szabadka2", description="Robot to start from.")
     contact_law: ContactLaw | None = Field(
         default=None,
-        description="How soles rub: linear_zone, karnopp, stick or dead_zone; null is the robot's own law.",
+        description="How soles rub: linear_zone, karnopp, stick or dead_zone; null is the robot's"
+        " own law.",
     )
     backlash: Degrees = Field(
         default=(0.0, 0.0, 0.0),

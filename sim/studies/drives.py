@@ -65,7 +65,9 @@ class WalkFigures:
 
 
 def _published(controller: ControllerName, study: str) -> Mapping[str, float]:
-    return CONTROLLERS[controller].published[study]
+    """Without its gait: drives are compared in the scenario's, or in one that they name."""
+    design = CONTROLLERS[controller].published[study]
+    return {name: value for name, value in design.items() if name not in GAIT_VARIABLE_NAMES}
 
 
 DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
@@ -90,7 +92,7 @@ DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
                 "fuzzy-pi-3",
                 "published Fuzzy-PI of chapter 3, in the scenario's own gait",
                 "fuzzy-pi-3",
-                _published("fuzzy-pi-3", "PSO-PS"),
+                _published("fuzzy-pi-3", "fuzzy-pso-ps"),
             ),
         )
     }

@@ -163,7 +163,7 @@ def test_a_table_of_three_inputs_is_its_inference() -> None:
 
 
 def test_chapter_3s_rules_follow_error_and_velocity_and_yield_to_current() -> None:
-    law = CONTROLLERS["fuzzy-pi-3"].compile(CONTROLLERS["fuzzy-pi-3"].published["PSO-PS"])
+    law = CONTROLLERS["fuzzy-pi-3"].compile(CONTROLLERS["fuzzy-pi-3"].published["fuzzy-pso-ps"])
     assert isinstance(law.direct, LookupTable) and isinstance(law.integrated, LookupTable)
     voltage, rate = law.direct.values[:, :, 0].astype(int), law.integrated.values.astype(int)
     assert voltage[900, 0] > 0 > voltage[120, 0]

@@ -66,6 +66,13 @@ class SpecOptions:
     ] = None
     iterations: Annotated[int | None, typer.Option(help="Iterations to run.")] = None
     particles: Annotated[int | None, typer.Option(help="Size of the swarm.")] = None
+    optimizer: Annotated[
+        str | None,
+        typer.Option(
+            help="Search method with its settings: pso, or pso-thesis with the thesis's constant"
+            " inertia."
+        ),
+    ] = None
     seed: Annotated[int | None, typer.Option(help="Source of all randomness.")] = None
     preference: Annotated[
         str | None, typer.Option(help="How objectives are weighed: A, B, C or chapter-3 (eq. 3.1).")

@@ -58,10 +58,10 @@ def build_spec(options: SpecOptions) -> AnySpec:
         chosen["robot"] = chosen_robot(options.robot)
     particles = chosen.pop("particles", None)
     if particles is not None:
-        optimizer = data.get("optimizer", {})
-        chosen["optimizer"] = (
-            {**optimizer, "particles": particles} if isinstance(optimizer, dict) else optimizer
-        )
+        from gaitswarm.specs import with_particles
+
+        optimizer = chosen.get("optimizer", data.get("optimizer", {}))
+        chosen["optimizer"] = with_particles(optimizer, particles)
     return parse_spec(data | chosen)
 
 

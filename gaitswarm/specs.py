@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias, TypedDict, cast
 
@@ -13,7 +14,7 @@ from gaitswarm.errors import InvalidRequest, invalid_request
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.search.pso import PsoSettings
+from services.optimizer.search.pso import OptimizerName, PsoSettings, optimizer_settings
 from sim.controllers import ControllerName
 from sim.robot import RobotFiles, RobotVariant
 from sim.robot.shipped import SHIPPED
@@ -50,7 +51,8 @@ class SpecOptions(TypedDict, total=False):
         fixed: Variables held at one value, by name, in their units; a categorical one at a choice's
             name.
         preference: How objectives are weighed.
-        optimizer: Settings of the search.
+        optimizer: Settings of the search, or the name of a preset: `pso`, or `pso-thesis` with the
+            thesis's constant inertia.
         particles: Size of the swarm, in place of `optimizer`'s.
         iterations: Budget: iterations of the swarm.
         seed: Source of all randomness; the same seed gives the same bits.
@@ -63,7 +65,7 @@ class SpecOptions(TypedDict, total=False):
     variables: Sequence[str | Variable | Document]
     fixed: Mapping[str, float | str]
     preference: PreferenceInput
-    optimizer: PsoSettings | Document
+    optimizer: OptimizerName | PsoSettings | Document
     particles: int
     iterations: int
     seed: int
@@ -92,17 +94,29 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
         given["scenarios"] = scenario_entries(given["scenarios"])
     if "particles" in given:
         settings = given.get("optimizer", document.get("optimizer", {}))
-        if isinstance(settings, PsoSettings):
-            settings = settings.model_dump()
-        particles = given.pop("particles")
-        # What is no mapping is left for validation to refuse.
-        sized = {**settings, "particles": particles} if isinstance(settings, Mapping) else settings
-        given["optimizer"] = sized
+        given["optimizer"] = with_particles(settings, given.pop("particles"))
     document |= given
     try:
         return SPECS.validate_python(document)
     except ValidationError as error:
         raise invalid_request(error, document) from error
+
+
+def with_particles(optimizer: object, particles: object) -> object:
+    """An optimizer with another size of its swarm.
+
+    Args:
+        optimizer: Settings, a document of some, or the name of a preset.
+        particles: Size of the swarm.
+
+    Returns:
+        A document; what is none of these as it is, for validation to refuse.
+    """
+    with suppress(ValueError):
+        optimizer = optimizer_settings(optimizer)
+    if isinstance(optimizer, PsoSettings):
+        optimizer = optimizer.model_dump()
+    return {**optimizer, "particles": particles} if isinstance(optimizer, Mapping) else optimizer
 
 
 def scenario_entries(

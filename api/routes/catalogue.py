@@ -15,9 +15,11 @@ from gaitswarm.views import (
     PREFIX,
     CatalogueView,
     ControllerView,
+    OptimizerView,
     PreferenceView,
     ScenarioView,
     controller_views,
+    optimizer_views,
     preference_views,
     scenario_views,
 )
@@ -48,6 +50,17 @@ def list_scenarios() -> CatalogueView[ScenarioView]:
 def list_preferences() -> CatalogueView[PreferenceView]:
     """Biases and exponents by which objectives are weighed: thesis table 4.5, eq. 3.1."""
     return CatalogueView(items=preference_views())
+
+
+@router.get(
+    "/optimizers",
+    operation_id="list_optimizers",
+    summary="List optimizers",
+    responses=problems(),
+)
+def list_optimizers() -> CatalogueView[OptimizerView]:
+    """Search methods with their settings, by the names that jobs may give them."""
+    return CatalogueView(items=optimizer_views())
 
 
 @router.get(

@@ -16,9 +16,11 @@ from gaitswarm.views.base import View, finite
 from gaitswarm.views.catalogue import (
     CatalogueView,
     ControllerView,
+    OptimizerView,
     PreferenceView,
     ScenarioView,
     controller_views,
+    optimizer_views,
     preference_views,
     scenario_views,
 )
@@ -66,6 +68,7 @@ __all__ = [
     "JobView",
     "MeasurementsView",
     "ObjectiveView",
+    "OptimizerView",
     "PageView",
     "ParticlesHeaderView",
     "PreferenceView",
@@ -86,6 +89,7 @@ __all__ = [
     "evaluation_views",
     "field_errors",
     "finite",
+    "optimizer_views",
     "preference_views",
     "scenario_views",
 ]

@@ -1,4 +1,4 @@
-"""What there is to choose from: scenarios, preferences, controllers."""
+"""What there is to choose from: scenarios, preferences, optimizers, controllers."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field
 
 from gaitswarm.views.base import View, listing_name
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
+from services.optimizer.search.pso import OPTIMIZERS, OptimizerName, PsoSettings
 from sim.controllers import CONTROLLERS
 from sim.scenario import GAIT_VARIABLES, PRESETS, Scenario
 from sim.variables import Variable
@@ -52,6 +53,13 @@ class PreferenceView(Preference):
     name: PreferenceName = Field(description="Name, as in job specs.", examples=["A"])
 
 
+class OptimizerView(View):
+    """A preset of the search method."""
+
+    name: OptimizerName = Field(description="Name, as in job specs.", examples=["pso-thesis"])
+    settings: PsoSettings = Field(description="What the name stands for.")
+
+
 class ControllerView(View):
     """A family of motor controllers and what can be tuned in it."""
 
@@ -86,6 +94,11 @@ def scenario_views() -> list[ScenarioView]:
 def preference_views() -> list[PreferenceView]:
     """The preferences of table 4.5, in its order, then that of eq. 3.1."""
     return [PreferenceView(name=name, **dict(p)) for name, p in PREFERENCES.items()]
+
+
+def optimizer_views() -> list[OptimizerView]:
+    """The presets of the search method, the default first."""
+    return [OptimizerView(name=name, settings=settings) for name, settings in OPTIMIZERS.items()]
 
 
 def controller_views() -> list[ControllerView]:

@@ -47,6 +47,16 @@ def test_preferences_have_their_biases_and_exponents(client: httpx2.Client) -> N
     assert found[3]["bias"] == [0.0, 0.0, 0.0, 0.0, 0.0, 0.03]
 
 
+def test_optimizers_have_their_settings(client: httpx2.Client) -> None:
+    found = {item["name"]: item["settings"] for item in items(client, "optimizers")}
+
+    assert {name: (s["inertia_start"], s["inertia_end"]) for name, s in found.items()} == {
+        "pso": (0.9, 0.7),
+        "pso-thesis": (0.9, 0.9),
+    }
+    assert all((s["cognitive"], s["social"]) == (0.5, 1.5) for s in found.values())
+
+
 def test_controllers_have_variables_with_bounds_units_and_published_designs(
     client: httpx2.Client,
 ) -> None:
@@ -66,6 +76,7 @@ def test_a_job_can_name_whatever_the_catalogue_lists(client: httpx2.Client) -> N
     spec = {
         "controller": items(client, "controllers")[0]["name"],
         "preference": items(client, "preferences")[-1]["name"],
+        "optimizer": items(client, "optimizers")[-1]["name"],
         "scenarios": [str(item["number"]) for item in items(client, "scenarios")],
     }
 

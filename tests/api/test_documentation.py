@@ -53,6 +53,7 @@ def test_the_routes_are_these(document: Document) -> None:
         "post /v1/replays",
         "get /v1/scenarios",
         "get /v1/preferences",
+        "get /v1/optimizers",
         "get /v1/controllers",
         "post /v1/controllers/{controller}/surface",
         "get /v1/healthz",

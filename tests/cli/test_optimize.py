@@ -45,6 +45,18 @@ def test_options_go_before_the_spec(gaitswarm: Gaitswarm, small_spec: Path, db: 
     assert set(result.json["best"]["design"]) == {"P", "I"}
 
 
+def test_an_optimizer_is_named_and_its_settings_are_written_out(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path
+) -> None:
+    named = ("submit", "--spec", small_spec, "--db", db, "--optimizer", "pso-thesis", "--json")
+    whole = gaitswarm(*named).json["spec"]["optimizer"]
+    assert (whole["inertia_start"], whole["inertia_end"], whole["particles"]) == (0.9, 0.9, 25)
+    assert gaitswarm(*named, "--particles", "4").json["spec"]["optimizer"] == {
+        **whole,
+        "particles": 4,
+    }
+
+
 def test_the_report_for_people_has_the_published_optimum_beside_the_best(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path
 ) -> None:
@@ -110,6 +122,10 @@ BAD_SPECS: dict[str, tuple[dict[str, Any], str]] = {
     "no iterations": ({"iterations": 0}, "iterations"),
     "no particles": ({"optimizer": {"name": "pso", "particles": 0}}, "optimizer.particles"),
     "optimizer that is a number": ({"optimizer": 3}, "optimizer"),
+    "unknown optimizer": (
+        {"optimizer": "pos"},
+        "optimizer: unknown optimizer 'pos'",
+    ),
     "negative seed": ({"seed": -1}, "seed"),
     "unknown field": ({"budget": 5}, "budget"),
     "unknown preference": ({"preference": "Z"}, "preference"),

@@ -64,6 +64,10 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "inverted bounds": ({"variables": [{"name": "P", "low": 1.0, "high": 0.1}]}, "variables.0"),
     "unknown field": ({"budget": 5}, "budget"),
     "no particles": ({"particles": 0}, "optimizer.particles"),
+    "empty preset": (
+        {"optimizer": "pso-thesis", "particles": 0},
+        "optimizer.particles",
+    ),
     "unknown robot": ({"robot": "spot"}, "robot"),
     "gait out of reach": (
         {"scenarios": {"name": "giant", "cycle_time": 1.5, "radius": 0.9, "hip_height": 0.15}},

@@ -13,7 +13,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.search.pso import ParticleSwarm, PsoSettings, absorb, reflect
+from services.optimizer.search.pso import (
+    OPTIMIZERS,
+    OptimizerName,
+    ParticleSwarm,
+    PsoSettings,
+    absorb,
+    reflect,
+)
 from services.optimizer.search.random_stream import uniform
 from sim.variables import Variable
 
@@ -157,6 +164,28 @@ def test_a_reflected_particle_bounces_as_often_as_it_takes(
 def test_an_absorbed_particle_stops_at_the_wall_in_that_direction_only() -> None:
     moved, stopped = absorb(np.array([[1.5, 0.5]]), np.ones((1, 2)), np.zeros(2), np.ones(2))
     assert moved.tolist() == [[1.0, 0.5]] and stopped.tolist() == [[0.0, 1.0]]
+
+
+def speeds(name: OptimizerName, iterations: int) -> list[float]:
+    """Of a lone particle that improves with every step, so that nothing but inertia moves it."""
+    settings = OPTIMIZERS[name].model_copy(update={"particles": 1})
+    lone = ParticleSwarm(settings, np.array([-1e3]), np.array([1e3]), iterations, 1)
+    found = []
+    for k in range(iterations):
+        lone.ask()
+        found.append(abs(lone.dump()["velocities"][0][0]))
+        lone.tell(np.array([-float(k)]))
+    return found
+
+
+def test_the_thesis_swarm_keeps_its_inertia_and_that_of_the_default_falls() -> None:
+    thesis, default = (
+        [later / earlier for earlier, later in pairwise(speeds(name, 10))]
+        for name in ("pso-thesis", "pso")
+    )
+    assert thesis == pytest.approx([0.9] * 9)
+    assert default == sorted(default, reverse=True)
+    assert default[-1] == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

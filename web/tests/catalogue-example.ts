@@ -69,6 +69,10 @@ export const CATALOGUE = {
     { name: 'A', bias: [0.9, 0.8, 0.24, 0.5, 0.8], exponent: [0.1, 0.7, 0.3, 0.3, 0.1] },
     { name: 'C', bias: [0, 0, 0, 0, 0], exponent: [1, 1, 1, 1, 1] },
   ],
+  optimizers: [
+    { name: 'pso', settings: { particles: 25, inertia_end: 0.7 } },
+    { name: 'pso-thesis', settings: { particles: 25, inertia_end: 0.9 } },
+  ],
   fields: {
     job: fieldsOf(DOCUMENT, 'JobSpec'),
     scenario: fieldsOf(DOCUMENT, 'Scenario'),

@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest'
 import type { JobSpec } from '../src/api/types'
 import { around } from '../src/submission/around-design'
 import { errorsByField, specOf, withKinds } from '../src/submission/build-spec'
-import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
+import { type Draft, draftOf, emptyDraft, scenarioDraft, withPreset } from '../src/submission/draft'
 import { boundsInWords, fieldsOf } from '../src/submission/schema-fields'
 import { CATALOGUE, DOCUMENT } from './catalogue-example'
 
@@ -64,6 +64,21 @@ describe('a draft', () => {
       contact_law: 'linear_zone',
       backlash: [2.5, 1, 1],
     })
+  })
+})
+
+describe('a preset of the optimizer', () => {
+  test('sets all but the size of the swarm', () => {
+    const [, thesis] = CATALOGUE.optimizers
+    expect(withPreset({ particles: '40', inertia_end: '0.7' }, thesis)).toEqual({
+      particles: '40',
+      inertia_end: '0.9',
+    })
+  })
+
+  test('may be all that a job to be cloned says of it', () => {
+    const draft = draftOf({ ...specOf(empty), optimizer: 'pso-thesis' }, CATALOGUE)
+    expect(draft.optimizer.inertia_end).toBe('0.9')
   })
 })
 

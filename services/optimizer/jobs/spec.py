@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.pso import ParticleSwarm, PsoSettings
+from services.optimizer.search.pso import OptimizerChoice, ParticleSwarm, PsoSettings
 from sim.case import Case
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
@@ -91,8 +91,10 @@ class Spec(BaseModel):
         " index.",
         examples=[{"FOMF": 2, "stride": 0.15}],
     )
-    optimizer: PsoSettings = Field(
-        default_factory=PsoSettings, description="Search algorithm and its settings."
+    optimizer: OptimizerChoice = Field(
+        default_factory=PsoSettings,
+        description="Search algorithm and its settings: `pso`, `pso-thesis` (the thesis's constant"
+        " inertia), or settings of your own.",
     )
     iterations: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
         default=25, description="Budget: iterations to run (generations of the swarm)."

@@ -1,13 +1,21 @@
-"""Particle swarm optimization with a falling inertia (thesis 3.4.1, 4.4.1)."""
+"""Particle swarm optimization (thesis 3.4.1, 4.4.1), and its presets."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    NonNegativeInt,
+    model_validator,
+)
 
 from services.optimizer.search.optimizer import matrix, parse_state
 from services.optimizer.search.random_stream import swarm_uniform
@@ -22,7 +30,7 @@ _INITIAL_VELOCITY: Final = 0.1
 
 
 class PsoSettings(BaseModel):
-    """Settings of the particle swarm; defaults are those of chapter 4."""
+    """Settings of the particle swarm; defaults are the thesis's, but for an inertia that falls."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -45,8 +53,47 @@ class PsoSettings(BaseModel):
     @model_validator(mode="after")
     def _inertia_falls(self) -> PsoSettings:
         if self.inertia_end > self.inertia_start:
-            raise ValueError("inertia_end must not exceed inertia_start: inertia falls over a run")
+            raise ValueError("inertia_end must not exceed inertia_start: inertia never rises")
         return self
+
+
+OptimizerName = Literal["pso", "pso-thesis"]
+
+OPTIMIZERS: Final[dict[OptimizerName, PsoSettings]] = {
+    "pso": PsoSettings(),
+    "pso-thesis": PsoSettings(inertia_end=0.9),
+}
+"""`pso`: the default, whose inertia falls. `pso-thesis`: inertia 0.9 throughout (3.4.1)."""
+
+
+def optimizer_settings(choice: object) -> object:
+    """Look up settings that are named.
+
+    Args:
+        choice: name of a preset, or anything else.
+
+    Returns:
+        The preset's settings; what is no name as it is.
+
+    Raises:
+        ValueError: no preset of that name; names those that there are.
+    """
+    if not isinstance(choice, str):
+        return choice
+    for name, settings in OPTIMIZERS.items():
+        if name == choice:
+            return settings
+    raise ValueError(
+        f"unknown optimizer {choice!r}; known are {', '.join(OPTIMIZERS)}, or give an object:"
+        " settings of your own"
+    )
+
+
+OptimizerChoice = Annotated[
+    PsoSettings,
+    BeforeValidator(optimizer_settings, json_schema_input_type=OptimizerName | PsoSettings),
+]
+"""How jobs choose a search: once it is read, a name has become settings."""
 
 
 class _SwarmState(BaseModel):
@@ -86,7 +133,7 @@ class ParticleSwarm:
             settings: of the method.
             low: (d,) lower bounds, in the variables' own units.
             high: (d,) upper bounds.
-            iterations: of the planned run, over which inertia falls.
+            iterations: of the planned run, over which inertia goes from its start to its end.
             seed: of all random numbers.
         """
         self._settings = settings
@@ -218,7 +265,7 @@ class ParticleSwarm:
         )
 
     def _inertia(self) -> float:
-        """Falls linearly from the first to the last iteration of the plan, then stays."""
+        """Linear from the first to the last iteration of the plan, then it stays."""
         share = min(self._iteration / max(self._iterations - 1, 1), 1.0)
         start, end = self._settings.inertia_start, self._settings.inertia_end
         return start + share * (end - start)

@@ -1,13 +1,14 @@
 /** Everything that the form offers, as the API lists it. */
 
 import { get } from '../api/client'
-import type { Controller, PreferencePreset, ScenarioPreset } from '../api/types'
+import type { Controller, OptimizerPreset, PreferencePreset, ScenarioPreset } from '../api/types'
 import { fieldsOf, type OpenApiDocument, type SchemaField } from './schema-fields'
 
 export interface Catalogue {
   readonly controllers: readonly Controller[]
   readonly scenarios: readonly ScenarioPreset[]
   readonly preferences: readonly PreferencePreset[]
+  readonly optimizers: readonly OptimizerPreset[]
   readonly fields: {
     readonly job: ReadonlyMap<string, SchemaField>
     readonly scenario: ReadonlyMap<string, SchemaField>
@@ -17,16 +18,18 @@ export interface Catalogue {
 }
 
 export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
-  const [controllers, scenarios, preferences, document] = await Promise.all([
+  const [controllers, scenarios, preferences, optimizers, document] = await Promise.all([
     get('/v1/controllers', { signal }),
     get('/v1/scenarios', { signal }),
     get('/v1/preferences', { signal }),
+    get('/v1/optimizers', { signal }),
     fetch('/openapi.json', { signal }).then((answer) => answer.json() as Promise<OpenApiDocument>),
   ])
   return {
     controllers: controllers.items,
     scenarios: scenarios.items,
     preferences: preferences.items,
+    optimizers: optimizers.items,
     fields: {
       job: fieldsOf(document, 'JobSpec'),
       scenario: fieldsOf(document, 'Scenario'),

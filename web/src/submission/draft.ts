@@ -1,6 +1,6 @@
 /** A job as it stands in the form: numbers are still text, choices not yet a spec. */
 
-import type { JobSpec, Scenario, Variable } from '../api/types'
+import type { JobSpec, OptimizerPreset, Scenario, Variable } from '../api/types'
 import type { Catalogue } from './catalogue'
 import type { SchemaField } from './schema-fields'
 
@@ -108,7 +108,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
     variables: variablesOf(spec, defaultVariables(catalogue, controller)),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
-    optimizer: { ...empty.optimizer, ...texts(spec.optimizer ?? {}) },
+    optimizer: { ...empty.optimizer, ...optimizerOf(spec.optimizer, catalogue) },
     iterations: text(spec.iterations),
     seed: text(spec.seed),
   }
@@ -145,6 +145,23 @@ export function preferenceOf(
   )
   if (preset) return preferenceDraft(catalogue, preset.name)
   return { kind: 'own', bias: preference.bias.map(text), exponent: preference.exponent.map(text) }
+}
+
+/** Settings of an optimizer by field; a preset's where it is named. */
+function optimizerOf(
+  optimizer: JobSpec['optimizer'],
+  catalogue: Catalogue,
+): Readonly<Record<string, string>> {
+  if (typeof optimizer !== 'string') return texts(optimizer ?? {})
+  return texts(catalogue.optimizers.find(({ name }) => name === optimizer)?.settings ?? {})
+}
+
+/** An optimizer with a preset's settings; how large its swarm is, presets leave open. */
+export function withPreset(
+  optimizer: Draft['optimizer'],
+  { settings }: OptimizerPreset,
+): Draft['optimizer'] {
+  return { ...optimizer, ...texts(settings), particles: optimizer.particles }
 }
 
 function variablesOf(

@@ -1,6 +1,7 @@
 /** Name, budget and seed; optimizer and its settings. */
 
 import { inWords } from '../format/words'
+import { withPreset } from './draft'
 import { ChoiceField, NumberField, Problems } from './number-field'
 import type { SectionProps } from './section'
 
@@ -47,6 +48,21 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
   return (
     <section class="card" aria-labelledby="part-optimizer">
       <h2 id="part-optimizer">Optimizer</h2>
+      <fieldset class="segmented" aria-label="Preset of the optimizer">
+        {catalogue.optimizers.map((preset) => {
+          const settings = withPreset(draft.optimizer, preset)
+          return (
+            <button
+              key={preset.name}
+              type="button"
+              aria-pressed={Object.keys(settings).every((k) => settings[k] === draft.optimizer[k])}
+              onClick={() => onChange({ optimizer: settings })}
+            >
+              {preset.name}
+            </button>
+          )
+        })}
+      </fieldset>
       <Problems messages={errors.has('optimizer') ? [errors.get('optimizer')!] : []} />
       <div class="fields">
         {[...catalogue.fields.optimizer.values()].map((field) =>

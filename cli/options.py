@@ -83,6 +83,13 @@ class SpecOptions:
     controller: Annotated[str | None, typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")] = (
         None
     )
+    with_gait: Annotated[
+        bool | None,
+        typer.Option(
+            "--with-gait",
+            help="Search the gait, too: cycle time, stride, height, duty factor and FIR filter.",
+        ),
+    ] = None
     robot: RobotOption = None
     name: JobName = None
 

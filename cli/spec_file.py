@@ -62,7 +62,19 @@ def build_spec(options: SpecOptions) -> AnySpec:
 
         optimizer = chosen.get("optimizer", data.get("optimizer", {}))
         chosen["optimizer"] = with_particles(optimizer, particles)
-    return parse_spec(data | chosen)
+    with_gait = chosen.pop("with_gait", False)
+    spec = parse_spec(data | chosen)
+    return _searching_gait(spec) if with_gait else spec
+
+
+def _searching_gait(spec: AnySpec) -> AnySpec:
+    from services.optimizer.jobs.tuning import JobSpec
+
+    if not isinstance(spec, JobSpec):
+        raise InvalidRequest("only a job that tunes a drive has a gait", field="with-gait")
+    searching = spec.with_gait_searched()
+    searching.check_can_be_simulated()
+    return searching
 
 
 def parse_spec(data: Mapping[str, Any]) -> AnySpec:

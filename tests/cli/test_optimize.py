@@ -12,6 +12,7 @@ from cli.spec_file import LARGEST_FILE
 from services.runtime import open_store
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.jobs import SMALL_SPEC
+from tests.examples.paths import CHAPTER_3
 
 pytestmark = pytest.mark.slow
 
@@ -43,6 +44,45 @@ def test_options_go_before_the_spec(gaitswarm: Gaitswarm, small_spec: Path, db: 
     assert (spec["controller"], spec["optimizer"]["particles"]) == ("pi", 2)
     assert spec["preference"]["exponent"] == [1.0] * 5
     assert set(result.json["best"]["design"]) == {"P", "I"}
+
+
+@pytest.mark.parametrize(("controller", "searched"), [("fuzzy-pi-3", 17), ("pi", 7)])
+def test_controller_and_gait_are_searched_together(
+    gaitswarm: Gaitswarm, db: Path, controller: str, searched: int
+) -> None:
+    """The example has the size of chapter 3's job; the options ask for the same one."""
+    where = ("--db", db, "--evaluator", "in-process", "--json")
+    spec = ("--spec", CHAPTER_3 / f"{controller}.json")
+    small = ("--iterations", "2", "--particles", "4")
+    job = gaitswarm("optimize", *spec, *small, *where).json
+    optimizer = gaitswarm("submit", *spec, "--db", db, "--json").json["spec"]["optimizer"]
+    assert (optimizer["particles"], optimizer["inertia_end"]) == (40, 0.9)
+
+    gait = {"cycle_time", "stride", "height", "duty_factor", "fir_ms"}
+    assert len(job["best"]["design"]) == searched and gait < set(job["best"]["design"])
+    assert job["best"]["figure_of_merit"] == pytest.approx(1e5 / job["best"]["fitness"])
+
+    options = "--with-gait --scenarios straight --preference chapter-3 --optimizer pso-thesis"
+    asked = ("optimize", "--controller", controller, *options.split(), *small)
+    assert gaitswarm(*asked, *where).json["best"] == job["best"]
+
+
+def test_a_gait_that_is_held_fixed_stays_so(
+    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path
+) -> None:
+    spec = write_json({"controller": "pi", "fixed": {"stride": 0.12}, "scenarios": ["straight"]})
+    asked = gaitswarm("submit", "--spec", spec, "--with-gait", "--db", db, "--json").json["spec"]
+    assert [v["name"] for v in asked["variables"]] == [
+        "P", "I", "cycle_time", "height", "duty_factor", "fir_ms",
+    ]  # fmt: skip
+    assert asked["fixed"] == {"stride": 0.12}
+
+
+def test_a_robot_is_fitted_without_a_gait(gaitswarm: Gaitswarm, write_json: WriteJson) -> None:
+    spec = write_json({"kind": "identification", "recordings": ["0" * 32]})
+    refused = gaitswarm("submit", "--spec", spec, "--with-gait")
+    assert refused.code == 2
+    assert "with-gait: only a job that tunes a drive has a gait" in refused.err
 
 
 def test_an_optimizer_is_named_and_its_settings_are_written_out(

@@ -7,5 +7,8 @@ from typing import Final
 
 ROOT: Final = Path(__file__).parents[2]
 
+CHAPTER_3: Final = ROOT / "examples" / "chapter-3"
+"""Folder of the job specs of chapter 3's study, one by controller."""
+
 QUADRUPED: Final = ROOT / "examples" / "quadruped"
 """Folder of a robot that is not shipped, and of the walk `crawl.json`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ from sim.simulate import check_reach
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]
+
+GAIT_OF_CHAPTER_3: Final = ("cycle_time", "stride", "height", "duty_factor", "fir_ms")
+"""The gait variables that chapter 3 optimizes together with a controller's (table 3.2)."""
 
 
 class JobSpec(Spec):
@@ -103,6 +106,13 @@ class JobSpec(Spec):
             chosen=self.variables,
             fixed=self.fixed,
         )
+
+    def with_gait_searched(self) -> JobSpec:
+        """The same job that searches the gait of chapter 3, too, but what it holds fixed of it."""
+        space = self.design_space()
+        added = tuple(name for name in GAIT_OF_CHAPTER_3 if name not in space.names)
+        document = self.model_dump() | {"variables": (*space.variables, *added)}
+        return JobSpec.model_validate(document)
 
     def check_can_be_simulated(self) -> None:
         """Check that the controller can be compiled and that the legs reach their feet's paths.

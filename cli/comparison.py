@@ -45,11 +45,12 @@ def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str
     It walks in its own gait only as far as the job searches the gait; else in the gait that all of
     the job's designs have. So with conventions that the job holds fixed.
     """
-    searched = {variable.name for variable in spec.design_space().variables}
+    space = spec.design_space()
+    searched = {variable.name for variable in space.variables}
     conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
     held = {
         name: value
-        for name, value in spec.fixed.items()
+        for name, value in space.fixed
         if name in conventions | GAIT_VARIABLE_NAMES
     }
     own = {

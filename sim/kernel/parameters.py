@@ -75,8 +75,8 @@ class Layout:
     field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
     supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every coxa
-    (L each), backlash (J, if the robot has any), and by foot (L each) the parameters
-    of the contact law.
+    (L each), backlash (J, if the robot has any), static_friction (J, if the robot has any), and by
+    foot (L each) the parameters of the contact law.
 
     Args:
         robot: The robot.
@@ -102,6 +102,7 @@ class Layout:
             "jam_damping": n_feet,
             "jam_angle": n_feet,
             "backlash": n_joints if robot.has_backlash else 0,
+            "static_friction": n_joints if robot.has_static_friction else 0,
             **dict.fromkeys(law.parameters, n_feet),
         }
         self.slices: dict[str, slice] = {}
@@ -194,5 +195,6 @@ def pack_parameters(
         jam_damping=JAM_DAMPING * jammed,
         jam_angle=angles[::JOINTS_PER_LEG] * jammed,
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
+        static_friction=(actuators.static_friction if robot.has_static_friction else np.empty(0)),
         **by_foot,
     )

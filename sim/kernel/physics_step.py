@@ -18,8 +18,8 @@ from sim.kernel.articulated_body import (
     kinematics,
     links_of,
 )
-from sim.kernel.backlash import shaft_torque
 from sim.kernel.contact import FRICTION, Foot, InternalState, foot_on_ground
+from sim.kernel.gearhead import shaft_torque, static_friction
 from sim.kernel.inertia import Inertia, Motion
 from sim.kernel.integration import integrated
 from sim.kernel.motor import Electrical, electrical
@@ -259,8 +259,11 @@ def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
         s.p["supply_voltage"][0],
         s.p["supply_resistance"][0],
     )
+    geared = list(motors.torques)
+    for joint, friction in enumerate(s.p["static_friction"]):
+        geared[joint] = geared[joint] + static_friction(rotors[joint], friction)
     if not robot.has_backlash:
-        torques = [a + b for a, b in zip(motors.torques, s.disturbance, strict=True)]
+        torques = [a + b for a, b in zip(geared, s.disturbance, strict=True)]
         return _Actuation(motors, torques, data.armature.tolist(), ())
     shafts = [
         shaft_torque(motor - link, rotor - rate, play, stiffness, damping)
@@ -279,7 +282,7 @@ def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
     faster = [
         rotor + dt * ((torque - shaft) * (1.0 / inertia))
         for rotor, torque, shaft, inertia in zip(
-            rotors, motors.torques, shafts, data.armature.tolist(), strict=True
+            rotors, geared, shafts, data.armature.tolist(), strict=True
         )
     ]
     further = [

@@ -37,7 +37,8 @@ def kernel_identity(robot: Robot) -> bytes:
     if robot.has_backlash:
         digest.update(actuators.shaft_stiffness.tobytes() + actuators.shaft_damping.tobytes())
     legs = [(*leg.joints, leg.foot) for leg in robot.description.legs]
-    digest.update(repr((legs, robot.description.contact_law, robot.has_backlash)).encode())
+    kind = (robot.description.contact_law, robot.has_backlash, robot.has_static_friction)
+    digest.update(repr((legs, *kind)).encode())
     return digest.digest()
 
 

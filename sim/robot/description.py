@@ -32,12 +32,17 @@ class Motor(_Data):
 
 
 class Gearhead(_Data):
-    """A planetary gearhead; its losses are viscous friction on the output side."""
+    """A planetary gearhead; its losses are viscous and static friction on the output side."""
 
     ratio: float = Field(gt=0.0, description="r_G [1]")
     nominal_torque: float = Field(gt=0.0, description="M_NG [N m]")
     nominal_speed: float = Field(gt=0.0, description="omega_NG [rad/s], motor side")
     efficiency: float = Field(gt=0.0, le=1.0, description="eta at the nominal point [1]")
+    static_friction: float = Field(
+        default=0.0,
+        ge=0.0,
+        description="against the motion at the output, whatever its speed [N m]",
+    )
 
 
 class Actuator(_Data):

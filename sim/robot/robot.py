@@ -53,6 +53,7 @@ class JointActuators:
         motor_friction: B_M r^2 [N m s/rad].
         gear_friction: B_G at eta = 0 [N m s/rad], to be multiplied by 1 - eta.
         efficiency: eta [1].
+        static_friction: of the gearhead, against the motion [N m].
         backlash: play, end to end [rad].
         shaft_stiffness: of the closed play [N m/rad].
         shaft_damping: of the closed play [N m s/rad].
@@ -65,6 +66,7 @@ class JointActuators:
     motor_friction: Floats
     gear_friction: Floats
     efficiency: Floats
+    static_friction: Floats
     backlash: Floats
     shaft_stiffness: Floats
     shaft_damping: Floats
@@ -107,6 +109,11 @@ class Robot:
             for leg in self.description.legs
             for name in leg.actuators
         )
+
+    @property
+    def has_static_friction(self) -> bool:
+        """Whether any joint's gearhead has static friction."""
+        return bool(self.actuators().static_friction.any())
 
     @property
     def body(self) -> BodyInertia:
@@ -155,6 +162,7 @@ class Robot:
                         motor.viscous_friction * ratio**2,
                         gear.nominal_torque * gear.ratio / gear.nominal_speed * actuator.bevel**2,
                         gear.efficiency,
+                        gear.static_friction * actuator.bevel,
                         actuator.backlash,
                         actuator.shaft_stiffness,
                         actuator.shaft_damping,

@@ -1,0 +1,52 @@
+"""Gearheads as symbols: backlash (thesis: gearlash) and static friction.
+
+The thesis calls their absence the model's largest errors. With backlash the motor side (rotor,
+gearhead, encoder) is a second inertia that touches the link at either end of the play through a
+stiff, damped shaft.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import casadi as ca
+
+from sim.kernel.spatial import Scalar
+
+STATIC_FRICTION_RATE: Final = 0.02
+"""Rate of a joint from which on its gearhead's static friction is full [rad/s]."""
+
+
+def shaft_torque(
+    ahead: Scalar, rate: Scalar, play: Scalar, stiffness: float, damping: float
+) -> Scalar:
+    """Torque of a stiff, damped shaft on the link; it pushes, but never pulls into the play.
+
+    Args:
+        ahead: Motor side's angle less the link's [rad].
+        rate: Derivative of `ahead` [rad/s].
+        play: End to end [rad].
+        stiffness: Of the closed play [N m/rad].
+        damping: Of the closed play [N m s/rad].
+
+    Returns:
+        Torque on the link [N m].
+    """
+    half = 0.5 * play
+    drag = damping * rate
+    forward = ca.fmax(stiffness * (ahead - half) + drag, 0.0) * (half < ahead)
+    backward = ca.fmin(stiffness * (ahead + half) + drag, 0.0) * (ahead < -half)
+    return forward + backward
+
+
+def static_friction(rate: Scalar, friction: Scalar) -> Scalar:
+    """Torque against the motion, whatever its speed; linear in a narrow zone, so it never drives.
+
+    Args:
+        rate: Of the gearhead's output, at the joint [rad/s].
+        friction: From `STATIC_FRICTION_RATE` on [N m].
+
+    Returns:
+        Torque [N m].
+    """
+    return -friction * ca.fmin(ca.fmax(rate * (1.0 / STATIC_FRICTION_RATE), -1.0), 1.0)

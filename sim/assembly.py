@@ -117,14 +117,15 @@ def plan_walk(
         robot: The robot that walks.
         scenario: With the gait that it walks in.
         timestep: Of the physics [s].
-        noise: Torques on its links.
+        noise: Torques on its links, or angles between gearheads and links.
         trajectory: Desired angles, if they are not those for this robot's legs.
 
     Returns:
         From a control law to the walk; None for a gait out of the legs' reach.
 
     Raises:
-        SimulationInputError: The scenario jams a leg that the robot does not have.
+        SimulationInputError: The scenario jams a leg that the robot does not have, or angles are to
+            be displaced in a robot without elastic shafts.
     """
     check_stuck_leg(robot, scenario)
     trajectory = trajectory or desired_angles(robot, scenario)
@@ -138,18 +139,19 @@ def plan_walk(
     internal_state = np.zeros(internal_state_size(robot))
     if robot.has_backlash:
         internal_state[:n_joints] = joints
+    displaced = noise is not None and noise.kind == "angle"
     codes = np.rint(trajectory.angles * robot.description.sensors.angle_counts)
     return partial(
         WalkSetup,
         np.concatenate([base, joints]),
         internal_state,
-        pack_parameters(robot, scenario, timestep, start=joints),
+        pack_parameters(robot, scenario, timestep, start=joints, displaced=displaced),
         codes.astype(np.int32),
         fall_height=0.5 * scenario.hip_height,
         energy=robot.description.supply.energy,
         direction=-1 if scenario.direction == "backward" else 1,
         drop=scenario.drop,
-        disturbance=None if noise is None else noise.torques(ticks, n_joints),
+        disturbance=None if noise is None else noise.samples(ticks, n_joints),
     )
 
 

@@ -2,36 +2,58 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sim.robot.description import JOINTS_PER_LEG
 
+LARGEST_ANGLE: Final = 0.5
+"""Of the noise's standard deviations [rad]."""
+
 
 class LinkNoise(BaseModel):
-    """White torque noise on all links of one kind, a new value at every control tick."""
+    """White noise between gearhead and link of all links of one kind, new at every control tick.
+
+    An angle displaces the link against its gearhead, so the robot needs elastic shafts between the
+    two (`sim.robot.robot.with_shafts`); `sim.simulate.simulate` gives them to a robot without.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     link: Literal[1, 2, 3] = Field(description="Links disturbed: 1 coxa, 2 femur, 3 tibia.")
-    deviation: float = Field(gt=0.0, le=100.0, description="Standard deviation [N m].")
+    deviation: float = Field(
+        gt=0.0, le=100.0, description="Standard deviation [N m], or of an angle [rad]."
+    )
+    kind: Literal["torque", "angle"] = Field(
+        default="torque",
+        description="A torque on the links, or an angle between gearheads and links.",
+    )
     seed: int = Field(default=1, ge=0, lt=2**63, description="Same seed, same noise.")
 
-    def torques(self, ticks: int, joints: int) -> NDArray[np.float64]:
-        """Torques of a whole walk; a longer one has the same noise as a shorter one, and more.
+    @model_validator(mode="after")
+    def _angles_are_small(self) -> LinkNoise:
+        if self.kind == "angle" and self.deviation > LARGEST_ANGLE:
+            raise ValueError(
+                f"deviation: {self.deviation:g} rad is more than {LARGEST_ANGLE:g} rad; noise on an"
+                " angle is given in rad"
+            )
+        return self
+
+    def samples(self, ticks: int, joints: int) -> NDArray[np.float64]:
+        """Noise of a whole walk; a longer one has the same noise as a shorter one, and more.
 
         Args:
             ticks: Control ticks.
             joints: Number of joints.
 
         Returns:
-            (ticks, joints) [N m].
+            (ticks, joints) [N m], of an angle [rad].
         """
         generator = np.random.Generator(np.random.Philox(key=[self.seed, self.link]))
         kind = np.arange(joints) % JOINTS_PER_LEG == self.link - 1
-        torques = np.zeros((ticks, joints))
-        torques[:, kind] = self.deviation * generator.standard_normal((ticks, int(kind.sum())))
-        return torques
+        noise = np.zeros((ticks, joints))
+        noise[:, kind] = self.deviation * generator.standard_normal((ticks, int(kind.sum())))
+        return noise

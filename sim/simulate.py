@@ -28,6 +28,7 @@ from sim.kernel.walk import Coding, WalkSetup
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import Robot, RobotChoice, load_robot
+from sim.robot.robot import with_shafts
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
 
 
@@ -71,7 +72,8 @@ def simulate(
         robot: A shipped robot by name, a variant of one, or a `Robot` of your own; with backlash
             it is simulated at `BACKLASH_PHYSICS_RATE` at least.
         planner: The robot that the desired angles are for, if its legs differ from the robot's.
-        noise: Torques on the robot's links.
+        noise: On the robot's links. Noise on angles has it simulated with elastic shafts between
+            motors and links, and so at `BACKLASH_PHYSICS_RATE`.
         log: Whether to keep every walk's log.
         backend: Which kernel; with `auto` a warning says if it is the slow one.
         physics_rate: Physics steps a second [Hz], a multiple of the control rate.
@@ -84,6 +86,8 @@ def simulate(
     """
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
+    if noise is not None and noise.kind == "angle":
+        machine = with_shafts(machine)
     kernel = kernel_of(machine, backend)
     substeps, timestep = control_steps(machine, physics_rate)
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sim.studies.accuracy import Deviation
+
+NoiseKind = Literal["angle", "torque"]
 
 Design = Annotated[
     str, typer.Option(metavar="FILE|published:NAME", help="Design as for `simulate`.")
@@ -68,19 +70,28 @@ def noise(
     design: Design = "published:A",
     controller: Controller = "fuzzy-pi",
     scenario: Scenario = "1",
-    deviation: Annotated[float, typer.Option(help="Standard deviation of the noise [N m].")] = 10.0,
+    kind: Annotated[
+        NoiseKind, typer.Option(help="On the angle between gearhead and link, or on its torque.")
+    ] = "angle",
+    deviation: Annotated[
+        float | None,
+        typer.Option(
+            help="Standard deviation of the noise; by default 0.001 rad, or 10 N m of torque."
+        ),
+    ] = None,
     robot: RobotOption = None,
     as_json: Json = False,
 ) -> None:
-    """Put torque noise on one kind of link after the other; ratios to the noiseless walk."""
+    """Put noise on one kind of link after the other; ratios to the noiseless walk (table 2.9)."""
     from cli.design_file import read_design
     from cli.robots import chosen_robot, chosen_scenarios
     from sim.studies.accuracy import noise_on_links
 
     values = read_design(design, controller)
     chosen = chosen_scenarios(scenario)
+    machine = chosen_robot(robot)
     found = noise_on_links(
-        controller, values, chosen, robot=chosen_robot(robot), deviation=deviation
+        controller, values, chosen, robot=machine, kind=kind, deviation=deviation
     )
     _show(found, as_json=as_json, ratios=True)
 
@@ -103,6 +114,9 @@ def _show(deviations: Iterable[Deviation], *, as_json: bool, ratios: bool = Fals
     from cli.output import print_text, stdout_console
     from sim.outcome import OBJECTIVE_NAMES
 
+    def finite(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
     rows = list(deviations)
     if as_json:
         items = [
@@ -110,9 +124,10 @@ def _show(deviations: Iterable[Deviation], *, as_json: bool, ratios: bool = Fals
                 "variant": row.variant,
                 "scenario": row.scenario,
                 "ratio": {
-                    name: value if math.isfinite(value) else None
+                    name: finite(value)
                     for name, value in zip(OBJECTIVE_NAMES, row.ratio.tolist(), strict=True)
                 },
+                **({"quality": finite(row.quality)} if ratios else {}),
             }
             for row in rows
         ]
@@ -124,9 +139,12 @@ def _show(deviations: Iterable[Deviation], *, as_json: bool, ratios: bool = Fals
     # f6 is a difference of millimetres, and its ratio says little.
     for name in OBJECTIVE_NAMES[:5]:
         table.add_column(_HEADS[name], justify="right")
+    if ratios:
+        table.add_column("quality", justify="right")
     for row in rows:
         values = row.ratio if ratios else 100.0 * row.relative
         unit = "" if ratios else " %"
-        cells = [f"{v:.2f}{unit}" if math.isfinite(v) else "-" for v in values.tolist()[:5]]
+        shown = [*values.tolist()[:5], *([row.quality] if ratios else [])]
+        cells = [f"{v:.2f}{unit}" if math.isfinite(v) else "-" for v in shown]
         table.add_row(row.scenario, row.variant, *cells)
     stdout_console().print(table)

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.errors import SimulationInputError
 from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG, ContactLaw
 from sim.robot.inertia import parallel_axis
@@ -75,7 +76,8 @@ class Layout:
     field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
     supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every coxa
-    (L each), backlash (J, if the robot has any), static_friction (J, if the robot has any), and by
+    (L each), backlash (J, if the robot has any) and displaced (1, likewise: whether disturbances
+    are angles), static_friction (J, if the robot has any), and by
     foot (L each) the parameters of the contact law.
 
     Args:
@@ -102,6 +104,7 @@ class Layout:
             "jam_damping": n_feet,
             "jam_angle": n_feet,
             "backlash": n_joints if robot.has_backlash else 0,
+            "displaced": 1 if robot.has_backlash else 0,
             "static_friction": n_joints if robot.has_static_friction else 0,
             **dict.fromkeys(law.parameters, n_feet),
         }
@@ -154,7 +157,12 @@ def gravity_on(slope: float, direction: float = 0.0) -> Floats:
 
 
 def pack_parameters(
-    robot: Robot, scenario: Scenario, timestep: float, *, start: Floats | None = None
+    robot: Robot,
+    scenario: Scenario,
+    timestep: float,
+    *,
+    start: Floats | None = None,
+    displaced: bool = False,
 ) -> Floats:
     """The kernel's parameters for one robot in one scenario.
 
@@ -166,10 +174,18 @@ def pack_parameters(
         timestep: Of the physics [s].
         start: Angles at which the walk begins, where a jammed coxa is held, (J,) [rad]; zero if
             left out.
+        displaced: Whether disturbances are angles between gearheads and links [rad], not torques.
 
     Returns:
         (Layout.size,).
+
+    Raises:
+        SimulationInputError: Angles are to be displaced in a robot without shafts that yield.
     """
+    if displaced and not robot.has_backlash:
+        raise SimulationInputError(
+            "noise: an angle between gearhead and link needs a robot with elastic_shafts"
+        )
     jammed = np.array([leg.name == scenario.stuck_leg for leg in robot.legs], dtype=np.float64)
     angles = np.zeros(robot.n_joints) if start is None else start
     d, body = robot.description, robot.body
@@ -195,6 +211,7 @@ def pack_parameters(
         jam_damping=JAM_DAMPING * jammed,
         jam_angle=angles[::JOINTS_PER_LEG] * jammed,
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
+        displaced=float(displaced) if robot.has_backlash else np.empty(0),
         static_friction=(actuators.static_friction if robot.has_static_friction else np.empty(0)),
         **by_foot,
     )

@@ -60,8 +60,9 @@ class PhysicsModel:
 
     Their inputs are q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its
     own frame, joint rates; internal_state (I), as `parameters.internal_state_size` says; duty (J):
-    motor voltage per supply voltage; disturbance (J): torque on each link [N m]; parameters (P), as
-    `parameters.Layout` says.
+    motor voltage per supply voltage; disturbance (J): torque on each link [N m], or, as the
+    parameter `displaced` says, angle [rad] by which its gearhead is turned further; parameters (P),
+    as `parameters.Layout` says.
 
     Attributes:
         step: to q, v and internal state after the step, current (J), integrands (8) and largest
@@ -265,11 +266,13 @@ def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
     if not robot.has_backlash:
         torques = [a + b for a, b in zip(geared, s.disturbance, strict=True)]
         return _Actuation(motors, torques, data.armature.tolist(), ())
+    displaced = s.p["displaced"][0]
     shafts = [
-        shaft_torque(motor - link, rotor - rate, play, stiffness, damping)
-        for motor, link, rotor, rate, play, stiffness, damping in zip(
+        shaft_torque(motor - link + displaced * disturbance, rotor - rate, play, stiffness, damping)
+        for motor, link, disturbance, rotor, rate, play, stiffness, damping in zip(
             s.internal_state[:n],
             s.q[7:],
+            s.disturbance,
             rotors,
             s.v[6:],
             s.p["backlash"],
@@ -288,7 +291,8 @@ def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
     further = [
         angle + dt * rotor for angle, rotor in zip(s.internal_state[:n], faster, strict=True)
     ]
-    torques = [a + b for a, b in zip(shafts, s.disturbance, strict=True)]
+    share = 1.0 - displaced
+    torques = [a + share * b for a, b in zip(shafts, s.disturbance, strict=True)]
     return _Actuation(motors, torques, [0.0] * n, [*further, *faster])
 
 

@@ -93,7 +93,8 @@ class WalkSetup:
         control_law: of every joint.
         fall_height: of the body; below it the robot has fallen [m].
         fall_cosine: of the tilt; below it the robot has fallen.
-        disturbance: torques on the links, (T, J) [N m], or None.
+        disturbance: torques on the links, (T, J) [N m], or, as the parameter `displaced` says,
+            angles between gearheads and links [rad]; or None.
         energy: what of a motor's electrical power counts as spent.
         direction: of travel along the heading, 1 forward and -1 backward.
         drop: height of the start above the stance at which the soles carry the weight [m].

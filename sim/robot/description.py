@@ -188,6 +188,10 @@ class RobotDescription(_Data):
         gt=0.0,
         description="body's mass in place of the URDF's, its inertia scaled alike [kg]",
     )
+    elastic_shafts: bool = Field(
+        default=False,
+        description="whether shafts that yield join motors and links, also where there is no play",
+    )
     motors: dict[str, Motor]
     gearheads: dict[str, Gearhead]
     actuators: dict[str, Actuator]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,8 +103,8 @@ class Robot:
 
     @property
     def has_backlash(self) -> bool:
-        """Whether motors and links move apart: any joint has play."""
-        return any(
+        """Whether motors and links move apart: any joint has play, or shafts yield."""
+        return self.description.elastic_shafts or any(
             self.description.actuators[name].backlash > 0.0
             for leg in self.description.legs
             for name in leg.actuators
@@ -169,6 +169,21 @@ class Robot:
                     )
                 )
         return JointActuators(*np.array(rows).T.copy())
+
+
+def with_shafts(robot: Robot) -> Robot:
+    """The same robot with elastic shafts between motors and links, also where there is no play.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        The robot itself if it has them.
+    """
+    if robot.has_backlash:
+        return robot
+    description = robot.description.model_copy(update={"elastic_shafts": True})
+    return replace(robot, description=description)
 
 
 def parse_robot(toml: str, urdf: str) -> Robot:

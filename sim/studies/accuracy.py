@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from types import MappingProxyType
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +20,19 @@ from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status
 from sim.robot import RobotChoice, load_robot
+from sim.robot.robot import with_shafts
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate
 
 RESOLUTIONS: Final = ((6, 6), (8, 8), (10, 6))
 """Bits of error and current in the tables that are compared."""
 
+NoiseKind = Literal["angle", "torque"]
+
 RATES: Final = (5_000, 10_000, 20_000)
 
-NOISE: Final = 10.0
-"""Standard deviation [N m] of the study's noise; the thesis does not give its own."""
+NOISE: Final[Mapping[NoiseKind, float]] = MappingProxyType({"angle": 0.001, "torque": 10.0})
+"""Standard deviations [rad], [N m] of the study's noise; the thesis does not give its own."""
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +52,11 @@ class Deviation:
     scenario: str
     reference: Floats
     ratio: Floats
+
+    @property
+    def quality(self) -> float:
+        """Ratio of f = speed / (f1 f2 f3 f4), the sixth row of table 2.9 [1]."""
+        return float(1.0 / np.prod(self.ratio[:5]))
 
     @property
     def relative(self) -> Floats:
@@ -125,28 +134,32 @@ def noise_on_links(
     scenarios: Sequence[Scenario] = SCENARIOS[:1],
     *,
     robot: RobotChoice = "szabadka2",
-    deviation: float = NOISE,
+    kind: NoiseKind = "angle",
+    deviation: float | None = None,
     seed: int = 1,
 ) -> tuple[Deviation, ...]:
-    """Torque noise on link 1, 2 or 3 relative to the noiseless run (table 2.9).
+    """Noise on link 1, 2 or 3 relative to the noiseless run of the same robot (table 2.9).
 
     Args:
         controller: Name of the motor controller.
         design: Values by variable.
         scenarios: Walks.
-        robot: That walks.
-        deviation: Standard deviation of the noise [N m].
+        robot: That walks; for noise on angles with elastic shafts between motors and links.
+        kind: On the angle between gearhead and link, as in the thesis, or on the link's torque.
+        deviation: Standard deviation of the noise [rad], [N m]; that of `NOISE` if left out.
         seed: Of the noise.
 
     Returns:
         By scenario and link.
     """
+    machine = with_shafts(load_robot(robot)) if kind == "angle" else load_robot(robot)
+    size = NOISE[kind] if deviation is None else deviation
     deviations = []
     for scenario in scenarios:
-        calm = _walk(scenario, controller, design, robot)
+        calm = _walk(scenario, controller, design, machine)
         for link in (1, 2, 3):
-            noise = LinkNoise(link=link, deviation=deviation, seed=seed)
-            noisy = _walk(scenario, controller, design, robot, noise=noise)
+            noise = LinkNoise(link=link, kind=kind, deviation=size, seed=seed)
+            noisy = _walk(scenario, controller, design, machine, noise=noise)
             deviations.append(Deviation(f"link {link}", scenario.name, calm, noisy / calm))
     return tuple(deviations)
 

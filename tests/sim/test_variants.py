@@ -170,7 +170,7 @@ def test_noise_on_a_link_costs_torque(link: int) -> None:
     assert noisy[0] > 1.1 * calm[0]
     again = simulate(calm_walk, "pi", ["P", "I"], PI, noise=noise).outcome.objectives[0]
     np.testing.assert_array_equal(noisy, again)
-    torques = noise.torques(50, 18)
+    torques = noise.samples(50, 18)
     assert set(np.flatnonzero(torques.any(axis=0)) % 3) == {link - 1}
 
 

@@ -21,7 +21,8 @@ DESCRIPTION: Final = """
 Finds robust drive controllers for walking robots: a controller is tried in several walking
 scenarios at once, in a fast simulation, and a particle swarm improves it.
 
-1. Look at what can be tuned: **GET /v1/controllers**, **/v1/scenarios**, **/v1/preferences**.
+1. Look at what can be tuned: **GET /v1/controllers**, **/v1/robots**, **/v1/scenarios**,
+   **/v1/preferences**.
 2. Try one design: **POST /v1/simulations**.
 3. Submit a job: **POST /v1/jobs** answers at once with the job's id.
 4. Follow it: **GET /v1/jobs/{id}/events** is a stream of its committed iterations.

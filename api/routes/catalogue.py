@@ -17,10 +17,12 @@ from gaitswarm.views import (
     ControllerView,
     OptimizerView,
     PreferenceView,
+    RobotView,
     ScenarioView,
     controller_views,
     optimizer_views,
     preference_views,
+    robot_views,
     scenario_views,
 )
 from gaitswarm.views.surface import SurfaceView
@@ -28,6 +30,17 @@ from services.optimizer.errors import NotFound
 from sim.controllers import CONTROLLERS, ControllerName
 
 router = APIRouter(prefix=PREFIX, tags=["catalogue"])
+
+
+@router.get(
+    "/robots",
+    operation_id="list_robots",
+    summary="List robots",
+    responses=problems(),
+)
+def list_robots() -> CatalogueView[RobotView]:
+    """Robots that ship; a job names one, brings a variant of one, or the files of its own."""
+    return CatalogueView(items=robot_views())
 
 
 @router.get(

@@ -18,10 +18,12 @@ from gaitswarm.views.catalogue import (
     ControllerView,
     OptimizerView,
     PreferenceView,
+    RobotView,
     ScenarioView,
     controller_views,
     optimizer_views,
     preference_views,
+    robot_views,
     scenario_views,
 )
 from gaitswarm.views.evaluation import (
@@ -77,6 +79,7 @@ __all__ = [
     "RankingRequest",
     "RankingView",
     "ResumeRequest",
+    "RobotView",
     "ScenarioResultView",
     "ScenarioView",
     "SimulatedScenarioView",
@@ -91,5 +94,6 @@ __all__ = [
     "finite",
     "optimizer_views",
     "preference_views",
+    "robot_views",
     "scenario_views",
 ]

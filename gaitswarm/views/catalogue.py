@@ -1,4 +1,4 @@
-"""What there is to choose from: scenarios, preferences, optimizers, controllers."""
+"""What there is to choose from: robots, scenarios, preferences, optimizers, controllers."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from gaitswarm.views.base import View, listing_name
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
 from services.optimizer.search.pso import OPTIMIZERS, OptimizerName, PsoSettings
 from sim.controllers import CONTROLLERS
+from sim.robot import SHIPPED, RobotName, load_robot
 from sim.scenario import GAIT_VARIABLES, PRESETS, Scenario
 from sim.variables import Variable
 
@@ -35,6 +36,15 @@ class CatalogueView(View, Generic[T]):
             The name, as clients see it.
         """
         return listing_name(params, "List")
+
+
+class RobotView(View):
+    """A robot that ships with gaitswarm."""
+
+    name: RobotName = Field(description="Name, as in job specs.", examples=["szabadka2"])
+    description: str = Field(
+        description="What it is, with its source.", examples=["Hexapod of 18 joints, 6.76 kg"]
+    )
 
 
 class ScenarioView(Scenario):
@@ -81,6 +91,14 @@ class ControllerView(View):
         description="Designs from the literature, by preference or study: {name: value}.",
         examples=[{"A": {"I": 0.171, "FI1R": 5837.0}}],
     )
+
+
+def robot_views() -> list[RobotView]:
+    """The robots that ship, the default one first."""
+    return [
+        RobotView(name=name, description=load_robot(name).description.description)
+        for name in SHIPPED
+    ]
 
 
 def scenario_views() -> list[ScenarioView]:

@@ -36,7 +36,6 @@ class RobotVariant(BaseModel):
         " measured at 2 to 3 on the robot. Simulated at 20 kHz, so four times as slow.",
         examples=[(2.5, 1.0, 1.0)],
     )
-
     planned_soles: PlannedSoles | None = Field(
         default=None,
         description="Soles that the gait is planned for: nominal, all as the datasheet has them, or"

@@ -8,6 +8,7 @@ import httpx2
 
 from services.optimizer.jobs.preference import PREFERENCES
 from sim.controllers import CONTROLLERS
+from sim.robot import SHIPPED, load_robot
 from sim.scenario import GAIT_VARIABLES, PRESETS, SCENARIOS
 
 
@@ -15,6 +16,13 @@ def items(client: httpx2.Client, what: str) -> list[dict[str, Any]]:
     answer = client.get(f"/v1/{what}")
     assert answer.status_code == 200
     return answer.json()["items"]
+
+
+def test_robots_are_those_that_ship_and_say_what_they_are(client: httpx2.Client) -> None:
+    found = {item["name"]: item["description"] for item in items(client, "robots")}
+
+    assert list(found) == list(SHIPPED) == ["szabadka2", "szabadka2-identified"]
+    assert found == {name: load_robot(name).description.description for name in found}
 
 
 def test_scenarios_are_the_presets_and_begin_with_those_of_the_table(client: httpx2.Client) -> None:

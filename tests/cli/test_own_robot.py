@@ -1,4 +1,4 @@
-"""A robot that is not shipped walks through the same commands."""
+"""Robots beside the default one walk through the same commands, those that do not ship as well."""
 
 from __future__ import annotations
 
@@ -35,6 +35,21 @@ def test_a_quadruped_crawls(capsys: pytest.CaptureFixture[str]) -> None:
     assert walked["status"] == "ok"
     # Stride over support: 0.08 m in 0.8 of 2 s.
     assert 1.0 / walked["objectives"]["reciprocal_speed"] == pytest.approx(0.05, rel=0.1)
+
+
+def test_the_identified_robot_walks_by_its_name_and_as_a_variant(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    walks = []
+    for robot in (
+        "szabadka2",
+        "szabadka2-identified",
+        '{"name": "szabadka2-identified", "planned_soles": "own"}',
+    ):
+        assert run([*SIMULATE, "--robot", robot, "--scenario", "1"]) == 0
+        walks.append(json.loads(capsys.readouterr().out)["scenarios"]["normal-fast"])
+    assert [walk["status"] for walk in walks] == ["ok"] * 3
+    assert len({walk["objectives"]["energy"] for walk in walks}) == 3
 
 
 def test_files_with_former_names_walk_as_well(
@@ -99,7 +114,10 @@ def test_an_error_in_a_robot_file_names_field_line_and_unit(
 @pytest.mark.parametrize(
     ("robot", "said"),
     [
-        ("no-such-robot", "unknown robot 'no-such-robot'; known are szabadka2"),
+        (
+            "no-such-robot",
+            "unknown robot 'no-such-robot'; known are szabadka2, szabadka2-identified",
+        ),
         ('{"contact_law": "glue"}', "robot.contact_law: Input should be 'linear_zone'"),
         (str(QUADRUPED.parent), "is not a robot's folder"),
     ],

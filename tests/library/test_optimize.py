@@ -49,6 +49,23 @@ def test_the_finished_job_comes_with_its_best_design_and_history(finished: Finis
     assert again.fitness.tolist() == [result.best.fitness]
 
 
+def test_a_job_runs_on_the_identified_robot(tmp_path: Path) -> None:
+    robot = "szabadka2-identified"
+    result = gaitswarm.optimize(
+        controller="pi",
+        scenarios="1",
+        robot=robot,
+        particles=2,
+        iterations=1,
+        db=tmp_path / "jobs.db",
+    )
+    assert result.job.spec.robot == robot
+    again = gaitswarm.simulate(result.best.design, controller="pi", scenarios="1", robot=robot)
+    assert again.fitness.tolist() == [result.best.fitness]
+    datasheet = gaitswarm.simulate(result.best.design, controller="pi", scenarios="1")
+    assert datasheet.fitness.tolist() != [result.best.fitness]
+
+
 def test_convergence_and_evaluations_are_tables(finished: Finished) -> None:
     result = finished.result
     convergence = result.convergence()

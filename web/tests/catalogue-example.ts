@@ -33,7 +33,13 @@ export const DOCUMENT: OpenApiDocument = {
       },
       RobotVariant: {
         properties: {
-          contact_law: { type: 'string', enum: ['linear_zone', 'stick'], default: 'linear_zone' },
+          name: { type: 'string', enum: ['hexapod', 'hexapod-identified'], default: 'hexapod' },
+          contact_law: {
+            anyOf: [{ type: 'string', enum: ['linear_zone', 'stick'] }, { type: 'null' }],
+          },
+          planned_soles: {
+            anyOf: [{ type: 'string', enum: ['nominal', 'own'] }, { type: 'null' }],
+          },
           backlash: { default: [0, 0, 0] },
         },
       },
@@ -59,6 +65,10 @@ export const CATALOGUE = {
       gait_variables: [variable('stride', 0.1, 0.2)],
       published: { A: { P: 0.45, FOMF: 2 } },
     },
+  ],
+  robots: [
+    { name: 'hexapod', description: 'a hexapod' },
+    { name: 'hexapod-identified', description: 'the same, identified' },
   ],
   scenarios: [
     { name: 'fast', radius: 0.16, load: 0, number: 1, simulated_seconds: 4.5 },

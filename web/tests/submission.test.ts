@@ -18,7 +18,7 @@ describe('a draft', () => {
   test('begins with the defaults that the API documents', () => {
     expect(specOf(empty)).toEqual({
       name: '',
-      robot: 'szabadka2',
+      robot: 'hexapod',
       controller: 'pi',
       scenarios: ['fast', 'loaded'],
       variables: [
@@ -60,10 +60,25 @@ describe('a draft', () => {
   test('sends a variant of the robot with numbers', () => {
     const robot = { ...empty.robot, kind: 'variant' as const, backlash: ['2.5', '1', '1'] }
     expect(specOf({ ...empty, robot }).robot).toEqual({
-      name: 'szabadka2',
-      contact_law: 'linear_zone',
+      name: 'hexapod',
+      contact_law: null,
+      planned_soles: null,
       backlash: [2.5, 1, 1],
     })
+  })
+
+  test('names the robot that was chosen, and what a variant of it changes', () => {
+    const robot = { ...empty.robot, name: 'hexapod-identified' }
+    expect(specOf({ ...empty, robot }).robot).toBe('hexapod-identified')
+    const stick = { ...robot, kind: 'variant' as const, contact_law: 'stick' }
+    expect(specOf({ ...empty, robot: stick }).robot).toMatchObject({
+      name: 'hexapod-identified',
+      contact_law: 'stick',
+    })
+  })
+
+  test('offers the choices of a field that may be null', () => {
+    expect(CATALOGUE.fields.variant.get('contact_law')?.choices).toEqual(['linear_zone', 'stick'])
   })
 })
 
@@ -115,6 +130,16 @@ describe('a clone', () => {
       scenarios: ['fast', resolved.scenarios![1]],
       preference: 'C',
     })
+  })
+
+  test('keeps the robot that was named', () => {
+    for (const robot of [
+      'hexapod-identified',
+      { name: 'hexapod-identified', contact_law: null, planned_soles: 'own', backlash: [1, 0, 0] },
+    ]) {
+      const again = specOf(draftOf({ ...resolved, robot } as unknown as JobSpec, CATALOGUE))
+      expect(again.robot).toEqual(robot)
+    }
   })
 
   test('of a preference of one’s own stays so', () => {

@@ -77,11 +77,12 @@ function formField(field: string, draft: Draft, searched: readonly string[]): st
 }
 
 function robotOf({ robot }: Draft): JobSpec['robot'] {
-  if (robot.kind === 'szabadka2') return 'szabadka2'
+  if (robot.kind === 'shipped') return robot.name as JobSpec['robot']
   if (robot.kind === 'files') return { toml: robot.toml, urdf: robot.urdf }
   return {
-    name: 'szabadka2',
-    contact_law: robot.contact_law,
+    name: robot.name,
+    contact_law: robot.contact_law || null,
+    planned_soles: robot.planned_soles || null,
     backlash: robot.backlash.map(number),
   } as unknown as JobSpec['robot']
 }

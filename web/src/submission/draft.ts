@@ -15,8 +15,12 @@ export interface VariableDraft {
 }
 
 export interface RobotDraft {
-  readonly kind: 'szabadka2' | 'variant' | 'files'
+  readonly kind: 'shipped' | 'variant' | 'files'
+  /** Of a shipped robot, also of a variant's. */
+  readonly name: string
+  /** Empty where it is the robot's own, as planned_soles. */
   readonly contact_law: string
+  readonly planned_soles: string
   /** Coxa, femur, tibia [deg]. */
   readonly backlash: readonly string[]
   readonly toml: string
@@ -53,8 +57,10 @@ export function emptyDraft(catalogue: Catalogue): Draft {
   return {
     name: '',
     robot: {
-      kind: 'szabadka2',
+      kind: 'shipped',
+      name: text(variant.get('name')?.default),
       contact_law: text(variant.get('contact_law')?.default),
+      planned_soles: text(variant.get('planned_soles')?.default),
       backlash: list(variant.get('backlash')?.default, 3),
       toml: '',
       urdf: '',
@@ -184,12 +190,15 @@ function variablesOf(
 }
 
 function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
-  if (robot === undefined || typeof robot === 'string') return empty
+  if (robot === undefined) return empty
+  if (typeof robot === 'string') return { ...empty, name: robot }
   if ('toml' in robot) return { ...empty, kind: 'files', toml: robot.toml, urdf: robot.urdf }
   return {
     ...empty,
     kind: 'variant',
+    name: robot.name ?? empty.name,
     contact_law: robot.contact_law ?? empty.contact_law,
+    planned_soles: robot.planned_soles ?? empty.planned_soles,
     backlash: robot.backlash?.map(text) ?? empty.backlash,
   }
 }

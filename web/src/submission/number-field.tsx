@@ -42,7 +42,7 @@ export function NumberField({
   )
 }
 
-/** A labelled choice. */
+/** A labelled choice; an empty one leaves it to the robot. */
 export function ChoiceField({
   label,
   choices,
@@ -70,7 +70,7 @@ export function ChoiceField({
       >
         {choices.map((choice) => (
           <option key={choice} value={choice}>
-            {choice.replaceAll('_', ' ')}
+            {choice === '' ? 'as the robot’s own' : choice.replaceAll('_', ' ')}
           </option>
         ))}
       </select>

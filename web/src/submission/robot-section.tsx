@@ -6,8 +6,8 @@ import { ChoiceField, NumberField, Problems } from './number-field'
 import type { SectionProps } from './section'
 
 const KINDS = [
-  ['szabadka2', 'Szabad(ka)-II'],
-  ['variant', 'a variant of it'],
+  ['shipped', 'as it ships'],
+  ['variant', 'a variant'],
   ['files', 'a robot of one’s own'],
 ] as const
 
@@ -17,6 +17,7 @@ export function RobotSection(props: SectionProps) {
   const { draft, catalogue, errors, onChange } = props
   const { robot } = draft
   const { variant } = catalogue.fields
+  const shipped = catalogue.robots.find(({ name }) => name === robot.name)
   const change = (changes: Partial<RobotDraft>) => onChange({ robot: { ...robot, ...changes } })
   return (
     <section class="card" aria-labelledby="part-robot">
@@ -34,15 +35,32 @@ export function RobotSection(props: SectionProps) {
             </button>
           ))}
         </fieldset>
+        {robot.kind !== 'files' && (
+          <ChoiceField
+            label="Robot that ships"
+            choices={catalogue.robots.map(({ name }) => name)}
+            value={robot.name}
+            hint={shipped?.description}
+            onChange={(name) => change({ name })}
+          />
+        )}
         {robot.kind === 'variant' && (
           <div class="fields">
             <ChoiceField
               label="Law of friction"
-              choices={variant.get('contact_law')?.choices ?? []}
+              choices={['', ...(variant.get('contact_law')?.choices ?? [])]}
               value={robot.contact_law}
               error={errors.get('robot.contact_law')}
               hint={variant.get('contact_law')?.description}
               onChange={(contact_law) => change({ contact_law })}
+            />
+            <ChoiceField
+              label="Soles that gaits are planned for"
+              choices={['', ...(variant.get('planned_soles')?.choices ?? [])]}
+              value={robot.planned_soles}
+              error={errors.get('robot.planned_soles')}
+              hint={variant.get('planned_soles')?.description}
+              onChange={(planned_soles) => change({ planned_soles })}
             />
             {LINKS.map((link, index) => (
               <NumberField
@@ -76,7 +94,8 @@ export function RobotSection(props: SectionProps) {
         )}
         <Problems
           messages={errorsUnder(errors, 'robot').filter(
-            (message) => robot.kind !== 'variant' || !/^(backlash|contact_law)/.test(message),
+            (message) =>
+              robot.kind !== 'variant' || !/^(backlash|contact_law|planned_soles)/.test(message),
           )}
         />
       </div>

@@ -28,6 +28,7 @@ interface Property {
   enum?: string[]
   const?: string
   default?: unknown
+  anyOf?: Property[]
 }
 
 export interface OpenApiDocument {
@@ -70,7 +71,8 @@ export function describe({ description }: SchemaField): string {
   return description.replace(/\s*\[[^\]]*\]/, '')
 }
 
-function fieldOf(name: string, property: Property, required: boolean): SchemaField {
+function fieldOf(name: string, given: Property, required: boolean): SchemaField {
+  const property = { ...given, ...orNull(given) }
   const description = property.description ?? ''
   const { type } = property
   return {
@@ -86,4 +88,10 @@ function fieldOf(name: string, property: Property, required: boolean): SchemaFie
     default: property.default,
     required,
   }
+}
+
+/** Of a property that may be null instead: what else it may be. */
+function orNull({ anyOf }: Property): Property | undefined {
+  const others = anyOf?.filter(({ type }) => type !== 'null')
+  return anyOf?.length === 2 && others?.length === 1 ? others[0] : undefined
 }

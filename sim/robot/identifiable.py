@@ -93,6 +93,13 @@ CONVENTIONAL_VARIABLES: Final = (
         description="Velocity of every foot from which on friction is full (v_lin).",
     ),
     Variable(
+        name="current_filter",
+        low=0.0,
+        high=0.05,
+        unit="s",
+        description="Time constant of the low-pass of the current before the ADC.",
+    ),
+    Variable(
         name="planned_soles",
         kind="categorical",
         choices=get_args(PlannedSoles),
@@ -178,6 +185,7 @@ def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) ->
     parts = {
         "gearheads": {name: changed(gear, "efficiency") for name, gear in d.gearheads.items()},
         "supply": changed(d.supply, "energy"),
+        "sensors": changed(d.sensors, "current_filter"),
         "contact": changed(d.contact, "slip_velocity"),
         "legs": legs,
     }

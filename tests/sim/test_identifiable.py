@@ -170,6 +170,13 @@ def test_the_slip_velocity_is_that_of_every_foot(name: str) -> None:
     assert changed.contacts()[-1].friction == 0.4
 
 
+def test_the_current_filter_is_that_of_the_sensors() -> None:
+    robot = load_robot("szabadka2")
+    d = with_parameters(robot, {"current_filter": 0.004}).description
+    sensors = robot.description.sensors.model_copy(update={"current_filter": 0.004})
+    assert d == robot.description.model_copy(update={"sensors": sensors})
+
+
 @pytest.mark.parametrize("name", ["szabadka2", "szabadka2-identified"])
 def test_conventions_leave_all_else(name: str) -> None:
     robot = load_robot(name)
@@ -178,6 +185,7 @@ def test_conventions_leave_all_else(name: str) -> None:
         "energy": d.supply.energy,
         "contact_law": d.contact_law,
         "slip_velocity": d.contact.slip_velocity,
+        "current_filter": d.sensors.current_filter,
         "planned_soles": d.planned_soles,
     }
     assert with_parameters(robot, described).description == d
@@ -190,6 +198,10 @@ def test_conventions_leave_all_else(name: str) -> None:
         ({"energy": 9.0}, "energy: 9 is none of its choices signed, positive, absolute"),
         ({"efficiency": 1.5}, "efficiency: "),
         ({"slip_velocity": 0.0}, "slip_velocity: "),
+        (
+            {"contact_law": "dead_zone", "slip_velocity": 0.004},
+            "contact_law, slip_velocity: contact.stick_velocity: must be less than slip_velocity",
+        ),
         ({"body_mass": "heavy"}, "body_mass: 'heavy' is not a number"),
     ],
 )

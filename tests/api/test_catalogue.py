@@ -89,3 +89,19 @@ def test_a_job_can_name_whatever_the_catalogue_lists(client: httpx2.Client) -> N
     }
 
     assert client.post("/v1/jobs", json=spec).status_code == 202
+
+
+def test_a_job_searches_choices_of_the_gait_and_holds_them_by_name(client: httpx2.Client) -> None:
+    window = {"name": "fir_window", "kind": "categorical", "choices": ["moving_average", "hamming"]}
+    spec = {
+        "controller": "pi",
+        "variables": ["P", window, "start_phase"],
+        "fixed": {"I": 0.1, "duty_factor": 0.45, "duty_phase": "swing"},
+    }
+
+    assert client.post("/v1/jobs", json=spec).status_code == 202
+
+    spec["fixed"] = {"I": 0.1, "duty_phase": "flight"}
+    refused = client.post("/v1/jobs", json=spec)
+    assert refused.status_code == 422
+    assert "duty_phase: 'flight' is none of its choices support, swing" in refused.text

@@ -62,7 +62,10 @@ export const CATALOGUE = {
       name: 'pi',
       description: '',
       variables: [variable('P', 0, 1), variable('FOMF', 1, 3, 'integer')],
-      gait_variables: [variable('stride', 0.1, 0.2)],
+      gait_variables: [
+        variable('stride', 0.1, 0.2),
+        { ...variable('window', 0, 2, 'categorical'), choices: ['flat', 'hamming', 'hann'] },
+      ],
       published: { A: { P: 0.45, FOMF: 2 } },
     },
   ],

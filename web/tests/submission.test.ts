@@ -47,6 +47,25 @@ describe('a draft', () => {
     expect(spec.variables).toContainEqual({ name: 'stride', low: 0.12, high: 0.2 })
   })
 
+  test('sends a categorical variable by the names of its choices', () => {
+    const { window, ...rest } = empty.variables
+    expect(window).toMatchObject({ mode: 'default', value: 'flat' })
+    const searched = specOf({
+      ...empty,
+      variables: { ...rest, window: { ...window, mode: 'searched', choices: ['flat', 'hann'] } },
+    })
+    expect(searched.variables).toContainEqual({
+      name: 'window',
+      kind: 'categorical',
+      choices: ['flat', 'hann'],
+    })
+    const fixed = {
+      ...empty,
+      variables: { ...rest, window: { ...window, mode: 'fixed' as const } },
+    }
+    expect(specOf(fixed).fixed).toEqual({ window: 'flat' })
+  })
+
   test('leaves what is no number for the API to refuse', () => {
     expect(specOf({ ...empty, iterations: 'many' }).iterations).toBe('many')
     expect(specOf({ ...empty, seed: '' }).seed).toBe('')
@@ -142,6 +161,20 @@ describe('a clone', () => {
     }
   })
 
+  test('has the choices that were searched, and the name of one that was fixed by its index', () => {
+    const window = {
+      name: 'window',
+      kind: 'categorical',
+      low: 0,
+      high: 1,
+      choices: ['flat', 'hann'],
+    }
+    const searched = draftOf({ ...resolved, variables: [window] } as unknown as JobSpec, CATALOGUE)
+    expect(searched.variables.window).toMatchObject({ mode: 'searched', choices: ['flat', 'hann'] })
+    const fixed = draftOf({ ...resolved, fixed: { window: 1 } } as unknown as JobSpec, CATALOGUE)
+    expect(fixed.variables.window).toMatchObject({ mode: 'fixed', value: 'hamming' })
+  })
+
   test('of a preference of one’s own stays so', () => {
     const own = { bias: [1, 1, 1, 1, 1], exponent: [1, 1, 1, 1, 0] } as JobSpec['preference']
     expect(specOf(draftOf({ ...resolved, preference: own }, CATALOGUE)).preference).toEqual(own)
@@ -158,6 +191,12 @@ describe('the neighbourhood of a design', () => {
 
   test('stays within the bounds and keeps its width', () => {
     expect(near({ P: 1 }).P).toMatchObject({ low: '0.7', high: '1' })
+  })
+
+  test('leaves a categorical variable its choices', () => {
+    const window = { ...empty.variables.window, mode: 'searched' as const }
+    const draft = { ...empty, variables: { ...empty.variables, window } }
+    expect(around(draft, { window: 1 }, new Set()).variables.window).toEqual(window)
   })
 
   test('of an integer variable has whole bounds that differ', () => {

@@ -17,7 +17,8 @@ export function around(
   const narrowed = Object.entries(draft.variables).map(
     ([name, variable]): [string, VariableDraft] => {
       const value = design[name]
-      if (variable.mode !== 'searched' || value === undefined) return [name, variable]
+      const bounded = variable.mode === 'searched' && variable.choices.length === 0
+      if (!bounded || value === undefined) return [name, variable]
       const [low, high] = [Number(variable.low), Number(variable.high)]
       const reach = ((high - low) * SHARE) / 2
       const from = Math.max(low, Math.min(value - reach, high - 2 * reach))

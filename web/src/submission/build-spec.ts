@@ -14,7 +14,11 @@ export type FieldErrors = ReadonlyMap<string, string>
 export function specOf(draft: Draft): JobSpec {
   const variables = Object.entries(draft.variables)
     .filter(([, { mode }]) => mode === 'searched')
-    .map(([name, { low, high }]) => ({ name, low: number(low), high: number(high) }))
+    .map(([name, { low, high, choices }]) =>
+      choices.length > 0
+        ? { name, kind: 'categorical', choices }
+        : { name, low: number(low), high: number(high) },
+    )
   const fixed = Object.entries(draft.variables)
     .filter(([, { mode }]) => mode === 'fixed')
     .map(([name, { value }]) => [name, number(value)])

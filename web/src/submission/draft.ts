@@ -11,7 +11,10 @@ export interface VariableDraft {
   readonly mode: VariableMode
   readonly low: string
   readonly high: string
+  /** Of a categorical variable the name of a choice. */
   readonly value: string
+  /** Of a categorical variable those that are searched, in place of bounds; else none. */
+  readonly choices: readonly string[]
 }
 
 export interface RobotDraft {
@@ -90,7 +93,8 @@ export function defaultVariables(
       mode,
       low: text(variable.low),
       high: text(variable.high),
-      value: text(published[variable.name] ?? middle(variable)),
+      value: shown(variable, published[variable.name]) ?? text(middle(variable)),
+      choices: variable.choices ?? [],
     },
   ]
   return Object.fromEntries([
@@ -112,7 +116,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     controller,
     presets: scenarios.filter((entry) => typeof entry === 'string'),
     own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
-    variables: variablesOf(spec, defaultVariables(catalogue, controller)),
+    variables: variablesOf(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
     optimizer: { ...empty.optimizer, ...optimizerOf(spec.optimizer, catalogue) },
     iterations: text(spec.iterations),
@@ -172,19 +176,28 @@ export function withPreset(
 
 function variablesOf(
   spec: JobSpec,
-  byDefault: Readonly<Record<string, VariableDraft>>,
+  catalogue: Catalogue,
+  controller: string,
 ): Readonly<Record<string, VariableDraft>> {
-  const drafts = { ...byDefault }
+  const drafts = { ...defaultVariables(catalogue, controller) }
+  const known = catalogue.controllers.find(({ name }) => name === controller)
+  const variables = new Map(
+    [...(known?.variables ?? []), ...(known?.gait_variables ?? [])].map((v) => [v.name, v]),
+  )
   if (spec.variables) {
     for (const entry of spec.variables) {
       const name = typeof entry === 'string' ? entry : entry.name
       const bounds =
-        typeof entry === 'string' ? {} : { low: text(entry.low), high: text(entry.high) }
+        typeof entry === 'string'
+          ? {}
+          : { low: text(entry.low), high: text(entry.high), choices: entry.choices ?? [] }
       if (drafts[name]) drafts[name] = { ...drafts[name], ...bounds, mode: 'searched' }
     }
   }
   for (const [name, value] of Object.entries(spec.fixed ?? {})) {
-    if (drafts[name]) drafts[name] = { ...drafts[name], value: text(value), mode: 'fixed' }
+    const variable = variables.get(name)
+    if (!variable) continue
+    drafts[name] = { ...drafts[name], value: shown(variable, value) ?? '', mode: 'fixed' }
   }
   return drafts
 }
@@ -216,9 +229,16 @@ function defaults(fields: ReadonlyMap<string, SchemaField>): Record<string, stri
   return Object.fromEntries([...fields].map(([name, field]) => [name, text(field.default)]))
 }
 
-function middle({ low, high, kind }: Variable): number {
+function middle({ low, high, kind, choices }: Variable): number | string {
+  if (kind === 'categorical') return choices?.[0] ?? ''
   const value = Number(((low + high) / 2).toPrecision(4))
   return kind === 'integer' ? Math.round(value) : value
+}
+
+/** A value as people read it: the name of a choice, where it is given by its index. */
+function shown({ choices }: Variable, value: number | string | undefined): string | null {
+  if (value === undefined) return null
+  return choices?.[Number(value)] ?? text(value)
 }
 
 function texts(values: object): Record<string, string> {

@@ -1,6 +1,7 @@
 /** The controller, and what becomes of each of its variables and of the gait's. */
 
 import type { Controller, Variable } from '../api/types'
+import { inWords } from '../format/words'
 import { errorsUnder, type FieldErrors } from './build-spec'
 import { defaultVariables, type VariableDraft, type VariableMode } from './draft'
 import { ChoiceField, Problems } from './number-field'
@@ -128,7 +129,8 @@ function VariableRow({
   problems: readonly string[]
   onChange: (changes: Partial<VariableDraft>) => void
 }) {
-  const { name } = variable
+  const { name, choices = [] } = variable
+  const categorical = variable.kind === 'categorical'
   const input = (part: 'low' | 'high' | 'value', label: string) => (
     <input
       class="short"
@@ -164,14 +166,61 @@ function VariableRow({
         </select>
       </td>
       <td>
-        {draft.mode === 'searched' && input('low', 'Lower bound')}
-        {draft.mode === 'fixed' && input('value', 'Value')}
+        {draft.mode === 'searched' && categorical && (
+          <Choices variable={variable} chosen={draft.choices} onChange={onChange} />
+        )}
+        {draft.mode === 'searched' && !categorical && input('low', 'Lower bound')}
+        {draft.mode === 'fixed' && categorical && (
+          <select
+            aria-label={`Value of ${name}`}
+            value={draft.value}
+            onChange={(event) => onChange({ value: event.currentTarget.value })}
+          >
+            {choices.map((choice) => (
+              <option key={choice} value={choice}>
+                {inWords(choice)}
+              </option>
+            ))}
+          </select>
+        )}
+        {draft.mode === 'fixed' && !categorical && input('value', 'Value')}
       </td>
-      <td>{draft.mode === 'searched' && input('high', 'Upper bound')}</td>
+      <td>{draft.mode === 'searched' && !categorical && input('high', 'Upper bound')}</td>
       <td class="unit">
         {variable.unit === '1' ? '–' : variable.unit}
         {variable.kind === 'integer' && ' (whole)'}
       </td>
     </tr>
+  )
+}
+
+/** Which of a categorical variable's choices are searched. */
+function Choices({
+  variable: { name, choices = [] },
+  chosen,
+  onChange,
+}: {
+  variable: Variable
+  chosen: readonly string[]
+  onChange: (changes: Partial<VariableDraft>) => void
+}) {
+  const toggle = (choice: string) =>
+    onChange({
+      // In the variable's order, however they were ticked.
+      choices: choices.filter((c) => chosen.includes(c) !== (c === choice)),
+    })
+  return (
+    <fieldset class="row" aria-label={`Choices of ${name}`}>
+      {choices.map((choice) => (
+        <label key={choice} class="check nowrap">
+          <input
+            type="checkbox"
+            checked={chosen.includes(choice)}
+            onChange={() => toggle(choice)}
+          />
+          {inWords(choice)}
+        </label>
+      ))}
+    </fieldset>
   )
 }

@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import SimulationInputError
+from sim.errors import SimulationInputError, UnreachablePose
 from sim.gait.driving_2011 import SPEEDS, driven_as_in_2011, scenario_2011
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import leg_angles
 from sim.gait.low_pass import FirWindow, fir_gains, low_pass
-from sim.gait.trajectory import desired_angles, n_ticks
+from sim.gait.trajectory import desired_angles, n_ticks, require_reachable
 from sim.robot import Robot, load_robot
 from sim.robot.posture import feet_below_body, resting_height
 from sim.scenario import SCENARIOS
@@ -112,6 +112,16 @@ def test_a_turn_of_both_sides_lengthens_the_outer_strides_by_what_it_takes_from_
     narrow = np.ptp(desired_angles(robot, inner).angles[:, ::3], axis=0)
     np.testing.assert_allclose(swing[[0, 2, 4]], narrow[[0, 2, 4]])
     assert (swing[[1, 3, 5]] > 1.1 * narrow[[1, 3, 5]]).all()
+
+
+def test_a_stride_that_a_turn_lengthens_out_of_reach_names_scenario_leg_and_millimetres(
+    robot: Robot,
+) -> None:
+    turn = SCENARIOS[5].model_copy(update={"turn": 1.0, "stride": 0.25})
+    require_reachable(robot, turn)
+    both = turn.model_copy(update={"turn_mode": "both"})
+    with pytest.raises(UnreachablePose, match=r"turn-right-fast.*left_\w+.* mm"):
+        require_reachable(robot, both)
 
 
 def test_a_share_of_swing_is_the_rest_of_one_of_support(robot: Robot) -> None:

@@ -66,6 +66,17 @@ describe('a draft', () => {
     expect(specOf(fixed).fixed).toEqual({ window: 'flat' })
   })
 
+  test('leaves conventions at their default unless they are set', () => {
+    const { integral_span: span, ...rest } = empty.variables
+    expect(specOf(empty).fixed).toEqual({})
+    const fixed = {
+      ...empty,
+      variables: { ...rest, integral_span: { ...span, mode: 'fixed' as const } },
+    }
+    expect(specOf(fixed).fixed).toEqual({ integral_span: 2 })
+    expect(draftOf(specOf(fixed), CATALOGUE).variables.integral_span.mode).toBe('fixed')
+  })
+
   test('leaves what is no number for the API to refuse', () => {
     expect(specOf({ ...empty, iterations: 'many' }).iterations).toBe('many')
     expect(specOf({ ...empty, seed: '' }).seed).toBe('')

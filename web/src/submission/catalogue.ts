@@ -1,11 +1,14 @@
 /** Everything that the form offers, as the API lists it. */
 
 import { get } from '../api/client'
-<<<<<<< HEAD
-import type { Controller, OptimizerPreset, PreferencePreset, ScenarioPreset } from '../api/types'
-=======
-import type { Controller, PreferencePreset, RobotPreset, ScenarioPreset } from '../api/types'
->>>>>>> f566b53 (List the robots that ship over HTTP, and offer them on the page)
+import type {
+  Controller,
+  OptimizerPreset,
+  PreferencePreset,
+  RobotPreset,
+  ScenarioPreset,
+  Variable,
+} from '../api/types'
 import { fieldsOf, type OpenApiDocument, type SchemaField } from './schema-fields'
 
 export interface Catalogue {
@@ -22,12 +25,14 @@ export interface Catalogue {
   }
 }
 
+/** All that a job may search or hold fixed with a controller. */
+export function variablesOf(controller: Controller | undefined): readonly Variable[] {
+  if (!controller) return []
+  return [...controller.variables, ...controller.conventions, ...controller.gait_variables]
+}
+
 export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
-<<<<<<< HEAD
-  const [controllers, scenarios, preferences, optimizers, document] = await Promise.all([
-=======
-  const [controllers, robots, scenarios, preferences, document] = await Promise.all([
->>>>>>> f566b53 (List the robots that ship over HTTP, and offer them on the page)
+  const [controllers, robots, scenarios, preferences, optimizers, document] = await Promise.all([
     get('/v1/controllers', { signal }),
     get('/v1/robots', { signal }),
     get('/v1/scenarios', { signal }),

@@ -1,10 +1,10 @@
 /** A job as it stands in the form: numbers are still text, choices not yet a spec. */
 
 import type { JobSpec, OptimizerPreset, Scenario, Variable } from '../api/types'
-import type { Catalogue } from './catalogue'
+import { type Catalogue, variablesOf } from './catalogue'
 import type { SchemaField } from './schema-fields'
 
-/** What becomes of a variable; `default` leaves a gait variable to each scenario. */
+/** What becomes of a variable; `default` leaves a convention, or the gait to each scenario. */
 export type VariableMode = 'searched' | 'fixed' | 'default'
 
 export interface VariableDraft {
@@ -79,7 +79,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
   }
 }
 
-/** All variables of a controller searched within the catalogue's bounds, gait left alone. */
+/** All variables of a controller searched within the catalogue's bounds, all others left alone. */
 export function defaultVariables(
   catalogue: Catalogue,
   controller: string,
@@ -93,13 +93,15 @@ export function defaultVariables(
       mode,
       low: text(variable.low),
       high: text(variable.high),
-      value: shown(variable, published[variable.name]) ?? text(middle(variable)),
+      value:
+        shown(variable, published[variable.name] ?? variable.default ?? undefined) ??
+        text(middle(variable)),
       choices: variable.choices ?? [],
     },
   ]
   return Object.fromEntries([
     ...found.variables.map((variable) => entry(variable, 'searched')),
-    ...found.gait_variables.map((variable) => entry(variable, 'default')),
+    ...[...found.conventions, ...found.gait_variables].map((v) => entry(v, 'default')),
   ])
 }
 
@@ -116,7 +118,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     controller,
     presets: scenarios.filter((entry) => typeof entry === 'string'),
     own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
-    variables: variablesOf(spec, catalogue, controller),
+    variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
     optimizer: { ...empty.optimizer, ...optimizerOf(spec.optimizer, catalogue) },
     iterations: text(spec.iterations),
@@ -174,16 +176,14 @@ export function withPreset(
   return { ...optimizer, ...texts(settings), particles: optimizer.particles }
 }
 
-function variablesOf(
+function variableDrafts(
   spec: JobSpec,
   catalogue: Catalogue,
   controller: string,
 ): Readonly<Record<string, VariableDraft>> {
   const drafts = { ...defaultVariables(catalogue, controller) }
   const known = catalogue.controllers.find(({ name }) => name === controller)
-  const variables = new Map(
-    [...(known?.variables ?? []), ...(known?.gait_variables ?? [])].map((v) => [v.name, v]),
-  )
+  const variables = new Map(variablesOf(known).map((v) => [v.name, v]))
   if (spec.variables) {
     for (const entry of spec.variables) {
       const name = typeof entry === 'string' ? entry : entry.name

@@ -4,7 +4,7 @@ import { useEffect, useMemo, useState } from 'preact/hooks'
 import { ApiProblem } from '../api/problem'
 import type { JobSpec } from '../api/types'
 import { errorsByField, specOf, withKinds } from './build-spec'
-import type { Catalogue } from './catalogue'
+import { type Catalogue, variablesOf } from './catalogue'
 import type { Draft } from './draft'
 import { JobSection, OptimizerSection } from './job-section'
 import { JsonForm } from './json-form'
@@ -59,8 +59,7 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
 
 function built(draft: Draft, catalogue: Catalogue): JobSpec {
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
-  const known = controller ? [...controller.variables, ...controller.gait_variables] : []
-  return withKinds(specOf(draft), known)
+  return withKinds(specOf(draft), variablesOf(controller))
 }
 
 /** After a refused submission the first field that is to blame takes the focus. */

@@ -7,7 +7,7 @@ import type { Job, JobSpec, Preference } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { usePlace } from '../router/navigation'
 import { around } from './around-design'
-import { type Catalogue, loadCatalogue } from './catalogue'
+import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
 import { type Draft, draftOf, emptyDraft, preferenceOf } from './draft'
 import { JobForm } from './form'
 import { JsonForm } from './json-form'
@@ -102,6 +102,9 @@ async function designIn(query: URLSearchParams, job: string, signal: AbortSignal
 
 function wholeVariables(catalogue: Catalogue, name: string): ReadonlySet<string> {
   const controller = catalogue.controllers.find((c) => c.name === name)
-  const all = controller ? [...controller.variables, ...controller.gait_variables] : []
-  return new Set(all.filter(({ kind }) => kind === 'integer').map((v) => v.name))
+  return new Set(
+    variablesOf(controller)
+      .filter(({ kind }) => kind === 'integer')
+      .map((v) => v.name),
+  )
 }

@@ -1,6 +1,6 @@
 /** The controller, and what becomes of each of its variables and of the gait's. */
 
-import type { Controller, Variable } from '../api/types'
+import type { Variable } from '../api/types'
 import { inWords } from '../format/words'
 import { errorsUnder, type FieldErrors } from './build-spec'
 import { defaultVariables, type VariableDraft, type VariableMode } from './draft'
@@ -45,7 +45,13 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
         {controller && (
           <>
             {table('Controller', controller.variables, ['searched', 'fixed'])}
-            <details open={anyGait(controller, draft.variables)}>
+            {controller.conventions.length > 0 && (
+              <details open={anySet(controller.conventions, draft.variables)}>
+                <summary>Conventions: what the thesis leaves open, searched or fixed</summary>
+                {table('Convention', controller.conventions, ['default', 'searched', 'fixed'])}
+              </details>
+            )}
+            <details open={anySet(controller.gait_variables, draft.variables)}>
               <summary>Gait: searched or fixed in place of the scenarios’ own values</summary>
               {table('Gait', controller.gait_variables, ['default', 'searched', 'fixed'])}
             </details>
@@ -56,14 +62,18 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
   )
 }
 
-function anyGait(controller: Controller, drafts: Readonly<Record<string, VariableDraft>>): boolean {
-  return controller.gait_variables.some(({ name }) => drafts[name]?.mode !== 'default')
+function anySet(
+  variables: readonly Variable[],
+  drafts: Readonly<Record<string, VariableDraft>>,
+): boolean {
+  return variables.some(({ name }) => drafts[name]?.mode !== 'default')
 }
 
-const MODES: Readonly<Record<VariableMode, string>> = {
-  searched: 'searched',
-  fixed: 'fixed',
-  default: 'as in scenario',
+/** The default of a convention is a value; that of the gait depends on the scenario. */
+function modeInWords(mode: VariableMode, { default: value, choices }: Variable): string {
+  if (mode !== 'default') return mode
+  if (value === undefined || value === null) return 'as in scenario'
+  return `default: ${inWords(choices?.[value] ?? String(value))}`
 }
 
 function VariableTable({
@@ -160,7 +170,7 @@ function VariableRow({
         >
           {modes.map((mode) => (
             <option key={mode} value={mode}>
-              {MODES[mode]}
+              {modeInWords(mode, variable)}
             </option>
           ))}
         </select>

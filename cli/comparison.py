@@ -48,11 +48,7 @@ def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str
     space = spec.design_space()
     searched = {variable.name for variable in space.variables}
     conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
-    held = {
-        name: value
-        for name, value in space.fixed
-        if name in conventions | GAIT_VARIABLE_NAMES
-    }
+    held = {name: value for name, value in space.fixed if name in conventions | GAIT_VARIABLE_NAMES}
     own = {
         name: value
         for name, value in published.items()

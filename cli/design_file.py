@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from cli.spec_file import read_json_object
 from services.optimizer.errors import InvalidRequest
-from sim.controllers import CONTROLLERS, Controller, names_of
-from sim.scenario import GAIT_VARIABLE_NAMES
+from sim.controllers import CONTROLLERS, Controller
+from sim.scenario import GAIT_VARIABLES
+from sim.variables import Variable
 
 _PUBLISHED: Final = "published:"
 
 
 def read_design(design: str, controller: str, trajectory: Path | None = None) -> dict[str, Any]:
-    """Values by name; not checked yet, but for names.
+    """Values by name, choices as their indices; numbers are not checked yet.
 
     design: a file with a flat object {name: value}, or with one under `design`, as `best --json`
         prints; or `published:NAME` for a design of the literature.
@@ -23,11 +25,12 @@ def read_design(design: str, controller: str, trajectory: Path | None = None) ->
     Raises InvalidRequest that names the field.
     """
     values = _read_values(design, controller)
-    _check_names(values, names_of(_controller(controller)) | GAIT_VARIABLE_NAMES, "design")
+    own = _controller(controller)
+    known = (*own.variables, *own.conventions, *GAIT_VARIABLES)
+    values = _checked(values, known, "design")
     if trajectory is None:
         return values
-    gait = read_json_object(trajectory, "trajectory")
-    _check_names(gait, GAIT_VARIABLE_NAMES, "trajectory")
+    gait = _checked(read_json_object(trajectory, "trajectory"), GAIT_VARIABLES, "trajectory")
     for name in gait:
         if name in values and not design.startswith(_PUBLISHED):
             raise InvalidRequest(
@@ -62,9 +65,21 @@ def _controller(name: str) -> Controller:
     )
 
 
-def _check_names(values: dict[str, Any], known: frozenset[str], field: str) -> None:
-    for name in values:
-        if name not in known:
+def _checked(values: dict[str, Any], known: Sequence[Variable], field: str) -> dict[str, Any]:
+    """Values of known variables, with the index of a choice in place of its name."""
+    variables = {variable.name: variable for variable in known}
+    checked = dict(values)
+    for name, value in values.items():
+        if name not in variables:
             raise InvalidRequest(
-                f"unknown variable; known are {', '.join(sorted(known))}", field=f"{field}.{name}"
+                f"unknown variable; known are {', '.join(sorted(variables))}",
+                field=f"{field}.{name}",
             )
+        if variables[name].kind == "categorical" and isinstance(value, str):
+            try:
+                checked[name] = variables[name].number(value)
+            except ValueError as error:
+                raise InvalidRequest(
+                    str(error).removeprefix(f"{name}: "), field=f"{field}.{name}"
+                ) from error
+    return checked

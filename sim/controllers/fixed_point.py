@@ -50,11 +50,10 @@ _DEFAULT_UNIT: Final = IntegratorUnit.COUNTS
 
 INTEGRATOR_UNIT: Final = Variable(
     name="integrator_unit",
-    low=0,
-    high=2,
-    kind="integer",
+    kind="categorical",
+    choices=tuple(unit.name.lower() for unit in IntegratorUnit),
     default=float(_DEFAULT_UNIT),
-    description="Unit of I: 0 PWM counts/(count s); 1 V/rad at every control tick; 2 V/(rad s).",
+    description="Unit of I: PWM counts/(count s), V/rad at every control tick, or V/(rad s).",
 )
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from cli.comparison import on_the_jobs_terms, published_beside
 from cli.design_file import read_design
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from sim.controllers import CONTROLLERS, ControllerName
@@ -119,3 +120,14 @@ def test_no_published_design_names_anything_but_variables_and_gait() -> None:
         known = {variable.name for variable in controller.variables} | GAIT_VARIABLE_NAMES
         for design in controller.published.values():
             assert design.keys() <= known
+
+
+def test_a_design_file_may_name_the_choice_of_a_convention(write_json: WriteJson) -> None:
+    gains = {"P": 0.454, "I": 0.147}
+    named = write_json({**gains, "integrator_unit": "volt_per_radian"}, "named.json")
+    indexed = write_json({**gains, "integrator_unit": 1}, "indexed.json")
+    expected = {**gains, "integrator_unit": 1.0}
+    assert read_design(str(named), "pi") == read_design(str(indexed), "pi") == expected
+    unknown = write_json({**gains, "integrator_unit": "volts"}, "unknown.json")
+    with pytest.raises(InvalidRequest, match="'volts' is none of its choices counts, "):
+        read_design(str(unknown), "pi")

@@ -159,6 +159,10 @@ def test_a_job_may_search_or_fix_conventions_and_else_leaves_them_to_their_defau
         fixed={"I": 0.147},
     )
     assert asked.design_space().names == ("P", "integrator_unit", "I")
+    held = JobSpec(
+        controller="pi", fixed={"integrator_unit": "volt_per_radian_second"}, iterations=1, seed=1
+    )
+    assert held.design_space().fixed == (("integrator_unit", 2.0),)
     asked.check_can_be_simulated()
     with pytest.raises(ValueError, match="unknown variable 'universe'"):
         JobSpec(controller="pi", fixed={"universe": 2.0}, iterations=1, seed=1)

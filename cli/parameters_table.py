@@ -53,8 +53,6 @@ def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> 
     from rich.table import Table
     from rich.text import Text
 
-    from cli.tables import number
-
     title = "Fitted parameters; widths of their intervals in % of the range searched"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("parameter", no_wrap=True)
@@ -69,8 +67,8 @@ def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> 
         table.add_row(
             p.name,
             p.unit,
-            number(p.best),
-            *([number(truth.get(p.name))] if truth else []),
+            _shown(p.best),
+            *([_shown(truth.get(p.name))] if truth else []),
             *(f"{100 * _width(found, p, threshold):.0f}" for threshold in _SHOWN),
             Text(p.trust or "one run", style=_STYLES.get(p.trust or "", "")),
         )
@@ -94,7 +92,9 @@ def draw_parameters(found: IdentifiabilityView, truth: Mapping[str, float]) -> F
             color="#9db8d9",
             lw=0,
         )
-        axes.axhline(p.best, color="#1f3a5f", lw=1.0)
+        for choice, name in enumerate(c.name for c in p.choices):
+            axes.text(100.0, choice, name, fontsize=5, va="center", ha="right")
+        axes.axhline(_height(p, p.best), color="#1f3a5f", lw=1.0)
         if p.name in truth:
             axes.axhline(truth[p.name], color="#d1495b", lw=1.0, ls="--")
         axes.set_ylim(p.low, p.high)
@@ -106,6 +106,21 @@ def draw_parameters(found: IdentifiabilityView, truth: Mapping[str, float]) -> F
         axes.set_visible(False)
     figure.supxlabel("fitness within so many percent of its run's best", fontsize=8)
     return figure
+
+
+def _shown(value: float | str | None) -> str:
+    """A number, or the name of a choice."""
+    from cli.tables import number
+
+    return value if isinstance(value, str) else number(value)
+
+
+def _height(p: ParameterView, value: float | str) -> float:
+    """Where a value lies in its panel: a choice at its index, one that is none below the panel."""
+    if not isinstance(value, str):
+        return value
+    names = [choice.name for choice in p.choices]
+    return float(names.index(value)) if value in names else -1.0
 
 
 def _width(found: IdentifiabilityView, p: ParameterView, threshold: float) -> float:

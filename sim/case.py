@@ -29,8 +29,8 @@ class Case(Protocol):
         """Simulated time of one design [s]."""
 
     @property
-    def robot(self) -> RobotSource:
-        """The robot, whose kernel should be ready before many processes need it."""
+    def robots(self) -> tuple[RobotSource, ...]:
+        """The robots, whose kernels should be ready before many processes need them."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -70,6 +70,11 @@ class Walk:
     def name(self) -> str:
         """Name of the scenario."""
         return self.scenario.name
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        """The robot that walks."""
+        return (self.robot,)
 
     @property
     def duration(self) -> float:

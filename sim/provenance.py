@@ -45,7 +45,10 @@ class Provenance(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    robot: str = Field(description="Name that the robot's file gives it.", examples=["szabadka2"])
+    robot: str = Field(
+        description="Name that the robot's file gives it; several separated by commas.",
+        examples=["szabadka2"],
+    )
     robot_digest: str = Field(
         description="Digest of the robot's parameters, as they were resolved, and of its URDF.",
         examples=["6a09e667f3bcc908b2fb1366ea957d3e"],
@@ -95,11 +98,12 @@ class Provenance(BaseModel):
 
 
 @lru_cache(maxsize=32)
-def provenance_of(robot: RobotSource) -> Provenance:
-    """The provenance of what this process computes of a robot; nothing is compiled for it.
+def provenance_of(*robots: RobotSource) -> Provenance:
+    """The provenance of what this process computes of robots; nothing is compiled for it.
 
     Args:
-        robot: the robot as cases name it. It is looked at once: later calls give the same answer.
+        robots: the robots as cases name them, one at least. They are looked at once: later calls
+            give the same answer.
 
     Returns:
         The provenance of its cases in this process.
@@ -107,12 +111,12 @@ def provenance_of(robot: RobotSource) -> Provenance:
     Raises:
         SimulationInputError: the robot's description cannot be used.
     """
-    machine = load_robot(robot)
-    content = machine.description.model_dump_json() + machine.urdf.text
+    machines = [load_robot(robot) for robot in robots]
+    content = "".join(m.description.model_dump_json() + m.urdf.text for m in machines)
     # With a compiler, a kernel is compiled or an error is raised: never replaced by the reference.
-    native = find_compiler() is not None or native_kernel(machine) is not None
+    native = find_compiler() is not None or all(native_kernel(m) for m in machines)
     return Provenance(
-        robot=machine.description.name,
+        robot=", ".join(machine.description.name for machine in machines),
         robot_digest=hashlib.sha256(content.encode()).hexdigest()[:_DIGITS],
         code_digest=simulator_digest(),
         libraries={name: metadata.version(name) for name in _LIBRARIES},

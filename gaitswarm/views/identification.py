@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gaitswarm.views.base import View
+from gaitswarm.views.base import View, finite
 from services.optimizer.analysis.identifiability import (
     THRESHOLDS,
+    ChoiceEvidence,
     Identifiability,
     ParameterIdentifiability,
     Trust,
@@ -22,6 +23,37 @@ class IntervalView(View):
     high: float = Field(description="Greatest of them.", examples=[11.3])
 
 
+class ChoiceView(View):
+    """One choice of a categorical parameter."""
+
+    name: str = Field(description="Name of the choice.", examples=["stick"])
+    fitness: float | None = Field(
+        description="Least fitness of all runs among designs with it; null if all failed, or none"
+        " was tried.",
+        examples=[0.84],
+    )
+    by_run: list[float | None] = Field(
+        description="The same of each run.", examples=[[0.84, 0.91, None]]
+    )
+    remains: bool = Field(
+        description="Whether a run has it among its designs within 5 % of its best."
+    )
+
+    @classmethod
+    def from_evidence(cls, choice: ChoiceEvidence) -> ChoiceView:
+        """Make a view of one choice.
+
+        Args:
+            choice: what the runs say of it.
+        """
+        return cls(
+            name=choice.name,
+            fitness=finite(min(choice.fitness)),
+            by_run=[finite(fitness) for fitness in choice.fitness],
+            remains=choice.remains,
+        )
+
+
 class ParameterView(View):
     """One parameter over all runs."""
 
@@ -29,17 +61,23 @@ class ParameterView(View):
     unit: str = Field(description="Its unit.", examples=["V"])
     low: float = Field(description="Lower bound of the search.", examples=[8.0])
     high: float = Field(description="Upper bound of the search.", examples=[13.0])
-    best: float = Field(description="Value in the best design of all runs.", examples=[11.1])
-    bests: list[float] = Field(
+    best: float | str = Field(
+        description="Value in the best design of all runs; of a categorical parameter the name of"
+        " the choice.",
+        examples=[11.1],
+    )
+    bests: list[float | str] = Field(
         description="Value in each run's best design.", examples=[[11.1, 11.2, 11.0]]
     )
     intervals: list[IntervalView] = Field(
-        description="One for each of `thresholds`, over all runs."
+        description="One for each of `thresholds`, over all runs; indices of choices of a"
+        " categorical parameter."
     )
+    choices: list[ChoiceView] = Field(description="Those of a categorical parameter; else none.")
     trust: Trust | None = Field(
         description="How far the runs agree at the threshold of 5 %: within 15 %, within 35 %, or"
-        " not within 35 % of the range that was searched; null for a single run, which cannot"
-        " tell.",
+        " not within 35 % of the range that was searched; of a categorical parameter on one"
+        " choice, on some, or on none; null for a single run, which cannot tell.",
         examples=["trusted"],
     )
     explanation: str | None = Field(
@@ -54,17 +92,18 @@ class ParameterView(View):
         Args:
             found: what the runs say of it.
         """
-        trust = found.trust
+        shown = found.variable.shown
         return cls(
             name=found.variable.name,
             unit=found.variable.unit,
             low=found.variable.low,
             high=found.variable.high,
-            best=found.best,
-            bests=list(found.bests),
+            best=shown(found.best),
+            bests=[shown(value) for value in found.bests],
             intervals=[IntervalView(low=low, high=high) for low, high in found.intervals],
-            trust=trust,
-            explanation=None if trust is None else trust.phrase,
+            choices=[ChoiceView.from_evidence(choice) for choice in found.choices],
+            trust=found.trust,
+            explanation=found.explanation,
         )
 
 

@@ -73,7 +73,7 @@ def encoded_particles(
 
 
 def _described(job: Job) -> list[ParticleColumnView]:
-    unit = "1" if job.spec.kind == "tuning" else "A"
+    unit = "A" if job.spec.kind == "identification" else "1"
     plain = [("iteration", "1", "index"), ("particle", "1", "index"), ("fitness", unit, "fitness")]
     worth = [(f"utility:{name}", unit, "utility") for name in job.spec.case_names]
     variables = [

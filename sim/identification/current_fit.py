@@ -53,6 +53,11 @@ class CurrentFit:
     variables: tuple[str, ...]
 
     @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        """The robot as described."""
+        return (self.robot,)
+
+    @property
     def duration(self) -> float:
         """Simulated time of one design [s]."""
         return self.walk.walked_seconds

@@ -8,7 +8,7 @@ the intervals here are over all runs together, each run's good designs by its ow
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -56,15 +56,33 @@ _PHRASES: Final = {
 
 
 @dataclass(frozen=True, slots=True)
+class ChoiceEvidence:
+    """What runs say of one choice of a categorical variable.
+
+    Attributes:
+        name: of the choice.
+        fitness: each run's least among designs with this choice, +inf where there is none.
+        remains: whether it is among the designs of any run within the decisive threshold of that
+            run's best.
+    """
+
+    name: str
+    fitness: tuple[float, ...]
+    remains: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterIdentifiability:
     """One parameter over all runs.
 
     Attributes:
         variable: with the bounds of the search.
-        best: value in the best design of all runs, in its unit.
+        best: value in the best design of all runs, in its unit; of a categorical variable the
+            index of a choice.
         bests: value in each run's best design.
         intervals: least and greatest value at each of `THRESHOLDS`.
         trust: None for a single run, which cannot tell.
+        choices: of a categorical variable.
     """
 
     variable: Variable
@@ -72,6 +90,19 @@ class ParameterIdentifiability:
     bests: tuple[float, ...]
     intervals: tuple[tuple[float, float], ...]
     trust: Trust | None
+    choices: tuple[ChoiceEvidence, ...] = ()
+
+    @property
+    def explanation(self) -> str | None:
+        """What the trust means, in a sentence; None without any."""
+        if self.trust is None or not self.choices:
+            return None if self.trust is None else self.trust.phrase
+        remaining = [choice.name for choice in self.choices if choice.remains]
+        if self.trust is Trust.TRUSTED:
+            return f"no other choice than {remaining[0]} comes near the best"
+        if self.trust is Trust.ROUGH:
+            return f"undecided between {', '.join(remaining)}; the others are worse"
+        return "every choice comes near the best: these walks cannot tell it"
 
     def width(self, threshold: float = DECISIVE) -> float:
         """Width of an interval.
@@ -125,6 +156,7 @@ def identifiability(
         [run.fitness <= least * (1.0 + threshold) for run, least in zip(runs, fitness, strict=True)]
         for threshold in THRESHOLDS
     ]
+    near = within[THRESHOLDS.index(DECISIVE)]
     parameters = []
     for column, variable in enumerate(variables):
         bests = tuple(float(run.designs[row, column]) for run, row in zip(runs, best, strict=True))
@@ -132,8 +164,10 @@ def identifiability(
             _interval([run.designs[rows, column] for run, rows in zip(runs, good, strict=True)])
             for good in within
         )
-        found = ParameterIdentifiability(variable, bests[overall], bests, intervals, trust=None)
-        parameters.append(found if len(runs) == 1 else _judged(found))
+        parameter = ParameterIdentifiability(
+            variable, bests[overall], bests, intervals, None, _choices(variable, column, runs, near)
+        )
+        parameters.append(parameter if len(runs) == 1 else _judged(parameter))
     designs = tuple(int(sum(rows.sum() for rows in good)) for good in within)
     return Identifiability(fitness, designs, tuple(parameters))
 
@@ -184,9 +218,32 @@ def _interval(values: Sequence[Floats]) -> tuple[float, float]:
     return float(together.min()), float(together.max())
 
 
+def _choices(
+    variable: Variable,
+    column: int,
+    runs: Sequence[EvaluationColumns],
+    near: Sequence[NDArray[np.bool_]],
+) -> tuple[ChoiceEvidence, ...]:
+    """None for a variable that is not categorical. near: of each run, its best designs."""
+    found = []
+    for index, name in enumerate(variable.choices):
+        chosen = [run.designs[:, column] == index for run in runs]
+        least = tuple(
+            float(run.fitness[rows].min(initial=np.inf))
+            for run, rows in zip(runs, chosen, strict=True)
+        )
+        remains = any(bool((a & b).any()) for a, b in zip(chosen, near, strict=True))
+        found.append(ChoiceEvidence(name, least, remains))
+    return tuple(found)
+
+
 def _judged(found: ParameterIdentifiability) -> ParameterIdentifiability:
-    width = found.width()
-    trust = Trust.UNKNOWN
-    if width <= _ROUGH:
-        trust = Trust.TRUSTED if width <= _TRUSTED else Trust.ROUGH
-    return ParameterIdentifiability(found.variable, found.best, found.bests, found.intervals, trust)
+    if found.choices:
+        remaining = sum(choice.remains for choice in found.choices)
+        decided = remaining == 1
+        undecided = remaining == len(found.choices)
+    else:
+        width = found.width()
+        decided, undecided = width <= _TRUSTED, width > _ROUGH
+    trust = Trust.UNKNOWN if undecided else Trust.TRUSTED if decided else Trust.ROUGH
+    return replace(found, trust=trust)

@@ -6,11 +6,13 @@ from typing import Annotated, Any, Final
 
 from pydantic import Discriminator, Tag, TypeAdapter
 
+from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.tuning import JobSpec
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"
+_CALIBRATION: Final = "<calibration>"
 
 
 def _kind(value: Any) -> str:
@@ -20,13 +22,15 @@ def _kind(value: Any) -> str:
 
 
 AnySpec = Annotated[
-    Annotated[JobSpec, Tag(_TUNING)] | Annotated[IdentificationSpec, Tag(_IDENTIFICATION)],
+    Annotated[JobSpec, Tag(_TUNING)]
+    | Annotated[IdentificationSpec, Tag(_IDENTIFICATION)]
+    | Annotated[CalibrationSpec, Tag(_CALIBRATION)],
     Discriminator(
         _kind,
         custom_error_type="unknown_kind",
-        custom_error_message="kind: must be tuning or identification",
+        custom_error_message="kind: must be tuning, identification or calibration",
     ),
 ]
 
-SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec]] = TypeAdapter(AnySpec)
+SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec]] = TypeAdapter(AnySpec)
 """Reads a document with a spec of any kind; raises ValidationError for what is none."""

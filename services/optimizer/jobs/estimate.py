@@ -180,8 +180,13 @@ def _alike(job: Job, spec: Spec) -> bool:
 
 def _kind_of_walk(spec: Spec) -> str:
     """What a walk's speed depends on: the robot and the controller."""
-    controller = spec.controller if isinstance(spec, JobSpec) else "recorded"
+    controller = spec.controller if isinstance(spec, JobSpec) else _fitted_walks(spec)
     return f"{controller} {spec.model_dump_json(include={'robot'})}"
+
+
+def _fitted_walks(spec: Spec) -> str:
+    """Of a job that fits parameters: walks to recordings are logged, others are not."""
+    return "recorded" if spec.recording_ids else "calibrated"
 
 
 def _simulated_seconds(job: Job, fitted: float) -> float:
@@ -189,8 +194,8 @@ def _simulated_seconds(job: Job, fitted: float) -> float:
 
     fitted: simulated time of one design of the other [s]; fits to the same recordings share it.
     """
-    tuned = isinstance(job.spec, JobSpec)
-    one = duration(job.spec, job.spec.cases({})) if tuned else fitted
+    recorded = bool(job.spec.recording_ids)
+    one = fitted if recorded else duration(job.spec, job.spec.cases({}))
     return job.progress.evaluations * one
 
 

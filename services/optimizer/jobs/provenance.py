@@ -16,6 +16,7 @@ from sim.provenance import Provenance, provenance_of, source_digest
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
 _SOURCES: Final = (
+    "jobs/calibration.py",
     "jobs/design_space.py",
     "jobs/identification.py",
     "jobs/preference.py",
@@ -90,7 +91,7 @@ def job_provenance(spec: Spec) -> JobProvenance:
     return JobProvenance(
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
-        simulation=provenance_of(spec.robot),
+        simulation=provenance_of(*spec.described),
     )
 
 

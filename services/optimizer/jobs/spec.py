@@ -2,7 +2,8 @@
 
 Spec
 ├── JobSpec              (kind `tuning`) a drive is tuned to walk well
-└── IdentificationSpec   (kind `identification`) a robot's parameters are fitted to measured walks
+├── IdentificationSpec   (kind `identification`) a robot's parameters are fitted to measured walks
+└── CalibrationSpec      (kind `calibration`) robot and conventions are fitted to tables of results
 """
 
 from __future__ import annotations
@@ -160,6 +161,11 @@ class Spec(BaseModel):
         Returns:
             K cases, in the order of `case_names`.
         """
+
+    @property
+    def described(self) -> tuple[RobotSource, ...]:
+        """The robots that may walk, as they are described; `robot` alone for most kinds."""
+        return (self.robot,)
 
     @property
     def recording_ids(self) -> tuple[str, ...]:

@@ -1,0 +1,148 @@
+"""How near a calibration comes to its targets, and to each of them when it is left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.columns import EvaluationColumns
+from sim.calibration.targets import Target
+
+Floats = NDArray[np.float64]
+
+LeaveOut = Literal["target", "walk"]
+"""What is left out together: one target, or all that a walk enters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """What a design comes to in one target.
+
+    Attributes:
+        simulated: value, in the target's unit.
+        difference: from the target's, in tolerances; see `CalibrationSpec.differences`.
+    """
+
+    simulated: float
+    difference: float
+
+
+@dataclass(frozen=True, slots=True)
+class TargetResult:
+    """One target over all runs.
+
+    Attributes:
+        target: that is meant.
+        best: of the best design of all runs; NaN where its walk failed, which only a target that
+            is not fitted may have.
+        left_out: of the design that is best without this target; None if that was not asked for, or
+            the target is not fitted, or nothing would be left to fit.
+    """
+
+    target: Target
+    best: Reached
+    left_out: Reached | None
+
+
+@dataclass(frozen=True, slots=True)
+class TargetResults:
+    """All targets.
+
+    Attributes:
+        run: index of the run that found the best design.
+        iteration: that found it.
+        particle: that it was.
+        design: (v,) its values, as stored.
+        fitness: its misfit, root mean square over fitted targets in tolerances.
+        targets: in the order of the spec.
+    """
+
+    run: int
+    iteration: int
+    particle: int
+    design: Floats
+    fitness: float
+    targets: tuple[TargetResult, ...]
+
+
+def target_results(
+    spec: CalibrationSpec, runs: Sequence[EvaluationColumns], leave_out: LeaveOut | None = None
+) -> TargetResults:
+    """Compare the best design of all runs with the targets.
+
+    What is left out is predicted from stored objectives: the designs are judged anew without it,
+    and the one that is then best says what it would have been. Nothing is simulated.
+
+    Args:
+        spec: of the runs, which differ in their seed alone.
+        runs: all evaluations of each run.
+        leave_out: what to leave out, each in its turn; None for nothing.
+
+    Returns:
+        What the best design comes to in every target.
+
+    Raises:
+        ValueError: no run has a design that did not fail.
+    """
+    fitness = np.concatenate([run.fitness for run in runs])
+    if not np.isfinite(fitness).any():
+        raise ValueError("there is no design that did not fail")
+    best = int(np.argmin(fitness))
+    run, row = _place(runs, best)
+    simulated = np.concatenate([spec.simulated(r.objectives, r.failed) for r in runs])
+    differences = spec.differences(simulated)
+    results = []
+    for index, target in enumerate(spec.targets):
+        left_out = None
+        if leave_out is not None and target.use == "fit":
+            kept = spec.fitted & ~_left_out(spec, index, leave_out)
+            chosen = _best_by(differences[:, kept]) if kept.any() else None
+            if chosen is not None:
+                left_out = _reached(simulated, differences, chosen, index)
+        results.append(
+            TargetResult(target, _reached(simulated, differences, best, index), left_out)
+        )
+    found = runs[run]
+    return TargetResults(
+        run=run,
+        iteration=int(found.iteration[row]),
+        particle=int(found.particle[row]),
+        design=found.designs[row],
+        fitness=float(fitness[best]),
+        targets=tuple(results),
+    )
+
+
+def _place(runs: Sequence[EvaluationColumns], index: int) -> tuple[int, int]:
+    """Run and row of an index into all evaluations."""
+    for number, run in enumerate(runs):
+        if index < len(run):
+            return number, index
+        index -= len(run)
+    raise IndexError(index)
+
+
+def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut) -> NDArray[np.bool_]:
+    """(T,) which targets go with one."""
+    if leave_out == "target":
+        return np.array([k == index for k in range(len(spec.targets))], dtype=np.bool_)
+    walk = spec.targets[index].walk
+    together = [walk in (target.walk, target.relative_to) for target in spec.targets]
+    return np.array(together, dtype=np.bool_)
+
+
+def _best_by(differences: Floats) -> int | None:
+    """Row of the least sum of squares; None if every one has failed."""
+    squares = np.square(differences).sum(axis=1)
+    row = int(np.argmin(squares))
+    return row if math.isfinite(squares[row]) else None
+
+
+def _reached(simulated: Floats, differences: Floats, row: int, column: int) -> Reached:
+    return Reached(float(simulated[row, column]), float(differences[row, column]))

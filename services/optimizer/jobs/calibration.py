@@ -1,0 +1,388 @@
+"""Jobs that fit a robot and open conventions to a table of measured or published results."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, model_validator
+
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.preference import (
+    PREFERENCES,
+    PreferenceName,
+    figure_of_merit,
+    judge,
+)
+from services.optimizer.jobs.spec import Judgement, Spec
+from sim.calibration.catalogue import robot_variables, varied_robot, walk_variables
+from sim.calibration.targets import QUANTITIES, Target, TargetWalk
+from sim.calibration.walk import RESULTS, CalibrationWalk
+from sim.case import Case
+from sim.controllers import CONTROLLERS
+from sim.errors import SimulationInputError
+from sim.identification.recorded_walk import Recordings
+from sim.outcome import Objective
+from sim.robot import RobotSource
+from sim.robot.shipped import RobotName
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
+from sim.simulate import check_reach
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Which cases there are, and which of them every walk needs.
+
+    Attributes:
+        cases: name, walk and scenario of each of the K cases; walks that are the same share one.
+        of_walk: indices of a walk's cases, in the order of its scenarios, by the walk's name.
+    """
+
+    cases: tuple[tuple[str, TargetWalk, Scenario], ...]
+    of_walk: dict[str, tuple[int, ...]]
+
+
+class CalibrationSpec(Spec):
+    """Calibration: which parameters and conventions are fitted to which results of walks.
+
+    Fitness is the root mean square over fitted targets of how many tolerances each is off [1].
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "kind": "calibration",
+                    "walks": [
+                        {
+                            "name": "pi",
+                            "controller": "pi",
+                            "design": {"P": 0.454, "I": 0.147, "stride": 0.168},
+                            "scenarios": ["normal-fast"],
+                        }
+                    ],
+                    "targets": [
+                        {"walk": "pi", "quantity": "energy", "value": 42.55, "tolerance": 0.2},
+                        {"walk": "pi", "quantity": "speed", "value": 0.152, "tolerance": 0.05},
+                    ],
+                    "variables": ["battery_voltage", "contact_law"],
+                    "iterations": 50,
+                }
+            ]
+        },
+    )
+
+    kind: Literal["calibration"] = Field(description="Fit a robot and conventions to results.")
+    robots: tuple[RobotName, ...] = Field(
+        default=(),
+        max_length=16,
+        description="Shipped robots that the variable `robot` chooses among, two at least. They"
+        " replace `robot`.",
+        examples=[[]],
+    )
+    walks: tuple[TargetWalk, ...] = Field(
+        min_length=1, max_length=64, description="Walks that were measured or published."
+    )
+    targets: tuple[Target, ...] = Field(
+        min_length=1, max_length=512, description="What they came to; one at least is fitted."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _begin_with_the_first_robot(cls, document: object) -> object:
+        if isinstance(document, dict) and document.get("robots"):
+            return {**document, "robot": document["robots"][0]}
+        return document
+
+    @model_validator(mode="after")
+    def _can_be_run(self) -> CalibrationSpec:
+        if len(self.robots) == 1 or len(set(self.robots)) < len(self.robots):
+            raise ValueError("robots: two different ones at least; one alone is given as `robot`")
+        if len({walk.name for walk in self.walks}) < len(self.walks):
+            raise ValueError("walks: two of them have the same name")
+        self._check_targets()
+        names = [name for name, _, _ in self.layout().cases]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"walks: two cases would be called {name!r}; rename a walk")
+        self.design_space()
+        self._check_every_variable_matters()
+        return self
+
+    def _check_targets(self) -> None:
+        walks = {walk.name: walk for walk in self.walks}
+        for index, target in enumerate(self.targets):
+            for field, name in (("walk", target.walk), ("relative_to", target.relative_to)):
+                if name is None:
+                    continue
+                if name not in walks:
+                    raise ValueError(
+                        f"targets.{index}.{field}: no walk {name!r}; there are {', '.join(walks)}"
+                    )
+                of_all = QUANTITIES[target.quantity].scenarios
+                if not of_all and len(walks[name].scenarios) > 1:
+                    raise ValueError(
+                        f"targets.{index}.quantity: {target.quantity} is of one scenario, and the"
+                        f" walk {name} has {len(walks[name].scenarios)}"
+                    )
+        if all(target.use != "fit" for target in self.targets):
+            raise ValueError("targets: one at least is to be fitted")
+
+    @property
+    def described(self) -> tuple[RobotSource, ...]:
+        """The robots as described, one or those that `robot` chooses among."""
+        return self.robots or (self.robot,)
+
+    def layout(self) -> Layout:
+        """The cases and the walks that need them."""
+        cases: list[tuple[str, TargetWalk, Scenario]] = []
+        index: dict[tuple[object, ...], int] = {}
+        of_walk = {}
+        for walk in self.walks:
+            indices = []
+            scenarios = walk.resolved_scenarios()
+            for scenario in scenarios:
+                key = walk.controller, walk.numbers, scenario
+                if key not in index:
+                    index[key] = len(cases)
+                    name = walk.name if len(scenarios) == 1 else f"{walk.name}.{scenario.name}"
+                    cases.append((name, walk, scenario))
+                indices.append(index[key])
+            of_walk[walk.name] = tuple(indices)
+        return Layout(tuple(cases), of_walk)
+
+    def design_space(self) -> DesignSpace:
+        """Any of the robot's variables, of the gait's, and of the controllers' conventions."""
+        try:
+            of_robot = robot_variables(self.described)
+            of_walks = walk_variables(walk.controller for walk in self.walks)
+        except SimulationInputError as error:
+            raise ValueError(str(error)) from error
+        for variable in of_walks:
+            if any(variable.name == known.name for known in of_robot):
+                raise ValueError(f"{variable.name}: both the robot and a controller have it")
+        chosen = self.variables
+        if chosen is None:
+            chosen = tuple(v for v in of_robot if v.name not in self.fixed)
+        return DesignSpace.build(
+            required=(), optional=(*of_robot, *of_walks), chosen=chosen, fixed=self.fixed
+        )
+
+    def _check_every_variable_matters(self) -> None:
+        of_robot = {variable.name for variable in robot_variables(self.described)}
+        cases = self._cases()
+        for variable in self.design_space().variables:
+            drives = [case.drive({variable.name: math.nan}) for case in cases]
+            unused = all(not _is_nan(drive.get(variable.name)) for drive in drives)
+            if variable.name not in of_robot and unused:
+                raise ValueError(
+                    f"variables: {variable.name} changes nothing: the design of every walk that"
+                    " has it gives it; leave it out there, or here"
+                )
+
+    def check_can_be_simulated(self) -> None:
+        """Check that robots, drives and gaits can be had at both ends of all bounds.
+
+        A gait that is itself searched may leave the legs' reach at some points of the box: there a
+        status says so.
+
+        Raises:
+            InvalidRequest: bounds or values that nothing can run with, or a walk out of reach;
+                names the field.
+        """
+        space, cases = self.design_space(), self._cases()
+        of_robot = {variable.name for variable in robot_variables(self.described)}
+        for values in space.corners():
+            try:
+                varied_robot(
+                    self.described, {name: v for name, v in values.items() if name in of_robot}
+                )
+            except SimulationInputError as error:
+                raise space.refusal(error) from error
+            for index, case in self._walks(cases):
+                drive = case.drive(values)
+                try:
+                    CONTROLLERS[case.controller].compile(drive)
+                except SimulationInputError as error:
+                    raise InvalidRequest(str(error), field=f"walks.{index}.design") from error
+        searched = {v.name: math.nan for v in space.variables if v.name in GAIT_VARIABLE_NAMES}
+        for index, case in self._walks(cases):
+            drive = case.drive(dict(space.fixed) | searched)
+            if not any(map(_is_nan, drive.values())):
+                self._check_reach(index, case, drive)
+
+    def _check_reach(self, index: int, case: CalibrationWalk, drive: dict[str, float]) -> None:
+        gait = {name: value for name, value in drive.items() if name in GAIT_VARIABLE_NAMES}
+        for robot in self.described:
+            try:
+                check_reach(case.scenario, tuple(gait), tuple(gait.values()), robot=robot)
+            except SimulationInputError as error:
+                raise InvalidRequest(str(error), field=f"walks.{index}") from error
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """Raw results of a walk: f1..f6 of table 4.1, and what else it tells."""
+        return RESULTS
+
+    @property
+    def case_names(self) -> tuple[str, ...]:
+        """Names of walks, with that of the scenario where a walk has several."""
+        return tuple(name for name, _, _ in self.layout().cases)
+
+    def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
+        """One walk for each distinct drive and scenario.
+
+        Args:
+            recordings: none are needed.
+
+        Returns:
+            The walks, in the order of `case_names`.
+        """
+        return self._cases()
+
+    def _cases(self) -> tuple[CalibrationWalk, ...]:
+        names = self.design_space().names
+        return tuple(
+            CalibrationWalk(name, self.described, walk.controller, walk.numbers, scenario, names)
+            for name, walk, scenario in self.layout().cases
+        )
+
+    def _walks(self, cases: tuple[CalibrationWalk, ...]) -> list[tuple[int, CalibrationWalk]]:
+        """Every walk's index with each of its cases."""
+        of_walk = self.layout().of_walk
+        return [(i, cases[k]) for i, walk in enumerate(self.walks) for k in of_walk[walk.name]]
+
+    def simulated(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
+        """What designs come to, target by target.
+
+        Args:
+            objectives: (n, K, m) raw results of walks, in their units.
+            failed: (n, K), true for a walk without a result.
+
+        Returns:
+            (n, T) values of `targets`, in their units, NaN where a walk failed.
+        """
+        of_walk, columns = self.layout().of_walk, []
+        for target in self.targets:
+            values = _quantity(target, objectives, failed, of_walk[target.walk])
+            if target.relative_to is not None:
+                other = _quantity(target, objectives, failed, of_walk[target.relative_to])
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    values = values / other
+            columns.append(values)
+        return np.stack(columns, axis=1)
+
+    def differences(self, simulated: Floats) -> Floats:
+        """How far off designs are, in tolerances.
+
+        Args:
+            simulated: (n, T) values of `targets`.
+
+        Returns:
+            (n, T): ln(simulated / value) / ln(1 + tolerance), so that a factor of 1 + tolerance
+            counts 1 and its inverse -1; for height_loss (simulated - value) / tolerance. +inf
+            where there is no value.
+        """
+        rows = [
+            [_difference(target, value) for target, value in zip(self.targets, row, strict=True)]
+            for row in simulated.tolist()
+        ]
+        return np.array(rows).reshape(simulated.shape)
+
+    @property
+    def fitted(self) -> NDArray[np.bool_]:
+        """(T,) whether a target is fitted."""
+        return np.array([target.use == "fit" for target in self.targets])
+
+    def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
+        """Judge designs by how far fitted targets are off.
+
+        Args:
+            objectives: (n, K, m) raw results of walks, in their units.
+            failed: (n, K), true for a walk without a result.
+
+        Returns:
+            Fitness is the root mean square over fitted targets, in tolerances [1]; utilities are
+            the same over those that need a case, 0 where none does.
+        """
+        differences = self.differences(self.simulated(objectives, failed))
+        fitted, of_walk = self.fitted, self.layout().of_walk
+        utilities = np.zeros(failed.shape)
+        for case in range(failed.shape[1]):
+            needs = [
+                case in (*of_walk[t.walk], *of_walk.get(t.relative_to or "", ()))
+                for t in self.targets
+            ]
+            utilities[:, case] = root_mean_square(differences[:, fitted & np.array(needs)])
+        utilities[failed] = np.inf
+        with np.errstate(divide="ignore"):
+            return Judgement(root_mean_square(differences[:, fitted]), np.log(utilities))
+
+    def resolved(self) -> CalibrationSpec:
+        """The same job with scenarios and variables written out."""
+        space = self.design_space()
+        walks = tuple(
+            walk.model_copy(update={"scenarios": walk.resolved_scenarios()}) for walk in self.walks
+        )
+        return self.model_copy(
+            update={"walks": walks, "variables": space.variables, "fixed": space.shown_fixed},
+        )
+
+
+def root_mean_square(differences: Floats) -> Floats:
+    """Root mean square of each row.
+
+    Args:
+        differences: (n, t).
+
+    Returns:
+        (n,), 0 for no columns, +inf where a value is not finite.
+    """
+    rows = [[difference * difference for difference in row] for row in differences.tolist()]
+    return np.array([math.sqrt(math.fsum(row) / len(row)) if row else 0.0 for row in rows])
+
+
+def _quantity(
+    target: Target, objectives: Floats, failed: NDArray[np.bool_], cases: tuple[int, ...]
+) -> Floats:
+    """(n,) what a walk came to, NaN where it failed."""
+    rows, bad = objectives[:, cases], failed[:, cases]
+    values = _of_all(target.quantity, rows, bad)
+    values[bad.any(axis=1)] = np.nan
+    return values
+
+
+def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:
+    """(n, k, m) results of a walk's k scenarios -> (n,) values, any where it failed."""
+    if quantity == "F":
+        preference = PREFERENCES["chapter-3"]
+        fitness = judge(rows, bad, preference).fitness.tolist()
+        found = [figure_of_merit(value, preference) for value in fitness]
+        return np.array([math.nan if value is None else value for value in found])
+    if quantity.startswith("fitness:"):
+        name: PreferenceName = quantity.removeprefix("fitness:")  # type: ignore[assignment]
+        return judge(rows, bad, PREFERENCES[name]).fitness
+    return rows[:, 0, _COLUMNS[quantity]].copy()
+
+
+_COLUMNS: Final = {result.name: column for column, result in enumerate(RESULTS)}
+
+
+def _difference(target: Target, value: float) -> float:
+    if not math.isfinite(value):
+        return math.inf
+    if not QUANTITIES[target.quantity].positive:
+        return (value - target.value) / target.tolerance
+    if value <= 0.0:
+        return math.inf
+    return math.log(value / target.value) / math.log1p(target.tolerance)
+
+
+def _is_nan(value: float | None) -> bool:
+    return value is not None and math.isnan(value)

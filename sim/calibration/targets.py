@@ -1,0 +1,174 @@
+"""What walks came to, measured or published: the targets of a calibration, as typed data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from sim.catalogue import design_catalogue, design_numbers
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.scenario import Scenario, ScenarioChoice, find_scenario
+from sim.variables import VariableName, VariableValue
+
+WalkName = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=40,
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$",
+        description="Label of the walk, unique in its job.",
+        examples=["fuzzy-pso-ps"],
+    ),
+]
+
+QuantityName = Literal[
+    "torque",
+    "acceleration",
+    "angular_acceleration",
+    "energy",
+    "height_loss",
+    "speed",
+    "power",
+    "peak_current",
+    "mean_current",
+    "motor_heat",
+    "F",
+    "fitness:A",
+    "fitness:B",
+    "fitness:C",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One thing that a walk comes to.
+
+    Attributes:
+        unit: of its values.
+        description: for people.
+        positive: whether every value is greater than 0, so that tolerances are relative; else
+            they are in the unit.
+        scenarios: whether it is one number over all scenarios of a walk.
+    """
+
+    unit: str
+    description: str
+    positive: bool = True
+    scenarios: bool = False
+
+
+QUANTITIES: Final[dict[QuantityName, Quantity]] = {
+    "torque": Quantity("N m", "f1, rms over time of the sum of the absolute gear torques"),
+    "acceleration": Quantity("m/s2", "f2, rms of the body's linear acceleration"),
+    "angular_acceleration": Quantity("rad/s2", "f3, rms of the body's angular acceleration"),
+    "energy": Quantity("J/m", "f4, electrical energy of the motors per metre walked"),
+    "height_loss": Quantity("m", "f6, height at the end less that at the start", positive=False),
+    "speed": Quantity("m/s", "mean forward speed"),
+    "power": Quantity("W", "mean electrical power of all motors"),
+    "peak_current": Quantity("A", "largest absolute current of any motor"),
+    "mean_current": Quantity("A", "mean over time and motors of the absolute current"),
+    "motor_heat": Quantity("W", "mean of what all windings turn to heat"),
+    "F": Quantity("1", "fitness of chapter 3, eq. 3.1; the greater the better"),
+    "fitness:A": Quantity("1", "fitness under preference A, eq. 4.2", scenarios=True),
+    "fitness:B": Quantity("1", "fitness under preference B, eq. 4.2", scenarios=True),
+    "fitness:C": Quantity("1", "fitness under preference C, eq. 4.2", scenarios=True),
+}
+"""What targets may be of."""
+
+
+class TargetWalk(BaseModel):
+    """A walk that was measured or published: what drove it, and where it went."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: WalkName
+    controller: ControllerName = Field(description="Controller that drove it.")
+    design: dict[VariableName, VariableValue] = Field(
+        description="Value of each of the controller's variables, and of whatever else is known of"
+        " it: gait variables, conventions. A calibration does not replace what is given here.",
+        examples=[{"P": 0.454, "I": 0.147, "stride": 0.168}],
+    )
+    scenarios: tuple[ScenarioChoice, ...] = Field(
+        min_length=1,
+        max_length=32,
+        description="Names or numbers of presets, or scenarios of your own; several for a fitness"
+        " over all of them.",
+        examples=[["normal-fast"]],
+    )
+
+    @model_validator(mode="after")
+    def _can_walk(self) -> TargetWalk:
+        known = design_catalogue(self.controller)
+        for name in self.design:
+            if name not in known:
+                raise ValueError(f"design: unknown variable {name!r}; known are {', '.join(known)}")
+        needed = [variable.name for variable in CONTROLLERS[self.controller].variables]
+        missing = [name for name in needed if name not in self.design]
+        if missing:
+            raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
+        design_numbers(self.controller, self.design)
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"scenarios: {name!r} is named twice")
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios in full, presets looked up."""
+        return tuple(find_scenario(s) if isinstance(s, str) else s for s in self.scenarios)
+
+    @property
+    def numbers(self) -> tuple[tuple[str, float], ...]:
+        """Names and numbers of the design, in the order of names."""
+        return tuple(sorted(design_numbers(self.controller, self.design).items()))
+
+
+class Target(BaseModel):
+    """One number that a walk came to, and how near a simulation should come to it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    walk: WalkName
+    quantity: QuantityName = Field(description="What was measured.", examples=["energy"])
+    value: FiniteFloat = Field(
+        description="In the quantity's unit; with `relative_to` the ratio to that walk's.",
+        examples=[41.96],
+    )
+    tolerance: float = Field(
+        gt=0.0,
+        le=1e6,
+        description="How far off counts as one. Relative, 0.2 for a fifth, except for height_loss,"
+        " which may have either sign: in metres.",
+        examples=[0.2],
+    )
+    relative_to: WalkName | None = Field(
+        default=None, description="Another walk, if the value is the ratio to its quantity."
+    )
+    use: Literal["fit", "predict"] = Field(
+        default="fit",
+        description="Whether it is fitted; what is only predicted is reported beside it.",
+    )
+
+    @model_validator(mode="after")
+    def _has_a_sense(self) -> Target:
+        if QUANTITIES[self.quantity].positive:
+            if not self.value > 0.0:
+                raise ValueError(f"value: {self.value:g}, but {self.quantity} is greater than 0")
+        elif self.relative_to is not None:
+            raise ValueError(f"relative_to: {self.quantity} may be zero, so it has no ratio")
+        if self.relative_to == self.walk:
+            raise ValueError("relative_to: the walk itself; its ratio is always 1")
+        return self
+
+    @property
+    def label(self) -> str:
+        """Walk and quantity, for people."""
+        ratio = "" if self.relative_to is None else f" / {self.relative_to}"
+        return f"{self.walk}{ratio} {self.quantity}"
+
+    @property
+    def unit(self) -> str:
+        """Unit of the value."""
+        return QUANTITIES[self.quantity].unit if self.relative_to is None else "1"

@@ -1,0 +1,125 @@
+"""Robots and conventions put to one of the walks that a calibration is fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
+from sim.calibration.catalogue import robot_variables, varied_robot
+from sim.catalogue import design_catalogue
+from sim.controllers import CONTROLLERS, ControlLaw, ControllerName
+from sim.gait.trajectory import Trajectory, desired_angles
+from sim.kernel.walk import Coding, Kernel, WalkSetup
+from sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
+from sim.robot import Robot, RobotSource
+from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+
+Floats = NDArray[np.float64]
+
+RESULTS: Final = (
+    *OBJECTIVES,
+    *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS),
+)
+"""All that a walk tells, f1 to f6 first: columns of what these walks come to."""
+
+_KEPT: Final = 128
+"""Control laws and trajectories that are kept, of all walks of this process."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationWalk:
+    """Designs are robots and conventions; all walk with the same drive through the same scenario.
+
+    Desired angles are those of the robot as described: its controller knows nothing of the
+    parameters that are varied. What the drive itself gives is not varied.
+
+    Attributes:
+        name: unique in its job.
+        robots: one, or those that the variable `robot` chooses among.
+        controller: name of the motor controller.
+        design: names and numbers of the drive, in the order of names.
+        scenario: that is walked through.
+        variables: columns of the designs, of `robot_variables` and `walk_variables`.
+    """
+
+    name: str
+    robots: tuple[RobotSource, ...]
+    controller: ControllerName
+    design: tuple[tuple[str, float], ...]
+    scenario: Scenario
+    variables: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of one design [s], with the drive's cycle time if it gives one."""
+        cycle_time = dict(self.design).get("cycle_time", self.scenario.cycle_time)
+        return self.scenario.cycles * cycle_time
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """All that a walk tells."""
+        return RESULTS
+
+    def run(self, designs: Floats) -> Outcome:
+        """Let every robot walk; those that share a kernel walk together."""
+        objectives = np.full((len(designs), len(RESULTS)), np.nan)
+        statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
+        together: dict[tuple[Kernel, Coding, float], dict[int, WalkSetup]] = {}
+        of_robot = {variable.name for variable in robot_variables(self.robots)}
+        for index, row in enumerate(designs.tolist()):
+            values = dict(zip(self.variables, row, strict=True))
+            described, robot = varied_robot(
+                self.robots, {name: v for name, v in values.items() if name in of_robot}
+            )
+            substeps, timestep = control_steps(robot)
+            setup = self._setup(described, robot, self.drive(values), timestep)
+            if setup is not None:
+                key = kernel_of(robot), Coding.of(robot, substeps), timestep
+                together.setdefault(key, {})[index] = setup
+        for (kernel, coding, timestep), setups in together.items():
+            results = kernel.walk(list(setups.values()), coding, log=False)
+            for (index, setup), result in zip(setups.items(), results, strict=True):
+                judged = judge(setup, result, coding.substeps, timestep)
+                statuses[index], objectives[index, :N_OBJECTIVES] = judged
+                objectives[index, N_OBJECTIVES:] = measure(setup, result, coding.substeps)
+        return Outcome(objectives, statuses)
+
+    def drive(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The drive with what is varied of it.
+
+        Args:
+            values: Of a design, by variable.
+
+        Returns:
+            The drive's own values, and those of its other variables that the design gives.
+        """
+        known = design_catalogue(self.controller)
+        own = dict(self.design)
+        return {name: value for name, value in values.items() if name in known} | own
+
+    def _setup(
+        self, described: Robot, robot: Robot, drive: Mapping[str, float], timestep: float
+    ) -> WalkSetup | None:
+        """None for a gait out of the legs' reach."""
+        gait = {name: value for name, value in drive.items() if name in GAIT_VARIABLE_NAMES}
+        gains = tuple((name, v) for name, v in drive.items() if name not in GAIT_VARIABLE_NAMES)
+        scenario = with_gait(self.scenario, gait)
+        trajectory = _trajectory(described, scenario)
+        plan = plan_walk(robot, scenario, timestep, trajectory=trajectory)
+        return None if plan is None else plan(_control_law(self.controller, gains))
+
+
+@lru_cache(maxsize=_KEPT)
+def _trajectory(robot: Robot, scenario: Scenario) -> Trajectory:
+    return desired_angles(robot, scenario)
+
+
+@lru_cache(maxsize=_KEPT)
+def _control_law(controller: ControllerName, gains: tuple[tuple[str, float], ...]) -> ControlLaw:
+    return CONTROLLERS[controller].compile(dict(gains))

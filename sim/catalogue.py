@@ -1,0 +1,68 @@
+"""All that a walk's design may give, and its values by name: numbers, and choices by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.errors import SimulationInputError
+from sim.scenario import GAIT_VARIABLES
+from sim.variables import Variable
+
+
+def design_catalogue(controller: ControllerName) -> dict[str, Variable]:
+    """Everything that a design of a controller may give.
+
+    Args:
+        controller: Name of the controller.
+
+    Returns:
+        The controller's variables and conventions and the gait's variables, by name.
+    """
+    family = CONTROLLERS[controller]
+    known = (*family.variables, *family.conventions, *GAIT_VARIABLES)
+    return {variable.name: variable for variable in known}
+
+
+def design_numbers(
+    controller: ControllerName, design: Mapping[str, float | str]
+) -> dict[str, float]:
+    """A design as the simulator takes it.
+
+    Args:
+        controller: Name of the controller.
+        design: Values by name; of a categorical variable a choice's name or index. Names that the
+            catalogue does not have are left as they are, for whoever checks names.
+
+    Returns:
+        Numbers by name.
+
+    Raises:
+        SimulationInputError: A value is no number, or none of the choices; names the variable.
+    """
+    catalogue = design_catalogue(controller)
+    numbers = {}
+    for name, value in design.items():
+        try:
+            known = catalogue.get(name)
+            numbers[name] = float(value) if known is None else known.number(value)
+        except ValueError as error:
+            raise SimulationInputError(str(error)) from error
+    return numbers
+
+
+def design_shown(controller: ControllerName, design: Mapping[str, float]) -> dict[str, float | str]:
+    """A design as people read it; the inverse of `design_numbers`.
+
+    Args:
+        controller: Name of the controller.
+        design: Numbers by name.
+
+    Returns:
+        Values by name; of a categorical variable the choice's name.
+    """
+    catalogue = design_catalogue(controller)
+    return {
+        name: catalogue[name].shown(value) if name in catalogue else value
+        for name, value in design.items()
+    }

@@ -1,0 +1,58 @@
+"""Calibration by the machinery of every job: queue, swarm, store, resume."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.job import JobState
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
+from services.runtime import open_evaluator, run_embedded
+from tests.calibration.conftest import TRUE_LAW, TRUTH, WALKS, spec, true_targets
+from tests.examples.jobs import history
+
+
+def finished(store: SqlStore, wanted: CalibrationSpec) -> str:
+    job, _ = JobService(store).submit(wanted)
+    evaluator = open_evaluator("in-process", cpus=2)
+    try:
+        assert run_embedded(store, evaluator, job.id).state is JobState.SUCCEEDED
+    finally:
+        evaluator.close()
+    return job.id
+
+
+@pytest.mark.slow
+def test_it_finds_hidden_parameters_and_the_hidden_law_of_friction(store: SqlStore) -> None:
+    wanted = spec(
+        targets=true_targets(),
+        variables=["battery_voltage", "body_mass", "contact_law"],
+        optimizer={"particles": 40, "inertia_start": 0.9, "inertia_end": 0.4},
+        iterations=16,
+    )
+    best = store.best(finished(store, wanted))
+    assert best is not None
+    found = wanted.design_space().shown(best.design.tolist())
+    assert found["contact_law"] == TRUE_LAW
+    assert found["battery_voltage"] == pytest.approx(TRUTH["battery_voltage"], abs=0.2)
+    assert found["body_mass"] == pytest.approx(TRUTH["body_mass"], abs=0.1)
+    assert best.fitness < 0.2
+
+
+@pytest.mark.slow
+def test_a_job_stopped_half_way_ends_with_the_same_bits(store: SqlStore) -> None:
+    wanted = spec(walks=WALKS[:1])
+    whole = finished(store, wanted)
+    job, _ = JobService(store).submit(wanted)
+    stop = threading.Event()
+    evaluator = open_evaluator("in-process", cpus=1)
+    try:
+        run_embedded(store, evaluator, job.id, stop=stop, on_commit=lambda *_: stop.set())
+        assert store.job(job.id).progress.iterations < wanted.iterations
+        run_embedded(store, evaluator, job.id)
+    finally:
+        evaluator.close()
+    assert history(store, job.id) == history(store, whole)

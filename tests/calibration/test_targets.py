@@ -1,0 +1,117 @@
+"""What the evidence of several runs says: targets one by one, choices one by one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from services.optimizer.analysis.identifiability import Trust, identifiability
+from services.optimizer.analysis.targets import target_results
+from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.columns import EvaluationColumns
+from sim.calibration.walk import RESULTS
+from sim.variables import Variable
+from tests.calibration.conftest import spec
+from tests.optimizer.columns import columns_of
+
+LAW = Variable(name="law", kind="categorical", choices=("linear", "stick", "jump"))
+
+
+def made_up(wanted: CalibrationSpec, *designs: tuple[float, float, float]) -> EvaluationColumns:
+    """Designs of which each comes to a torque and an energy of `stiff` and a torque of `fuzzy`."""
+    rows = np.full((len(designs), 2, len(RESULTS)), 1.0)
+    for row, (torque, energy, other) in zip(rows, designs, strict=True):
+        row[0, [0, 3]], row[1, 0] = (torque, energy), other
+    columns = columns_of(rows, designs=np.zeros((len(designs), 2)))
+    return replace(columns, fitness=wanted.judge(rows, columns.failed).fitness)
+
+
+WANTED = spec(
+    targets=[
+        {"walk": "stiff", "quantity": "torque", "value": 10.0, "tolerance": 0.1},
+        {"walk": "stiff", "quantity": "energy", "value": 50.0, "tolerance": 0.1},
+        {"walk": "fuzzy", "quantity": "torque", "value": 20.0, "tolerance": 0.1},
+        {"walk": "fuzzy", "quantity": "speed", "value": 2.0, "tolerance": 0.1, "use": "predict"},
+    ]
+)
+# The first is fair in all; each of the others meets two targets exactly and misses the third.
+FAIR, ALL_BUT_TORQUE = (11.0, 55.0, 22.0), (13.0, 50.0, 20.0)
+ALL_BUT_ENERGY, ALL_BUT_FUZZY = (10.0, 70.0, 20.0), (10.0, 50.0, 29.0)
+
+
+def test_the_best_design_of_all_runs_is_compared_with_every_target() -> None:
+    runs = [made_up(WANTED, ALL_BUT_TORQUE), made_up(WANTED, ALL_BUT_ENERGY, FAIR)]
+    found = target_results(WANTED, runs)
+    assert (found.run, found.iteration) == (1, 1)
+    assert [t.best.simulated for t in found.targets] == [11.0, 55.0, 22.0, 1.0]
+    np.testing.assert_allclose([t.best.difference for t in found.targets[:3]], 1.0)
+    assert found.fitness == pytest.approx(1.0)
+    assert all(t.left_out is None for t in found.targets)
+
+
+def test_a_target_that_is_left_out_is_predicted_by_what_is_best_without_it() -> None:
+    runs = [
+        made_up(WANTED, FAIR, ALL_BUT_TORQUE),
+        made_up(WANTED, ALL_BUT_ENERGY, ALL_BUT_FUZZY),
+    ]
+    found = target_results(WANTED, runs, "target")
+    predicted = [None if t.left_out is None else t.left_out.simulated for t in found.targets]
+    assert predicted == [13.0, 70.0, 29.0, None]
+
+
+def test_a_walk_is_left_out_with_all_of_its_targets() -> None:
+    runs = [made_up(WANTED, FAIR, ALL_BUT_FUZZY, (30.0, 90.0, 20.0))]
+    found = target_results(WANTED, runs, "walk")
+    predicted = [None if t.left_out is None else t.left_out.simulated for t in found.targets]
+    assert predicted == [30.0, 90.0, 29.0, None]
+
+
+def test_nothing_is_predicted_where_nothing_is_left_to_fit() -> None:
+    only = spec()
+    found = target_results(only, [made_up(only, FAIR)], "target")
+    assert found.targets[0].left_out is None
+
+
+def run_of(**least: float) -> EvaluationColumns:
+    """A run in which each law that is named has this least fitness."""
+    rows = [(LAW.number(name), fitness + k) for name, fitness in least.items() for k in (0.0, 1.0)]
+    columns = columns_of(np.ones((len(rows), 1, 6)), designs=np.array(rows)[:, :1])
+    return replace(columns, fitness=np.array(rows)[:, 1])
+
+
+@pytest.mark.parametrize(
+    ("runs", "trust", "remaining"),
+    [
+        ([run_of(linear=2.0, stick=1.0), run_of(stick=1.1, jump=9.0)], Trust.TRUSTED, ["stick"]),
+        (
+            [run_of(linear=2.0, stick=1.0), run_of(linear=9.0, jump=1.1)],
+            Trust.ROUGH,
+            ["stick", "jump"],
+        ),
+        (
+            [run_of(linear=1.02, stick=1.0), run_of(stick=1.0, jump=1.0)],
+            Trust.UNKNOWN,
+            ["linear", "stick", "jump"],
+        ),
+    ],
+)
+def test_evidence_decides_for_choices_that_any_run_has_near_its_best(
+    runs: list[EvaluationColumns], trust: Trust, remaining: list[str]
+) -> None:
+    (law,) = identifiability([LAW], runs).parameters
+    assert law.trust is trust
+    assert [choice.name for choice in law.choices if choice.remains] == remaining
+    assert law.explanation is not None
+
+
+def test_the_least_misfit_of_each_choice_is_told_by_run() -> None:
+    (law,) = identifiability([LAW], [run_of(linear=2.0, stick=1.0), run_of(stick=1.5)]).parameters
+    assert [choice.fitness for choice in law.choices] == [
+        (2.0, math.inf),
+        (1.0, 1.5),
+        (math.inf, math.inf),
+    ]
+    assert law.variable.shown(law.best) == "stick"

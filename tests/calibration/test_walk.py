@@ -1,0 +1,74 @@
+"""What robots and conventions come to in one of the walks of a calibration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim.calibration.catalogue import robot_variables
+from sim.calibration.walk import CalibrationWalk
+from sim.gait.trajectory import desired_angles
+from sim.outcome import Status
+from sim.robot import RobotVariant, load_robot
+from sim.robot.identifiable import with_parameters
+from sim.scenario import Scenario
+from tests.calibration.conftest import PI
+from tests.examples.walks import short_walk, walk
+
+(CONTACT_LAW,) = (v for v in robot_variables(["szabadka2"]) if v.name == "contact_law")
+
+
+def case(*variables: str, scenario: Scenario | None = None, **more: float) -> CalibrationWalk:
+    design = tuple(sorted((PI | more).items()))
+    return CalibrationWalk("w", ("szabadka2",), "pi", design, scenario or short_walk(), variables)
+
+
+@pytest.mark.parametrize("law", CONTACT_LAW.choices)
+def test_a_robot_walks_as_it_would_alone(law: Any) -> None:
+    index = CONTACT_LAW.number(law)
+    found = case("body_mass", "contact_law").run(np.array([[4.0, index], [2.5, index]]))
+    for row, mass in enumerate((4.0, 2.5)):
+        robot = with_parameters(load_robot(RobotVariant(contact_law=law)), {"body_mass": mass})
+        alone = walk(short_walk(), PI, "pi", robot=robot).outcome
+        np.testing.assert_array_equal(found.objectives[row, :6], alone.objectives[0])
+
+
+def test_a_design_does_not_depend_on_the_laws_of_friction_beside_it() -> None:
+    designs = np.array([[0.0], [1.0], [2.0], [0.0], [1.0], [2.0]])
+    together = case("contact_law").run(designs)
+    for row in range(3):
+        alone = case("contact_law").run(designs[row : row + 1])
+        np.testing.assert_array_equal(together.objectives[row], alone.objectives[0])
+        np.testing.assert_array_equal(together.objectives[row + 3], alone.objectives[0])
+    assert len(np.unique(together.objectives[:3, 3])) == 3
+
+
+def test_what_a_walks_own_design_gives_is_not_varied() -> None:
+    designs = np.array([[0.12], [0.16]])
+    own, open_ = case("stride", stride=0.14).run(designs), case("stride").run(designs)
+    assert own.objectives[0].tolist() == own.objectives[1].tolist()
+    assert open_.objectives[0].tolist() != open_.objectives[1].tolist()
+    with_own = walk(short_walk(stride=0.14), PI, "pi").outcome
+    np.testing.assert_array_equal(own.objectives[0, :6], with_own.objectives[0])
+
+
+def test_a_gait_out_of_reach_fails_alone() -> None:
+    statuses = case("stride").run(np.array([[0.5], [0.12]])).statuses
+    assert statuses.tolist() == [Status.UNREACHABLE, Status.OK]
+
+
+def test_a_gait_is_planned_once_for_all_robots(monkeypatch: pytest.MonkeyPatch) -> None:
+    planned = []
+
+    def counted(robot: Any, scenario: Scenario) -> Any:
+        planned.append(scenario.stride)
+        return desired_angles(robot, scenario)
+
+    monkeypatch.setattr("sim.calibration.walk.desired_angles", counted)
+    scenario = short_walk(height=0.0123)
+    masses = np.array([[3.0, 0.12], [4.0, 0.12], [5.0, 0.13]])
+    for _ in range(2):
+        case("body_mass", "stride", scenario=scenario).run(masses)
+    assert planned == [0.12, 0.13]

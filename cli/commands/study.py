@@ -1,4 +1,4 @@
-"""`gaitswarm study`: what the model's simplifications cost."""
+"""`gaitswarm study`: what simplifications cost, and what a controller gains."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from cli.commands.study_controllers import controllers
 from cli.options import Json, RobotOption
 
 if TYPE_CHECKING:
@@ -24,10 +25,13 @@ Scenario = Annotated[str, typer.Option(help="Name or number, several separated b
 
 def register(app: typer.Typer) -> None:
     """Add the group of commands."""
-    studies = typer.Typer(help="Measure what tables, steps and noise do to the objectives.")
+    studies = typer.Typer(
+        help="Measure what tables, steps, noise and the kind of controller do to the objectives."
+    )
     studies.command()(tables)
     studies.command()(steps)
     studies.command()(noise)
+    studies.command()(controllers)
     app.add_typer(studies, name="study")
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, Final, get_args
 
-from gaitswarm.errors import Conflict, Interrupted, InvalidRequest
+from gaitswarm.errors import Conflict, Interrupted, InvalidRequest, ProvenanceChanged
 from gaitswarm.views import JobView
 from services.optimizer.jobs.job import Claim, Command, CompletedIteration, Job, JobState
 from services.optimizer.jobs.spec import Spec
@@ -169,6 +169,33 @@ def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
     if job.state is not JobState.SUCCEEDED and not accept_changes:
         service.check_unchanged(job)
     return service.command(job_id, Command.RESUME) if job.state in _TAKEN_UP else job
+
+
+def earlier_job(service: JobService, spec: Spec) -> Job | None:
+    """The job that was submitted before to do the same, under the same name.
+
+    Args:
+        service: Of the database to look in.
+        spec: What the job is to do; its name should be its alone.
+
+    Returns:
+        One that was not cancelled, and whose numbers depend on what they would depend on if it were
+        run now, from its first iteration on; None if there is none.
+    """
+    wanted = spec.resolved()
+    after: str | None = None
+    while True:
+        page = service.jobs(search=spec.name, after=after)
+        for job in page.items:
+            if not job.readable or job.state is JobState.CANCELLED or job.spec != wanted:
+                continue
+            with suppress(ProvenanceChanged):
+                service.check_unchanged(job)
+                if len(job.provenance) <= 1:
+                    return job
+        if page.next is None:
+            return None
+        after = page.next
 
 
 def _interrupted(job: Job, url: str) -> Interrupted:

@@ -1,0 +1,124 @@
+"""`gaitswarm study controllers`: what the Fuzzy-PI gains on the PI when both are optimized."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Json, WorkerOptions, with_groups
+
+if TYPE_CHECKING:
+    from cli.controllers_study import Comparison, Runs
+    from cli.embedded import Embedded
+    from gaitswarm.jobs.database import DatabaseJobs
+    from services.optimizer.jobs.job import Job
+    from services.optimizer.jobs.tuning import JobSpec
+    from services.optimizer.store.base import Store
+
+
+@with_groups
+def controllers(
+    *,
+    chapters: Annotated[
+        str, typer.Option(help="3: with the gait, by eq. 3.1; 4: in six scenarios, preference A.")
+    ] = "3,4",
+    robots: Annotated[
+        str | None,
+        typer.Option(help="Names or folders, separated by commas. Default: all that are shipped."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, max=100, help="Runs of each controller.")] = 10,
+    particles: Annotated[
+        int | None, typer.Option(help="Size of each swarm. Default: 40 in chapter 3, 25 in 4.")
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option(help="Iterations of each run. Default: 70 in chapter 3, 25 in 4.")
+    ] = None,
+    optimizer: Annotated[str, typer.Option(help="pso-thesis or pso.")] = "pso-thesis",
+    workers: WorkerOptions,
+    as_json: Json = False,
+) -> None:
+    """Optimize PI and Fuzzy-PI alike from several seeds, and compare them (thesis 3.4).
+
+    Every run is a job of the database. What has been run before, by the same code, is not run
+    again: a study that was stopped goes on where it was by the same command.
+    """
+    import json
+
+    from cli.controllers_study import Budget, comparisons, study_document, study_table
+    from cli.output import note, print_text, stdout_console
+    from cli.robots import chosen_robot
+    from services.optimizer.errors import InvalidRequest
+    from sim.robot.shipped import SHIPPED
+
+    names = SHIPPED if robots is None else robots.split(",")
+    chosen = [chapter.strip() for chapter in chapters.split(",")]
+    if not set(chosen) <= {"3", "4"}:
+        raise InvalidRequest(f"{chapters!r} is none of 3, 4 or 3,4", field="chapters")
+    planned = comparisons(
+        sorted({int(chapter) for chapter in chosen}),
+        {name: chosen_robot(name) for name in names},
+        Budget(seeds, particles, iterations, optimizer),
+    )
+    found = _run(planned, workers)
+    if as_json:
+        print_text(json.dumps(study_document(found), indent=2))
+        return
+    stdout_console().print(study_table(found))
+    note(
+        "in the thesis +22 % (table 3.6, PSO-PS) and +20 % on average, both in chapter 3\n"
+        "medians over the runs; gain: median of all ratios of a run to a run of the other;\n"
+        "intervals of 95 % or more, by order statistics; F is maximized, f_G minimized"
+    )
+
+
+def _run(planned: list[Comparison], workers: WorkerOptions) -> list[Comparison]:
+    """Run what has not been run before. Raises JobEnded, and KeyboardInterrupt if interrupted."""
+    from contextlib import closing
+    from dataclasses import asdict, replace
+
+    from cli.embedded import Embedded
+    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.settings import read_settings
+    from services.optimizer.service import JobService
+    from services.runtime import open_store
+
+    settings = read_settings(**asdict(workers))
+    url = database_to_write(settings)
+    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
+        jobs = DatabaseJobs(JobService(store), url)
+
+        def run(runs: Runs) -> Runs:
+            return replace(
+                runs, jobs=tuple(_job_run(spec, store, jobs, embedded) for spec in runs.specs)
+            )
+
+        return [replace(c, pi=run(c.pi), fuzzy=run(c.fuzzy)) for c in planned]
+
+
+def _job_run(spec: JobSpec, store: Store, jobs: DatabaseJobs, embedded: Embedded) -> Job:
+    """The job that does this, run to its end. Raises as `_run`."""
+    from cli.embedded import ended
+    from cli.output import note
+    from gaitswarm.jobs.embedded import earlier_job, taken_up
+    from services.optimizer.jobs.job import JobState
+    from services.optimizer.service import JobService
+
+    service, claim = JobService(store), None
+    job = earlier_job(service, spec)
+    if job is None:
+        claim = service.submit_embedded(spec)
+        job = claim.job
+    elif job.state is not JobState.SUCCEEDED:
+        job = taken_up(service, job.id, accept_changes=False)
+    if job.state is JobState.SUCCEEDED:
+        return job
+    note(f"job {job.id}: {spec.name}")
+    if embedded.run(jobs, store, job, claim):
+        note("stopped; the same command goes on")
+        raise KeyboardInterrupt
+    job = store.job(job.id)
+    if job.state is not JobState.SUCCEEDED:
+        raise ended(jobs.job(job.id), jobs.place)
+    return job

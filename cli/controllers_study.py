@@ -1,0 +1,238 @@
+"""PI against Fuzzy-PI, each optimized alike (thesis 3.4): jobs, table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from services.optimizer.analysis.ratio import Interval, median_interval, median_ratio
+from services.optimizer.jobs.preference import figure_of_merit
+from services.optimizer.jobs.tuning import JobSpec
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from services.optimizer.jobs.job import Job
+
+THESIS: Final = {"chapter": 3, "gain_pso_ps": 6.887 / 5.644 - 1.0, "gain_average": 0.20}
+"""How much greater F of the Fuzzy-PI is than that of the PI: table 3.6, and Thesis 5."""
+
+CHAPTERS: Final[Mapping[int, Mapping[str, Any]]] = {
+    3: {
+        "controllers": ("pi", "fuzzy-pi-3"),
+        "scenarios": ("straight",),
+        "preference": "chapter-3",
+        "particles": 40,
+        "iterations": 70,
+    },
+    4: {
+        "controllers": ("pi", "fuzzy-pi"),
+        "scenarios": ("1", "2", "3", "4", "5", "6"),
+        "preference": "A",
+        "particles": 25,
+        "iterations": 25,
+    },
+}
+"""What the thesis optimized: in chapter 3 controller and gait, in chapter 4 the controller."""
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """How much every controller is given; None leaves the chapter's.
+
+    Attributes:
+        seeds: number of runs, whose seeds count from 1.
+        particles: size of the swarm.
+        iterations: of the swarm.
+        optimizer: name of the search's preset.
+    """
+
+    seeds: int
+    particles: int | None
+    iterations: int | None
+    optimizer: str
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """One controller's runs.
+
+    Attributes:
+        controller: its name.
+        specs: of the jobs, one by seed.
+        jobs: those that were run, in the same order; none before.
+    """
+
+    controller: str
+    specs: tuple[JobSpec, ...]
+    jobs: tuple[Job, ...] = ()
+
+    @property
+    def fitness(self) -> list[float]:
+        """Least fitness of every job that has found a design that walks."""
+        found = [job.progress.best_fitness for job in self.jobs]
+        return [fitness for fitness in found if fitness is not None]
+
+    @property
+    def quantity(self) -> str:
+        """What `values` are."""
+        return "F" if self.specs[0].figure_of_merit(1.0) is not None else "f_G"
+
+    @property
+    def values(self) -> list[float]:
+        """F of eq. 3.1 of every job, to be maximized, or its fitness f_G, to be minimized."""
+        preference = self.specs[0].resolved_preference()
+        return [figure_of_merit(fitness, preference) or fitness for fitness in self.fitness]
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """PI and Fuzzy-PI of one chapter on one robot.
+
+    Attributes:
+        chapter: of the thesis.
+        robot: name of the robot that walks.
+        pi: the runs of the PI.
+        fuzzy: the runs of the Fuzzy-PI.
+    """
+
+    chapter: int
+    robot: str
+    pi: Runs
+    fuzzy: Runs
+
+    @property
+    def ratio(self) -> Interval | None:
+        """How many times better the Fuzzy-PI is: fitness of the PI over its own, or F over F."""
+        if not self.pi.fitness or not self.fuzzy.fitness:
+            return None
+        return median_ratio(self.pi.fitness, self.fuzzy.fitness)
+
+
+def comparisons(
+    chapters: Iterable[int], robots: Mapping[str, Any], budget: Budget
+) -> list[Comparison]:
+    """The study's jobs, none of them run yet.
+
+    Args:
+        chapters: keys of `CHAPTERS`.
+        robots: by name, as specs have them.
+        budget: of every job.
+
+    Returns:
+        One comparison for each chapter and robot.
+    """
+    return [
+        Comparison(chapter, name, *(_runs(chapter, c, name, robot, budget) for c in controllers))
+        for chapter in chapters
+        for controllers in [CHAPTERS[chapter]["controllers"]]
+        for name, robot in robots.items()
+    ]
+
+
+def _runs(chapter: int, controller: str, name: str, robot: object, budget: Budget) -> Runs:
+    from pydantic import ValidationError
+
+    from gaitswarm.errors import invalid_request
+    from gaitswarm.specs import with_particles
+
+    study = CHAPTERS[chapter]
+    particles, iterations = (
+        study[field] if given is None else given
+        for field, given in (("particles", budget.particles), ("iterations", budget.iterations))
+    )
+    document = {
+        "robot": robot,
+        "controller": controller,
+        "scenarios": study["scenarios"],
+        "preference": study["preference"],
+        "optimizer": with_particles(budget.optimizer, particles),
+        "iterations": iterations,
+    }
+    specs = []
+    for seed in range(1, budget.seeds + 1):
+        title = f"study of controllers: chapter {chapter}, {controller}, {name}, seed {seed}"
+        try:
+            spec = JobSpec.model_validate({**document, "name": title[:200], "seed": seed})
+        except ValidationError as error:
+            raise invalid_request(error, document) from error
+        specs.append(spec.with_gait_searched() if chapter == 3 else spec)
+    return Runs(controller, tuple(specs))
+
+
+def study_document(found: Sequence[Comparison]) -> dict[str, Any]:
+    """The study as JSON has it.
+
+    Args:
+        found: comparisons whose jobs have been run.
+    """
+    return {
+        "thesis": THESIS,
+        "comparisons": [
+            {
+                "chapter": comparison.chapter,
+                "robot": comparison.robot,
+                "quantity": comparison.pi.quantity,
+                "pi": _runs_document(comparison.pi),
+                "fuzzy": _runs_document(comparison.fuzzy),
+                "ratio": None if comparison.ratio is None else asdict(comparison.ratio),
+            }
+            for comparison in found
+        ],
+    }
+
+
+def _runs_document(runs: Runs) -> dict[str, Any]:
+    return {
+        "controller": runs.controller,
+        "jobs": [job.id for job in runs.jobs],
+        "values": runs.values,
+        **(asdict(median_interval(runs.values)) if runs.values else {"median": None}),
+    }
+
+
+def study_table(found: Sequence[Comparison]) -> Table:
+    """One row for every chapter and robot: medians, the gain, and intervals.
+
+    Args:
+        found: comparisons whose jobs have been run.
+    """
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("chapter")
+    table.add_column("robot", no_wrap=True)
+    for column in ("runs", "PI", "Fuzzy-PI", "Fuzzy-PI's gain"):
+        table.add_column(column, justify="right")
+    for comparison in found:
+        ratio = comparison.ratio
+        table.add_row(
+            f"{comparison.chapter} ({comparison.pi.quantity})",
+            comparison.robot,
+            f"{len(comparison.pi.fitness)} and {len(comparison.fuzzy.fitness)}",
+            *(_median(runs.values) for runs in (comparison.pi, comparison.fuzzy)),
+            "–" if ratio is None else _gain(ratio),
+        )
+    return table
+
+
+def _median(values: list[float]) -> str:
+    from cli.tables import number
+
+    if not values:
+        return "–"
+    found = median_interval(values)
+    if found.low is None:
+        return number(found.median)
+    return f"{number(found.median)} ({number(found.low)} to {number(found.high)})"
+
+
+def _gain(ratio: Interval) -> str:
+    if ratio.low is None or ratio.high is None:
+        return _percent(ratio.median)
+    return f"{_percent(ratio.median)} ({_percent(ratio.low)} to {_percent(ratio.high)})"
+
+
+def _percent(ratio: float) -> str:
+    return f"{100.0 * (ratio - 1.0):+.1f} %"

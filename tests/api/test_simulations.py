@@ -86,7 +86,8 @@ def test_there_is_no_log_unless_asked_for(client: httpx2.Client) -> None:
 
 
 def test_a_walk_that_fails_is_a_result_not_an_error(client: httpx2.Client) -> None:
-    view = simulated(client, scenarios=[{**SHORT_WALK, "load": 50, "cycles": 3}])
+    weak = {**PUBLISHED_A, "FOR": 250.0}
+    view = simulated(client, design=weak, scenarios=[{**SHORT_WALK, "load": 50, "cycles": 3}])
 
     result = view["scenarios"]["short"]
     assert (result["status"], result["explanation"]) == ("fell", Status.FELL.phrase)

@@ -155,7 +155,8 @@ def test_bad_designs_are_statuses_beside_good_ones() -> None:
 
 def test_an_overloaded_robot_falls() -> None:
     crushed = SCENARIOS[0].model_copy(update={"load": 50.0})
-    assert walk(crushed).outcome.statuses.tolist() == [Status.FELL]
+    weak = {**PUBLISHED_A, "FOR": 250.0}
+    assert walk(crushed, weak).outcome.statuses.tolist() == [Status.FELL]
 
 
 def test_every_status_has_a_phrase_and_a_label() -> None:

@@ -17,6 +17,35 @@ pytestmark = pytest.mark.slow
 OBJECTIVES = ("torque", "acceleration", "angular acceleration", "energy", "reciprocal speed")
 
 
+def test_the_preference_of_chapter_3_has_a_sixth_objective_to_weigh(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    ranking = server.client.post(
+        f"/v1/jobs/{finished_job}/ranking", json={"preference": "chapter-3"}
+    ).json()
+    winner = ranking["top"][0]
+    page = visit(server.url).go(f"/jobs/{finished_job}/preferences")
+    sixth = page.get_by_label("bias of height loss, number")
+    expect(page.get_by_label("bias of torque, number")).to_be_visible()
+    expect(sixth).to_have_count(0)
+    page.get_by_role("button", name="chapter-3", exact=True).click()
+    expect(sixth).to_have_value("0.03")
+    expect(page.locator("[data-winner]")).to_have_attribute(
+        "data-winner", f"{winner['iteration']}/{winner['particle']}"
+    )
+    page.get_by_role("link", name="Start a job from here").click()
+    chosen = page.get_by_role("button", name="chapter-3", exact=True)
+    expect(chosen).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="pso-thesis", exact=True).click()
+    page.get_by_label("Name", exact=True).fill("as in chapter 3")
+    page.get_by_role("button", name="Submit the job").click()
+    expect(page.get_by_role("heading", name="as in chapter 3")).to_be_visible()
+    spec = server.job(page.url.rpartition("/")[2])["spec"]
+    assert spec["preference"]["bias"] == [0.0] * 5 + [0.03]
+    assert (spec["optimizer"]["inertia_end"], spec["optimizer"]["particles"]) == (0.9, 8)
+    expect(page.get_by_text("F of eq. 3.1, maximized")).to_be_visible(timeout=30_000)
+
+
 def test_another_preference_ranks_the_history_anew_without_a_walk(
     server: ServerProcess,
     finished_job: str,

@@ -74,6 +74,13 @@ CONVENTIONAL_VARIABLES: Final = (
         description="Efficiency of every gearhead; that of a single joint goes before it.",
     ),
     Variable(
+        name="static_friction",
+        low=0.0,
+        high=1.0,
+        unit="N m",
+        description="Static friction of every gearhead, at its output.",
+    ),
+    Variable(
         name="energy",
         kind="categorical",
         choices=get_args(EnergyConvention),
@@ -183,7 +190,10 @@ def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) ->
         for leg in d.legs
     )
     parts = {
-        "gearheads": {name: changed(gear, "efficiency") for name, gear in d.gearheads.items()},
+        "gearheads": {
+            name: changed(gear, "efficiency", "static_friction")
+            for name, gear in d.gearheads.items()
+        },
         "supply": changed(d.supply, "energy"),
         "sensors": changed(d.sensors, "current_filter"),
         "contact": changed(d.contact, "slip_velocity"),

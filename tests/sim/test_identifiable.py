@@ -170,6 +170,12 @@ def test_the_slip_velocity_is_that_of_every_foot(name: str) -> None:
     assert changed.contacts()[-1].friction == 0.4
 
 
+def test_static_friction_is_that_of_every_gearhead() -> None:
+    robot = with_parameters(load_robot("szabadka2-identified"), {"static_friction": 0.3})
+    assert {gear.static_friction for gear in robot.description.gearheads.values()} == {0.3}
+    assert (robot.actuators().static_friction > 0.0).all()
+
+
 def test_the_current_filter_is_that_of_the_sensors() -> None:
     robot = load_robot("szabadka2")
     d = with_parameters(robot, {"current_filter": 0.004}).description

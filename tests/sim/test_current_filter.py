@@ -38,9 +38,10 @@ def test_a_filters_time_constant_is_that_of_a_first_order_low_pass(robot: Robot)
 
 
 def softer_by_current() -> ControlLaw:
-    """PWM that falls by 3 counts with every 32 counts of current, whatever the error."""
-    values = np.arange(127, -1, -1, dtype=np.int8).reshape(1, 128, 1)
-    table = LookupTable(values, output_gain=3 << 16, error_gain=1, current_gain=1 << 11)
+    """PWM of the error's sign that falls by 3 counts with every 32 counts of current."""
+    soft = np.arange(127, -1, -1, dtype=np.int8)
+    values = np.stack([-soft, soft]).reshape(2, 128, 1)
+    table = LookupTable(values, output_gain=3 << 16, error_gain=1 << 16, current_gain=1 << 11)
     return ControlLaw(proportional_gain=0, integral_gain=0, derivative_gain=0, direct=table)
 
 
@@ -52,16 +53,20 @@ def test_the_controller_reads_the_filtered_absolute_current(robot: Robot, kind: 
     assert kernel is not None
     assert plan is not None
     setup = plan(softer_by_current())
-    setup = dataclasses.replace(setup, desired=setup.desired[:100])
+    # Errors, and with them the currents, change sign every 20 physics steps.
+    side = np.where(np.arange(100) // 20 % 2, -1, 1)[:, None]
+    setup = dataclasses.replace(setup, desired=setup.desired[:100] + 20_000 * side.astype(np.int32))
     coding = dataclasses.replace(Coding.of(robot, 1), current_smoothing=0.1)
     (result,) = kernel.walk([setup], coding, log=True)
     assert result.states is not None
-    current = np.abs(walk_log(robot, setup, result.states).current)
+    signed = walk_log(robot, setup, result.states).current
+    assert signed.min() < -0.1 < 0.1 < signed.max()
+    current = np.abs(signed)
     sensed = np.zeros_like(current)
     for tick in range(1, len(current)):
         sensed[tick] = sensed[tick - 1] + 0.1 * (current[tick - 1] - sensed[tick - 1])
     code = np.floor((np.rint(sensed * 2079.0) + 8.0) / 16.0) * 16.0
-    counts = 3.0 * (127.0 - np.floor(code / 32.0 + 0.5))
+    counts = side * 3.0 * (127.0 - np.floor(code / 32.0 + 0.5))
     duty = result.states[:, -robot.n_joints :]
     np.testing.assert_allclose(duty / coding.duty_per_count, counts, atol=1e-6)
     assert np.ptp(counts) > 100.0

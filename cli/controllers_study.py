@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -193,45 +193,38 @@ def _runs_document(runs: Runs) -> dict[str, Any]:
 
 
 def study_table(found: Sequence[Comparison]) -> Table:
-    """One row for every chapter and robot: medians, the gain, and intervals.
+    """Three rows for every chapter and robot: both controllers' medians, and the gain.
 
     Args:
         found: comparisons whose jobs have been run.
     """
     from rich.table import Table
 
+    from cli.tables import number
+
     table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("chapter")
-    table.add_column("robot", no_wrap=True)
-    for column in ("runs", "PI", "Fuzzy-PI", "Fuzzy-PI's gain"):
-        table.add_column(column, justify="right")
+    for column in ("chapter", "robot", "controller"):
+        table.add_column(column, no_wrap=True)
+    for column in ("runs", "median", "interval"):
+        table.add_column(column, justify="right", no_wrap=True)
     for comparison in found:
-        ratio = comparison.ratio
-        table.add_row(
-            f"{comparison.chapter} ({comparison.pi.quantity})",
-            comparison.robot,
-            f"{len(comparison.pi.fitness)} and {len(comparison.fuzzy.fitness)}",
-            *(_median(runs.values) for runs in (comparison.pi, comparison.fuzzy)),
-            "–" if ratio is None else _gain(ratio),
-        )
+        place = (f"{comparison.chapter} ({comparison.pi.quantity})", comparison.robot)
+        for runs in (comparison.pi, comparison.fuzzy):
+            interval = median_interval(runs.values) if runs.values else None
+            cells = _cells(interval, number)
+            table.add_row(*place, runs.controller, str(len(runs.values)), *cells)
+            place = ("", "")
+        table.add_row(*place, "gain", "", *_cells(comparison.ratio, _percent), style="bold")
     return table
 
 
-def _median(values: list[float]) -> str:
-    from cli.tables import number
-
-    if not values:
-        return "–"
-    found = median_interval(values)
-    if found.low is None:
-        return number(found.median)
-    return f"{number(found.median)} ({number(found.low)} to {number(found.high)})"
-
-
-def _gain(ratio: Interval) -> str:
-    if ratio.low is None or ratio.high is None:
-        return _percent(ratio.median)
-    return f"{_percent(ratio.median)} ({_percent(ratio.low)} to {_percent(ratio.high)})"
+def _cells(interval: Interval | None, written: Callable[[float], str]) -> tuple[str, str]:
+    """Median and interval; a dash for what there is not."""
+    if interval is None:
+        return "–", "–"
+    if interval.low is None or interval.high is None:
+        return written(interval.median), "–"
+    return written(interval.median), f"{written(interval.low)} to {written(interval.high)}"
 
 
 def _percent(ratio: float) -> str:

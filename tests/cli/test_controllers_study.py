@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from cli.controllers_study import Budget, comparisons, study_document, study_table
 from gaitswarm.jobs.embedded import earlier_job
 from services.optimizer.jobs.job import Command, Job
 from services.optimizer.service import JobService
@@ -95,21 +96,35 @@ def test_people_see_the_gain_beside_that_of_the_thesis(gaitswarm: Gaitswarm, db:
     assert "+22 % (table 3.6, PSO-PS) and +20 % on average" in shown.err
 
 
+def test_without_a_design_that_walks_there_is_nothing_to_compare() -> None:
+    budget = Budget(seeds=1, particles=2, iterations=1, optimizer="pso")
+    planned = comparisons([4], {"szabadka2": "szabadka2"}, budget)
+    (document,) = study_document(planned)["comparisons"]
+    assert (document["pi"]["values"], document["pi"]["median"], document["ratio"]) == (
+        [],
+        None,
+        None,
+    )
+    *_, median, interval = study_table(planned).columns
+    assert [*median.cells, *interval.cells] == ["–"] * 6
+
+
 @pytest.fixture
 def service(db: Path) -> Iterator[JobService]:
     with closing(open_store(str(db))) as store:
         yield JobService(store)
 
 
-def test_a_job_that_was_stopped_is_gone_on_with(
+def test_a_study_that_was_stopped_goes_on_where_it_was(
     gaitswarm: Gaitswarm, db: Path, service: JobService
 ) -> None:
-    whole, _ = study(gaitswarm, db, "--seeds", "1", "--chapters", "3")
-    spec = service.job(whole["comparisons"][0]["pi"]["jobs"][0]).spec
-    half, _ = service.submit(spec.model_copy(update={"name": "half", "iterations": 2}))
-    service.command(half.id, Command.PAUSE)
-    found = earlier_job(service, half.spec)
-    assert found is not None and found.id == half.id
+    budget = Budget(seeds=1, particles=2, iterations=1, optimizer="pso-thesis")
+    (planned,) = comparisons([3], {"szabadka2": "szabadka2"}, budget)
+    stopped, _ = service.submit(planned.fuzzy.specs[0])
+    service.command(stopped.id, Command.PAUSE)
+    document, ran = study(gaitswarm, db, "--seeds", "1", "--chapters", "3")
+    assert document["comparisons"][0]["fuzzy"]["jobs"] == [stopped.id]
+    assert ran[1] == stopped.spec.name
 
 
 def test_a_job_is_found_again_by_name_and_spec_unless_it_was_cancelled(

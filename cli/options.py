@@ -44,9 +44,9 @@ RobotOption = Annotated[
     typer.Option(
         "--robot",
         metavar="NAME|JSON|FOLDER",
-        help="Robot by name, szabadka2 (of the datasheet) or szabadka2-identified (of table 2.7), a"
-        ' variant as JSON, such as {"contact_law": "stick", "backlash": [2.5, 1, 1]}, or the folder'
-        " of your own.",
+        help="Robot by name, szabadka2-reconstructed (the default), szabadka2-identified (of table"
+        " 2.7) or szabadka2 (of the datasheet), a variant as JSON, such as"
+        ' {"contact_law": "stick", "backlash": [2.5, 1, 1]}, or the folder of your own.',
     ),
 ]
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from services.optimizer.errors import InvalidRequest
+from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -39,7 +40,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
 def robot_data(text: str | None) -> str | dict[str, Any]:
     """What a spec would hold under `robot`, unchecked. Raises InvalidRequest."""
     if text is None:
-        return "szabadka2"
+        return DEFAULT_ROBOT
     if text.lstrip().startswith("{"):
         try:
             data: dict[str, Any] = json.loads(text)

@@ -27,6 +27,7 @@ from sim.controllers import ControllerName
 from sim.kernel.observation import WalkLog
 from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.provenance import provenance_of
+from sim.robot import DEFAULT_ROBOT
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate as simulate_walk
 
@@ -55,7 +56,7 @@ def simulate(
     *,
     scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
     controller: ControllerName = "fuzzy-pi",
-    robot: RobotInput = "szabadka2",
+    robot: RobotInput = DEFAULT_ROBOT,
     preference: PreferenceInput = "A",
     log: bool = False,
     backend: Backend = "auto",

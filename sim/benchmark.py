@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.assembly import PHYSICS_RATE, Backend
 from sim.controllers import CONTROLLERS
+from sim.robot import DEFAULT_ROBOT
 from sim.scenario import SCENARIOS
 from sim.simulate import lanes, prepare, simulate
 
@@ -41,7 +42,7 @@ def measure(
     repeats: int = 3,
     walkers: int = 24,
     backend: Backend = "auto",
-    robot: str = "szabadka2",
+    robot: str = DEFAULT_ROBOT,
 ) -> BenchmarkResult:
     """Time whole walks (control, physics, objectives) of the six scenarios in this thread.
 

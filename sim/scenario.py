@@ -88,16 +88,16 @@ class Scenario(BaseModel):
         description="Where the ground rises, from straight ahead towards the left [deg].",
     )
     stride: float = Field(
-        default=0.16,
+        default=0.06,
         gt=0.0,
         le=1.0,
         description="Length of a foot's stroke on the ground [m].",
     )
     height: float = Field(
-        default=0.03,
+        default=0.035,
         ge=0.0,
         le=0.5,
-        description="Height of the swing half-ellipse [m].",
+        description="Height of the swing [m].",
     )
     duty_factor: float = Field(
         default=0.56,
@@ -128,7 +128,7 @@ class Scenario(BaseModel):
         description="Rate at which the desired angles are updated [Hz].",
     )
     curve: Literal["half_ellipse", "quadratic_spline"] = Field(
-        default="half_ellipse", description="Shape of the swing; the spline is that of 2011."
+        default="quadratic_spline", description="Shape of the swing; the spline is appendix .2.1's."
     )
     cycles: float = Field(
         default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."
@@ -137,7 +137,8 @@ class Scenario(BaseModel):
         default=None,
         min_length=1,
         max_length=60,
-        description="Name of the leg whose coxa is jammed at its first angle; by default none.",
+        description="Name of the leg whose joints are jammed at their first angles; none by"
+        " default.",
         examples=["right_middle"],
     )
     drop: float = Field(
@@ -206,6 +207,12 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         high=0.95,
         unit="1",
         description="Share of the cycle at which the gait begins: which legs swing first.",
+    ),
+    Variable(
+        name="curve",
+        kind="categorical",
+        choices=("quadratic_spline", "half_ellipse"),
+        description="Shape of the swing.",
     ),
     Variable(
         name="fir_ms",

@@ -27,7 +27,7 @@ from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Coding, WalkSetup
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
-from sim.robot import Robot, RobotChoice, load_robot
+from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
 from sim.robot.robot import with_shafts
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
 
@@ -54,7 +54,7 @@ def simulate(
     variables: Sequence[str],
     designs: NDArray[np.float64],
     *,
-    robot: RobotChoice = "szabadka2",
+    robot: RobotChoice = DEFAULT_ROBOT,
     planner: Robot | None = None,
     noise: LinkNoise | None = None,
     log: bool = False,
@@ -153,7 +153,7 @@ def check_reach(
     require_reachable(machine, with_gait(scenario, gait))
 
 
-def prepare(robot: RobotChoice = "szabadka2", *, backend: Backend = "auto") -> str:
+def prepare(robot: RobotChoice = DEFAULT_ROBOT, *, backend: Backend = "auto") -> str:
     """Build a robot's kernel, or find it in the cache.
 
     Args:

@@ -40,6 +40,7 @@ from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
+from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
 
@@ -254,7 +255,7 @@ class AsyncDatabaseJobs(AsyncJobs):
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         log: bool = False,
     ) -> SimulationResult:
@@ -277,7 +278,7 @@ class AsyncDatabaseJobs(AsyncJobs):
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let a design walk in a thread of this process, to look at it."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self, Unpack
 from gaitswarm.jobs.port import JobEvent
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from sim.controllers import ControllerName
+from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
     from gaitswarm.simulation_result import SimulationResult
@@ -167,7 +168,7 @@ class AsyncJobs(ABC):
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         log: bool = False,
     ) -> SimulationResult:
@@ -180,7 +181,7 @@ class AsyncJobs(ABC):
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let one design walk, to look at it: where every link is, frame by frame."""

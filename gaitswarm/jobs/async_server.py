@@ -55,6 +55,7 @@ from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
+from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
@@ -225,7 +226,7 @@ class AsyncServerJobs(AsyncJobs):
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         log: bool = False,
     ) -> SimulationResult:
@@ -246,7 +247,7 @@ class AsyncServerJobs(AsyncJobs):
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let a design walk on the server, to look at it."""

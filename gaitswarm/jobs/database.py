@@ -46,6 +46,7 @@ from services.optimizer.service import JobService
 from services.runtime import EvaluatorKind
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
+from sim.robot import DEFAULT_ROBOT
 
 POLL_SECONDS: Final = 0.5
 """How often a job that is followed is looked at [s]."""
@@ -287,7 +288,7 @@ class DatabaseJobs(Jobs):
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         log: bool = False,
     ) -> SimulationResult:
@@ -309,7 +310,7 @@ class DatabaseJobs(Jobs):
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let a design walk in this process, to look at it."""

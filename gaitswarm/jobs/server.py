@@ -54,6 +54,7 @@ from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
+from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
@@ -220,7 +221,7 @@ class ServerJobs(Jobs):
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         log: bool = False,
     ) -> SimulationResult:
@@ -241,7 +242,7 @@ class ServerJobs(Jobs):
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let a design walk on the server, to look at it."""

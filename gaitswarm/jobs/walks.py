@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from sim.controllers import ControllerName
+from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
     from gaitswarm.simulation_result import SimulationResult
@@ -25,7 +26,7 @@ class Walks(ABC):
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         log: bool = False,
     ) -> SimulationResult:
@@ -57,7 +58,7 @@ class Walks(ABC):
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = "szabadka2",
+        robot: RobotInput = DEFAULT_ROBOT,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let one design walk, to look at it: where every link is, frame by frame.

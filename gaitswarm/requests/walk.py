@@ -14,7 +14,7 @@ from services.optimizer.jobs.preference import PREFERENCES, Preference, Preferen
 from sim.assembly import Backend
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
-from sim.robot import RobotSource
+from sim.robot import DEFAULT_ROBOT, RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
 from sim.simulate import check_reach, simulate
 from sim.variables import VariableName
@@ -28,7 +28,7 @@ class WalkRequest(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     robot: RobotSource = Field(
-        default="szabadka2",
+        default=DEFAULT_ROBOT,
         description="Robot to simulate, by name, or a variant with another law of friction or with"
         " backlash, or the text of the files of your own.",
     )

@@ -29,7 +29,7 @@ LARGE_BEGINS: Final = Variable(
     name="large_begins",
     low=0.0,
     high=0.9,
-    default=0.5,
+    default=0.1,
     description="Share of the current's range from which a current is large.",
 )
 SMALL_ENDS: Final = Variable(

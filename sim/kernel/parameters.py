@@ -21,7 +21,7 @@ GRAVITY = 9.81
 """[m/s2], table 5."""
 
 JAM_STIFFNESS: Final = 2000.0
-"""Of the obstacle that holds a jammed coxa [N m/rad]: a stalled motor moves it by 0.3 degrees."""
+"""Of the obstacle that holds a jammed joint [N m/rad]: a stalled coxa moves it by 0.3 degrees."""
 
 JAM_DAMPING: Final = 10.0
 """Of the same [N m s/rad]: about half of what damps a coxa's rotor on it critically."""
@@ -75,10 +75,10 @@ class Layout:
 
     field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
-    supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every coxa
-    (L each), backlash (J, if the robot has any) and displaced (1, likewise: whether disturbances
-    are angles), static_friction (J, if the robot has any), and by
-    foot (L each) the parameters of the contact law.
+    supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every
+    joint (J each), backlash (J, if the robot has any) and displaced (1, likewise: whether
+    disturbances are angles), static_friction (J, if the robot has any), and by foot (L each) the
+    parameters of the contact law.
 
     Args:
         robot: The robot.
@@ -100,9 +100,9 @@ class Layout:
             "viscous": n_joints,
             "supply_voltage": 1,
             "supply_resistance": 1,
-            "jam_stiffness": n_feet,
-            "jam_damping": n_feet,
-            "jam_angle": n_feet,
+            "jam_stiffness": n_joints,
+            "jam_damping": n_joints,
+            "jam_angle": n_joints,
             "backlash": n_joints if robot.has_backlash else 0,
             "displaced": 1 if robot.has_backlash else 0,
             "static_friction": n_joints if robot.has_static_friction else 0,
@@ -172,7 +172,7 @@ def pack_parameters(
         robot: The robot.
         scenario: Its load and slope count.
         timestep: Of the physics [s].
-        start: Angles at which the walk begins, where a jammed coxa is held, (J,) [rad]; zero if
+        start: Angles at which the walk begins, where a jammed leg is held, (J,) [rad]; zero if
             left out.
         displaced: Whether disturbances are angles between gearheads and links [rad], not torques.
 
@@ -186,7 +186,8 @@ def pack_parameters(
         raise SimulationInputError(
             "noise: an angle between gearhead and link needs a robot with elastic_shafts"
         )
-    jammed = np.array([leg.name == scenario.stuck_leg for leg in robot.legs], dtype=np.float64)
+    stuck = np.array([leg.name == scenario.stuck_leg for leg in robot.legs], dtype=np.float64)
+    jammed = np.repeat(stuck, JOINTS_PER_LEG)
     angles = np.zeros(robot.n_joints) if start is None else start
     d, body = robot.description, robot.body
     actuators, contacts = robot.actuators(), robot.contacts()
@@ -209,7 +210,7 @@ def pack_parameters(
         supply_resistance=d.supply.resistance,
         jam_stiffness=JAM_STIFFNESS * jammed,
         jam_damping=JAM_DAMPING * jammed,
-        jam_angle=angles[::JOINTS_PER_LEG] * jammed,
+        jam_angle=angles * jammed,
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         displaced=float(displaced) if robot.has_backlash else np.empty(0),
         static_friction=(actuators.static_friction if robot.has_static_friction else np.empty(0)),

@@ -37,7 +37,6 @@ from sim.kernel.spatial import (
     vector,
 )
 from sim.robot import Robot
-from sim.robot.description import JOINTS_PER_LEG
 
 INTEGRANDS: Final = (
     "torque",
@@ -297,15 +296,14 @@ def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
 
 
 def _with_obstacles(torques: Sequence[Scalar], s: _Symbols) -> list[Scalar]:
-    """Torques on the links with those of jams at the coxae, which no gearhead passes on."""
-    blocked = list(torques)
-    for leg, (stiffness, damping, angle) in enumerate(
-        zip(s.p["jam_stiffness"], s.p["jam_damping"], s.p["jam_angle"], strict=True)
-    ):
-        joint = leg * JOINTS_PER_LEG
-        held = stiffness * (s.q[7 + joint] - angle) + damping * s.v[6 + joint]
-        blocked[joint] = blocked[joint] - held
-    return blocked
+    """Torques on the links with those of a jammed leg's obstacle, which no gearhead passes on."""
+    jams = zip(s.p["jam_stiffness"], s.p["jam_damping"], s.p["jam_angle"], strict=True)
+    return [
+        torque - (stiffness * (q - angle) + damping * v)
+        for torque, q, v, (stiffness, damping, angle) in zip(
+            torques, s.q[7:], s.v[6:], jams, strict=True
+        )
+    ]
 
 
 def _feet(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.robot.robot import Robot, parse_robot
-from sim.robot.shipped import SHIPPED, RobotName
+from sim.robot.shipped import DEFAULT_ROBOT, SHIPPED, RobotName
 from sim.robot.variant import (
     RobotChoice,
     RobotFiles,
@@ -13,6 +13,7 @@ from sim.robot.variant import (
 )
 
 __all__ = [
+    "DEFAULT_ROBOT",
     "SHIPPED",
     "Robot",
     "RobotChoice",

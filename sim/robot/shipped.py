@@ -12,8 +12,11 @@ from sim.errors import SimulationInputError
 from sim.robot.identifiable import with_parameters
 from sim.robot.robot import Robot, parse_robot
 
-RobotName = Literal["szabadka2", "szabadka2-identified"]
+RobotName = Literal["szabadka2", "szabadka2-identified", "szabadka2-reconstructed"]
 """Robots that ship with gaitswarm."""
+
+DEFAULT_ROBOT: Final[RobotName] = "szabadka2-reconstructed"
+"""The robot that walks where none is named: the one that published results speak of."""
 
 SHIPPED: Final[tuple[RobotName, ...]] = get_args(RobotName)
 

@@ -14,7 +14,7 @@ from sim.choice import NAME, alternatives
 from sim.former_names import current_names
 from sim.robot.description import Actuator, ContactLaw, Leg, PlannedSoles
 from sim.robot.robot import Robot, parse_robot
-from sim.robot.shipped import RobotName, shipped_robot
+from sim.robot.shipped import DEFAULT_ROBOT, RobotName, shipped_robot
 
 Degrees = tuple[float, float, float]
 
@@ -24,7 +24,7 @@ class RobotVariant(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    name: RobotName = Field(default="szabadka2", description="Robot to start from.")
+    name: RobotName = Field(default=DEFAULT_ROBOT, description="Robot to start from.")
     contact_law: ContactLaw | None = Field(
         default=None,
         description="How soles rub: linear_zone, karnopp, stick or dead_zone; null is the robot's"

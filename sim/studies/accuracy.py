@@ -19,7 +19,7 @@ from sim.kernel.reference import reference_kernel
 from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status
-from sim.robot import RobotChoice, load_robot
+from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
 from sim.robot.robot import with_shafts
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate
@@ -68,7 +68,7 @@ def tables_against_inference(
     design: Mapping[str, float],
     scenarios: Sequence[Scenario] = SCENARIOS,
     *,
-    robot: RobotChoice = "szabadka2",
+    robot: RobotChoice = DEFAULT_ROBOT,
 ) -> tuple[Deviation, ...]:
     """A Fuzzy-PI's tables of several resolutions against 64-bit inference (section 5.3).
 
@@ -104,7 +104,7 @@ def step_halving(
     design: Mapping[str, float],
     scenarios: Sequence[Scenario] = SCENARIOS,
     *,
-    robot: RobotChoice = "szabadka2",
+    robot: RobotChoice = DEFAULT_ROBOT,
 ) -> tuple[Deviation, ...]:
     """Physics at 5, 10 and 20 kHz against 40 kHz.
 
@@ -133,7 +133,7 @@ def noise_on_links(
     design: Mapping[str, float],
     scenarios: Sequence[Scenario] = SCENARIOS[:1],
     *,
-    robot: RobotChoice = "szabadka2",
+    robot: RobotChoice = DEFAULT_ROBOT,
     kind: NoiseKind = "angle",
     deviation: float | None = None,
     seed: int = 1,

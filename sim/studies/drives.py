@@ -13,7 +13,7 @@ from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.gait.driving_2011 import driven_as_in_2011
 from sim.outcome import Status
-from sim.robot import RobotChoice
+from sim.robot import DEFAULT_ROBOT, RobotChoice
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
 from sim.simulate import simulate
 
@@ -121,7 +121,7 @@ def compare(
     drives: Sequence[NamedDrive],
     scenarios: Sequence[Scenario],
     *,
-    robot: RobotChoice = "szabadka2",
+    robot: RobotChoice = DEFAULT_ROBOT,
 ) -> tuple[WalkFigures, ...]:
     """Every drive in every scenario.
 
@@ -139,7 +139,7 @@ def compare(
 
 
 def walk_figures(
-    drive: NamedDrive, scenario: Scenario, *, robot: RobotChoice = "szabadka2"
+    drive: NamedDrive, scenario: Scenario, *, robot: RobotChoice = DEFAULT_ROBOT
 ) -> WalkFigures:
     """Let one drive walk. Power is energy per metre times speed.
 

@@ -27,7 +27,7 @@ NEXT = {"coxa": "femur", "femur": "tibia", "tibia": "sole"}
 """The joint at a link's far end, to which X points."""
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
-"""From right to left."""
+"""From left to right."""
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def vector_of(leg: str, part: str, tag: str) -> Floats:
 
 
 def axes_of_table_3(leg: str, part: str) -> Floats:
-    """Rotation from a right leg's frame of table 3 to the link's in the URDF, (3, 3)."""
+    """Rotation from a left leg's frame of table 3 to the link's in the URDF, (3, 3)."""
     along = vector_of(leg, NEXT[part], "origin")
     x, z = along / np.linalg.norm(along), vector_of(leg, HINGE[part], "axis")
     return np.column_stack((x, np.cross(z, x), z))
@@ -52,8 +52,8 @@ def axes_of_table_3(leg: str, part: str) -> Floats:
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_links_are_those_of_table_3_about_their_hinges(side: str, row: str, part: str) -> None:
     mass, centre, (xx, yy, zz, xy, yz, xz) = TABLE_3[part]
-    turn = axes_of_table_3(f"right_{row}", part)
-    if side == "left":
+    turn = axes_of_table_3(f"left_{row}", part)
+    if side == "right":
         turn = MIRROR @ turn
     inertia = load_robot("szabadka2").urdf.links[f"{side}_{row}_{part}_link"].inertia
     assert inertia.mass == mass

@@ -26,7 +26,7 @@ from sim.case import Case
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 from sim.outcome import Objective, Outcome, Status
-from sim.robot import RobotSource, load_robot
+from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from sim.variables import VariableChoice, VariableName, VariableValue
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Spec(BaseModel):
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
     name: str = Field(default="", max_length=200, description="For people; need not be unique.")
     robot: RobotSource = Field(
-        default="szabadka2",
+        default=DEFAULT_ROBOT,
         description="Robot to simulate, by name, or a variant with another law of friction or with"
         " backlash, or the text of the files of your own.",
     )

@@ -33,7 +33,7 @@ export async function resolveDesign(
   return {
     source,
     label: 'Design of your own',
-    robot: 'szabadka2',
+    robot: 'szabadka2-reconstructed',
     controller,
     design: source.design,
     scenarios: [],
@@ -112,7 +112,7 @@ function published(
     return {
       source: exact,
       label: `Published ${study}, ${controller.name}`,
-      robot: 'szabadka2',
+      robot: 'szabadka2-reconstructed',
       controller,
       design,
       scenarios: [],

@@ -23,6 +23,7 @@ from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
 from api.routes import (
     analysis,
+    calibration,
     catalogue,
     events,
     health,
@@ -82,6 +83,7 @@ def create_app(
         history,
         events,
         analysis,
+        calibration,
         identification,
         simulations,
         catalogue,

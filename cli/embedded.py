@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from cli.exit_codes import JobEnded
 from cli.output import note, print_json, stdout_console
 from cli.progress import show_progress
+from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.embedded import check_same, taken_up
+from gaitswarm.jobs.open import database_to_write
+from gaitswarm.settings import read_settings
 from services.optimizer.jobs.job import JobState
-from services.runtime import open_evaluator, run_embedded, stop_on_signals
+from services.optimizer.service import JobService
+from services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
 
 if TYPE_CHECKING:
+    from cli.options import WorkerOptions
     from cli.progress import Progress
-    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.settings import Settings
     from gaitswarm.views import JobView
+    from services.optimizer.jobs.documents import AnySpec
     from services.optimizer.jobs.job import Claim, CompletedIteration, Iteration, Job
     from services.optimizer.jobs.spec import Spec
     from services.optimizer.run.evaluator import Evaluator
-    from services.optimizer.service import JobService
     from services.optimizer.store.base import Store
 
 
@@ -117,6 +124,37 @@ class Embedded:
                 progress.remark("connecting to Ray" if address else "starting Ray")
             self._evaluator = open_evaluator(kind, address=address, cpus=self._settings.cpus)
         return self._evaluator
+
+
+def run_seeds(
+    specs: Sequence[AnySpec],
+    workers: WorkerOptions,
+    report: Callable[[DatabaseJobs, list[str]], None],
+    *,
+    again: str,
+) -> None:
+    """Run jobs of one problem, one after the other, and report on all of them.
+
+    report: prints what they say together. again: the command that does, for who interrupts it.
+    """
+    settings = read_settings(**asdict(workers))
+    url = database_to_write(settings)
+    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
+        service = JobService(store)
+        jobs = DatabaseJobs(service, url)
+        submitted = [service.submit(spec)[0] for spec in specs]
+        ids = [job.id for job in submitted]
+        for number, job in enumerate(submitted, start=1):
+            note(f"run {number} of {len(specs)}: job {job.id} in database {url}")
+            if embedded.run(jobs, store, job):
+                rest = [f"  gaitswarm optimize --resume {i}{jobs.place}" for i in ids[number - 1 :]]
+                last = f"  gaitswarm {again} {' '.join(ids)}{jobs.place}"
+                note("\n".join(["stopped; go on with", *rest, last]))
+                raise KeyboardInterrupt
+            ended = store.job(job.id)
+            if ended.state is not JobState.SUCCEEDED:
+                note(f"job {job.id} is {ended.state}: {ended.error or 'no reason was given'}")
+        report(jobs, ids)
 
 
 def finish(

@@ -15,6 +15,7 @@ import typer
 
 from cli.commands import (
     bench,
+    calibrate,
     compare,
     export,
     history,
@@ -59,6 +60,7 @@ for _module in (
     validate,
     synthesize,
     identify,
+    calibrate,
 ):
     _module.register(app)
 

@@ -53,6 +53,8 @@ def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> 
     from rich.table import Table
     from rich.text import Text
 
+    from cli.tables import number
+
     title = "Fitted parameters; widths of their intervals in % of the range searched"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("parameter", no_wrap=True)
@@ -67,8 +69,8 @@ def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> 
         table.add_row(
             p.name,
             p.unit,
-            _shown(p.best),
-            *([_shown(truth.get(p.name))] if truth else []),
+            number(p.best),
+            *([number(truth.get(p.name))] if truth else []),
             *(f"{100 * _width(found, p, threshold):.0f}" for threshold in _SHOWN),
             Text(p.trust or "one run", style=_STYLES.get(p.trust or "", "")),
         )
@@ -106,13 +108,6 @@ def draw_parameters(found: IdentifiabilityView, truth: Mapping[str, float]) -> F
         axes.set_visible(False)
     figure.supxlabel("fitness within so many percent of its run's best", fontsize=8)
     return figure
-
-
-def _shown(value: float | str | None) -> str:
-    """A number, or the name of a choice."""
-    from cli.tables import number
-
-    return value if isinstance(value, str) else number(value)
 
 
 def _height(p: ParameterView, value: float | str) -> float:

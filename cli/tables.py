@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.provenance import JobProvenance
     from services.optimizer.jobs.spec import Spec
     from sim.outcome import Objective
+    from sim.variables import Variable
 
 MISSING: Final = "–"
 
@@ -75,7 +76,7 @@ def iterations_table(iterations: Iterable[IterationView]) -> Table:
     return table
 
 
-def design_table(spec: Spec, designs: Mapping[str, Mapping[str, float]]) -> Table:
+def design_table(spec: Spec, designs: Mapping[str, Mapping[str, float | str]]) -> Table:
     """Variables as rows, designs as columns, with unit and bounds."""
     table = Table(title="Design", title_justify="left", box=None, padding=(0, 2, 0, 0))
     table.add_column("variable")
@@ -90,10 +91,19 @@ def design_table(spec: Spec, designs: Mapping[str, Mapping[str, float]]) -> Tabl
         table.add_row(
             name,
             *(number(design.get(name)) for design in designs.values()),
-            "fixed" if variable is None else f"{variable.low:g} – {variable.high:g}",
+            _range(variable),
             "" if variable is None else variable.unit,
         )
     return table
+
+
+def _range(variable: Variable | None) -> str:
+    """Bounds of the search, or the choices; None for what is fixed."""
+    if variable is None:
+        return "fixed"
+    if variable.kind == "categorical":
+        return ", ".join(variable.choices)
+    return f"{variable.low:g} – {variable.high:g}"
 
 
 def results_table(
@@ -217,8 +227,10 @@ def provenance_line(provenance: JobProvenance) -> str:
     )
 
 
-def number(value: float | None, digits: int = 4) -> str:
-    """As many significant digits, or all before the decimal point."""
+def number(value: float | str | None, digits: int = 4) -> str:
+    """As many significant digits, or all before the decimal point; a choice's name as it is."""
+    if isinstance(value, str):
+        return value
     if value is None:
         return MISSING
     return f"{value:.0f}" if 10.0**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"

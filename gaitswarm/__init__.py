@@ -55,14 +55,17 @@ if TYPE_CHECKING:
         RankingView,
         StateView,
     )
+    from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.surface import SurfaceView
+    from services.optimizer.jobs.calibration import CalibrationSpec
     from services.optimizer.jobs.identification import IdentificationSpec
     from services.optimizer.jobs.preference import PREFERENCES, Preference
     from services.optimizer.jobs.tuning import JobSpec
     from services.optimizer.run.coordinator import Backoff
     from services.optimizer.search.pso import PsoSettings
+    from sim.calibration.targets import Target, TargetWalk
     from sim.controllers import CONTROLLERS
     from sim.identification.recorded_walk import RecordedWalk
     from sim.kernel.observation import WalkLog
@@ -85,6 +88,7 @@ __all__ = [
     "AsyncServerJobs",
     "Backoff",
     "BestView",
+    "CalibrationSpec",
     "Conflict",
     "DatabaseJobs",
     "EvaluationTable",
@@ -124,6 +128,9 @@ __all__ = [
     "StoreUnavailable",
     "SurfaceView",
     "Table",
+    "Target",
+    "TargetWalk",
+    "TargetsView",
     "Unavailable",
     "Unreadable",
     "Variable",
@@ -160,15 +167,18 @@ _MODULES: Final = {
         "BestView", "EvaluationView", "HistoryIterationView", "IterationView", "JobSummaryView",
         "JobView", "RankingView", "StateView",
     ),
+    "gaitswarm.views.calibration": ("TargetsView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.surface": ("SurfaceView",),
+    "services.optimizer.jobs.calibration": ("CalibrationSpec",),
     "services.optimizer.jobs.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.tuning": ("JobSpec",),
     "services.optimizer.search.pso": ("PsoSettings",),
     "services.optimizer.run.coordinator": ("Backoff",),
     "sim.controllers": ("CONTROLLERS",),
+    "sim.calibration.targets": ("Target", "TargetWalk"),
     "sim.identification.recorded_walk": ("RecordedWalk",),
     "sim.kernel.observation": ("WalkLog",),
     "sim.outcome": ("MEASUREMENTS", "OBJECTIVES", "Status"),

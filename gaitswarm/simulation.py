@@ -23,7 +23,8 @@ from services.optimizer.run.evaluator import EvaluationRequest
 from services.runtime import open_evaluator
 from sim.assembly import Backend
 from sim.case import MeasuredWalk
-from sim.controllers import ControllerName
+from sim.catalogue import design_catalogue
+from sim.controllers import CONTROLLERS, ControllerName
 from sim.kernel.observation import WalkLog
 from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.provenance import provenance_of
@@ -47,7 +48,7 @@ class Columns(Protocol):
         """One column: a number, or one number a design."""
 
 
-DesignInput: TypeAlias = Columns | Sequence[Mapping[str, float]]
+DesignInput: TypeAlias = Columns | Sequence[Mapping[str, float | str]]
 """One design or many."""
 
 
@@ -89,7 +90,7 @@ def simulate(
         InvalidRequest: An argument makes no sense; names it.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    columns = _columns(designs)
+    columns = _columns(designs, controller)
     variables = tuple(columns)
     rows = np.stack(list(columns.values()), axis=1)
     request = arguments.simulation(
@@ -122,15 +123,15 @@ def simulate_request(request: SimulationRequest) -> SimulationResult:
         InvalidRequest: The design cannot be compiled, or a gait leaves the legs' reach.
     """
     request.check_walks()
-    design = np.array([tuple(request.design.values())], dtype=np.float64)
+    design = np.array([tuple(request.numbers.values())], dtype=np.float64)
     with simulation_errors("design"):
         return _simulated(request, tuple(request.design), design, "auto", None)
 
 
-def _columns(designs: DesignInput) -> dict[str, Floats]:
+def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floats]:
     """(n,) values by variable. Raises InvalidRequest."""
     try:
-        found = _by_variable(designs)
+        found = _indexed(_by_variable(designs), controller)
         arrays = [np.atleast_1d(np.asarray(values, np.float64)) for values in found.values()]
         columns = np.broadcast_arrays(*arrays)
     except (TypeError, ValueError, AttributeError, KeyError) as error:
@@ -144,6 +145,17 @@ def _columns(designs: DesignInput) -> dict[str, Floats]:
     if columns[0].ndim > 1:
         raise InvalidRequest("values of a variable must have one axis", field="designs")
     return dict(zip(found, columns, strict=True))
+
+
+def _indexed(columns: dict[str, ArrayLike], controller: ControllerName) -> dict[str, ArrayLike]:
+    """Indices in place of names of choices. Raises ValueError."""
+    known = design_catalogue(controller) if controller in CONTROLLERS else {}
+    found = dict(columns)
+    for name, values in columns.items():
+        given = np.asarray(values)
+        if name in known and known[name].kind == "categorical" and given.dtype.kind in "UO":
+            found[name] = [known[name].number(value) for value in np.atleast_1d(given).tolist()]
+    return found
 
 
 def _by_variable(designs: DesignInput) -> dict[str, ArrayLike]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gaitswarm.tables import Table
 from gaitswarm.views import SimulationView
 from services.optimizer.jobs.preference import Preference, figure_of_merit
+from sim.catalogue import design_numbers
 from sim.kernel.observation import WalkLog
 from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
 from sim.robot import RobotSource
@@ -100,7 +101,7 @@ class SimulationResult:
             controller=view.controller,
             preference=view.preference,
             variables=tuple(view.design),
-            designs=np.array([list(view.design.values())], dtype=np.float64),
+            designs=np.array([list(design_numbers(view.controller, view.design).values())]),
             scenarios=tuple(view.scenarios),
             statuses=np.array([[Status.from_label(r.status) for r in results]], dtype=np.uint8),
             objectives=np.array(values, dtype=np.float64),

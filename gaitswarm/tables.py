@@ -1,7 +1,8 @@
 """Results as tables: by column as numpy arrays, and as files in CSV or Parquet.
 
-A table of evaluations has the columns iteration, particle, fitness; `design.<variable>`; and for
-every case `<case>.status`, `<case>.utility` and `<case>.<objective>`. What does not exist is NaN in
+A table of evaluations has the columns iteration, particle, fitness; `design.<variable>`, a number,
+or the name of a categorical variable's choice; and for every case `<case>.status`, `<case>.utility`
+and `<case>.<objective>`. What does not exist is NaN in
 an array, null in Arrow, Parquet and pandas, and empty in CSV; floats are exact to the bit.
 """
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.spec import Spec
 from sim.outcome import Status
+from sim.variables import Variable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,7 +123,8 @@ class EvaluationTable(Table):
             spec: Spec of the job.
         """
         super().__init__(columns)
-        self.variables = spec.design_space().names
+        self._known = spec.design_space().columns
+        self.variables = tuple(variable.name for variable in self._known)
         self.cases = spec.case_names
         self.objective_names = tuple(objective.name for objective in spec.objectives)
 
@@ -169,8 +172,8 @@ class EvaluationTable(Table):
 
     @property
     def designs(self) -> Floats:
-        """(r, v) values of the variables, in their units."""
-        return self._stacked([f"design.{name}" for name in self.variables])
+        """(r, v) values of the variables, in their units; of categorical ones the indices."""
+        return np.stack([self._numbers(variable) for variable in self._known], axis=1)
 
     @property
     def objectives(self) -> Floats:
@@ -187,6 +190,12 @@ class EvaluationTable(Table):
     def statuses(self) -> NDArray[np.str_]:
         """(r, K) how each case ended: `ok`, or in which way it failed."""
         return np.stack([self[f"{case}.status"] for case in self.cases], axis=1)
+
+    def _numbers(self, variable: Variable) -> Floats:
+        column = self[f"design.{variable.name}"]
+        if variable.kind != "categorical":
+            return column
+        return np.array([variable.number(name) for name in column.tolist()], dtype=np.float64)
 
     def _stacked(self, names: list[str]) -> Floats:
         return np.stack([self[name] for name in names], axis=1)
@@ -223,8 +232,8 @@ def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
         "particle": rows.particle,
         "fitness": _finite(rows.fitness),
     }
-    for name, design in zip(spec.design_space().names, rows.designs.T, strict=True):
-        columns[f"design.{name}"] = _finite(design)
+    for variable, design in zip(spec.design_space().columns, rows.designs.T, strict=True):
+        columns[f"design.{variable.name}"] = _shown(variable, design)
     utilities = spec.judge(rows.objectives, rows.failed).utilities
     for k, case in enumerate(spec.case_names):
         columns[f"{case}.status"] = _LABELS[rows.statuses[:, k]]
@@ -232,6 +241,13 @@ def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
         for objective, values in zip(spec.objectives, rows.objectives[:, k].T, strict=True):
             columns[f"{case}.{objective.name}"] = _finite(values)
     return columns
+
+
+def _shown(variable: Variable, column: Floats) -> Column:
+    """Values of a variable; of a categorical one the names of choices."""
+    if variable.kind != "categorical":
+        return _finite(column)
+    return np.array(variable.choices)[column.astype(np.intp)]
 
 
 _LABELS: Final = np.array([status.label for status in sorted(Status)])
@@ -266,7 +282,7 @@ def _numpy(column: pa.ChunkedArray) -> Column:
     import pyarrow as pa
 
     if pa.types.is_string(column.type):
-        return np.array(column.to_pylist(), dtype=_LABELS.dtype)
+        return np.array(column.to_pylist(), dtype=np.str_)
     # Null becomes NaN.
     return np.asarray(column.to_numpy())
 

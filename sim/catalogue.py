@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sim.controllers import CONTROLLERS, ControllerName
+from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.scenario import GAIT_VARIABLES
 from sim.variables import Variable
 
 
-def design_catalogue(controller: ControllerName) -> dict[str, Variable]:
+def design_catalogue(controller: str) -> dict[str, Variable]:
     """Everything that a design of a controller may give.
 
     Args:
@@ -19,14 +19,12 @@ def design_catalogue(controller: ControllerName) -> dict[str, Variable]:
     Returns:
         The controller's variables and conventions and the gait's variables, by name.
     """
-    family = CONTROLLERS[controller]
+    family = CONTROLLERS[controller]  # type: ignore[index]
     known = (*family.variables, *family.conventions, *GAIT_VARIABLES)
     return {variable.name: variable for variable in known}
 
 
-def design_numbers(
-    controller: ControllerName, design: Mapping[str, float | str]
-) -> dict[str, float]:
+def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[str, float]:
     """A design as the simulator takes it.
 
     Args:
@@ -51,7 +49,7 @@ def design_numbers(
     return numbers
 
 
-def design_shown(controller: ControllerName, design: Mapping[str, float]) -> dict[str, float | str]:
+def design_shown(controller: str, design: Mapping[str, float]) -> dict[str, float | str]:
     """A design as people read it; the inverse of `design_numbers`.
 
     Args:

@@ -62,6 +62,7 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.errors import InvalidRequest
     from services.optimizer.jobs.tuning import JobSpec
+    from sim.catalogue import design_numbers
     from sim.controllers import CONTROLLERS
     from sim.studies.drives import drive_of_design, find_drive
 
@@ -73,7 +74,9 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
             job, best = jobs.job(what), jobs.best(what)
         if not isinstance(job.spec, JobSpec):
             raise InvalidRequest(f"job {what} fits parameters, it tunes no drive", field="drive")
-        return drive_of_design(name, job.spec.controller, best.design)
+        return drive_of_design(
+            name, job.spec.controller, design_numbers(job.spec.controller, best.design)
+        )
     for controller in CONTROLLERS:
         if kind == controller:
             return drive_of_design(name, controller, read_design(what, controller))

@@ -98,20 +98,10 @@ def identify(
     as_json: Json = False,
 ) -> None:
     """Fit parameters of a robot to recorded walks, here and now, and say which can be trusted."""
-    from contextlib import closing
-    from dataclasses import asdict
-
-    from cli.embedded import Embedded
-    from cli.output import note
+    from cli.embedded import run_seeds
     from cli.parameters_table import read_truth, show_parameters
     from cli.robots import chosen_robot
     from cli.spec_file import parse_spec
-    from gaitswarm.jobs.database import DatabaseJobs
-    from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.settings import read_settings
-    from services.optimizer.jobs.job import JobState
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
 
     known = read_truth(truth)
     document = {
@@ -126,29 +116,12 @@ def identify(
         "iterations": iterations,
     }
     specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
-    settings = read_settings(**asdict(workers))
-    url = database_to_write(settings)
-    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
-        service = JobService(store)
-        jobs = DatabaseJobs(service, url)
-        submitted = [service.submit(spec)[0] for spec in specs]
-        for number, job in enumerate(submitted, start=1):
-            note(f"run {number} of {runs}: job {job.id} in database {url}")
-            if embedded.run(jobs, store, job):
-                note(_how_to_go_on([job.id for job in submitted], number, jobs.place))
-                raise KeyboardInterrupt
-            ended = store.job(job.id)
-            if ended.state is not JobState.SUCCEEDED:
-                note(f"job {job.id} is {ended.state}: {ended.error or 'no reason was given'}")
-        show_parameters(jobs.parameters([job.id for job in submitted]), known, as_json=as_json)
-
-
-def _how_to_go_on(ids: list[str], number: int, place: str) -> str:
-    """After the run of that number, from 1, was interrupted."""
-    rest = "".join(
-        f"  gaitswarm optimize --resume {job_id}{place}\n" for job_id in ids[number - 1 :]
+    run_seeds(
+        specs,
+        workers,
+        lambda jobs, ids: show_parameters(jobs.parameters(ids), known, as_json=as_json),
+        again="parameters",
     )
-    return f"stopped; go on with\n{rest}  gaitswarm parameters {' '.join(ids)}{place}"
 
 
 def parameters(

@@ -32,9 +32,11 @@ from gaitswarm.views import (
     JobView,
     RankingView,
 )
+from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.surface import SurfaceView
+from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind
@@ -231,6 +233,14 @@ class AsyncDatabaseJobs(AsyncJobs):
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.parameters, job_ids)
 
+    async def targets(
+        self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None
+    ) -> TargetsView:
+        """Compare runs with their targets, from what is stored."""
+        jobs = await self._jobs()
+        asked = partial(jobs.targets, job_ids, leave_out=leave_out)
+        return await to_thread.run_sync(asked)
+
     async def export(
         self, job_id: str, file_format: TableFormat = "parquet"
     ) -> AsyncIterator[bytes]:
@@ -251,7 +261,7 @@ class AsyncDatabaseJobs(AsyncJobs):
 
     async def simulate(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
@@ -274,7 +284,7 @@ class AsyncDatabaseJobs(AsyncJobs):
 
     async def replay(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
@@ -290,7 +300,7 @@ class AsyncDatabaseJobs(AsyncJobs):
 
     async def surface(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         controller: ControllerName = "fuzzy-pi",
         error_points: int = 65,

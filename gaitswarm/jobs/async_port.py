@@ -31,9 +31,11 @@ if TYPE_CHECKING:
         JobView,
         RankingView,
     )
+    from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.surface import SurfaceView
+    from services.optimizer.analysis.targets import LeaveOut
     from sim.identification.recorded_walk import RecordedWalk
 
 
@@ -150,6 +152,12 @@ class AsyncJobs(ABC):
         """See which parameters runs of one problem agree on, so that they can be trusted."""
 
     @abstractmethod
+    async def targets(
+        self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None
+    ) -> TargetsView:
+        """See how near runs of a calibration come to their targets."""
+
+    @abstractmethod
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> AsyncIterator[bytes]:
         """Write every evaluation of a job as a file."""
 
@@ -164,7 +172,7 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def simulate(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
@@ -177,7 +185,7 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def replay(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
@@ -189,7 +197,7 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def surface(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         controller: ControllerName = "fuzzy-pi",
         error_points: int = 65,

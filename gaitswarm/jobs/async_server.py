@@ -48,9 +48,11 @@ from gaitswarm.views import (
     PageView,
     RankingView,
 )
+from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.surface import SurfaceView
+from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.controllers import ControllerName
@@ -200,6 +202,13 @@ class AsyncServerJobs(AsyncJobs):
         """Let the server compare runs."""
         return await self._send(calls.parameters(arguments.runs(job_ids)))
 
+    async def targets(
+        self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None
+    ) -> TargetsView:
+        """Let the server compare runs with their targets."""
+        chosen = arguments.leave_out(leave_out)
+        return await self._send(calls.targets(arguments.runs(job_ids), chosen))
+
     async def export(
         self, job_id: str, file_format: TableFormat = "parquet"
     ) -> AsyncIterator[bytes]:
@@ -222,7 +231,7 @@ class AsyncServerJobs(AsyncJobs):
 
     async def simulate(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
@@ -243,7 +252,7 @@ class AsyncServerJobs(AsyncJobs):
 
     async def replay(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
@@ -258,7 +267,7 @@ class AsyncServerJobs(AsyncJobs):
 
     async def surface(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         controller: ControllerName = "fuzzy-pi",
         error_points: int = 65,

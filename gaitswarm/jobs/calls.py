@@ -32,9 +32,11 @@ from gaitswarm.views import (
     RankingView,
     SimulationView,
 )
+from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.surface import SurfaceView
+from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.spec import Spec
 from sim.controllers import ControllerName
@@ -234,6 +236,20 @@ def parameters(job_ids: Sequence[str]) -> Call[IdentifiabilityView]:
     first, *others = job_ids
     path = f"{_job(first)}/parameters"
     return Call("GET", path, IdentifiabilityView.model_validate_json, {"also": others})
+
+
+def targets(job_ids: Sequence[str], leave_out: LeaveOut | None) -> Call[TargetsView]:
+    """Find out how near runs of a calibration come to their targets.
+
+    Args:
+        job_ids: Identifiers of the runs, at least one.
+        leave_out: What to leave out and predict, or None.
+    """
+    first, *others = job_ids
+    asked: dict[str, str | Sequence[str]] = {"also": others}
+    if leave_out is not None:
+        asked["leave_out"] = leave_out
+    return Call("GET", f"{_job(first)}/targets", TargetsView.model_validate_json, asked)
 
 
 def record(walk: RecordedWalk) -> Call[RecordingView]:

@@ -15,6 +15,7 @@ from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.requests import arguments
 from gaitswarm.requests.replay import run_replay
 from gaitswarm.requests.surface import run_surface
+from gaitswarm.requests.targets import run_targets
 from gaitswarm.settings import default_database
 from gaitswarm.simulation import simulate_request
 from gaitswarm.simulation_result import SimulationResult
@@ -37,9 +38,11 @@ from gaitswarm.views import (
     RankingView,
     StateView,
 )
+from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.surface import SurfaceView
+from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
@@ -268,6 +271,10 @@ class DatabaseJobs(Jobs):
             list(job_ids), self._service.identifiability(jobs)
         )
 
+    def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
+        """Compare runs with their targets, from what is stored."""
+        return run_targets(self._service, arguments.runs(job_ids), arguments.leave_out(leave_out))
+
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
         """Write every evaluation as a file, in parts as they are read."""
         chosen = arguments.table_format(file_format)
@@ -284,7 +291,7 @@ class DatabaseJobs(Jobs):
 
     def simulate(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
@@ -306,7 +313,7 @@ class DatabaseJobs(Jobs):
 
     def replay(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
@@ -322,7 +329,7 @@ class DatabaseJobs(Jobs):
 
     def surface(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         controller: ControllerName = "fuzzy-pi",
         error_points: int = 65,

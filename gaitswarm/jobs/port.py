@@ -22,7 +22,9 @@ if TYPE_CHECKING:
         JobView,
         RankingView,
     )
+    from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+    from services.optimizer.analysis.targets import LeaveOut
     from sim.identification.recorded_walk import RecordedWalk
 
 JobEvent: TypeAlias = IterationView | StateView
@@ -300,6 +302,24 @@ class Jobs(Walks, ABC):
 
         Raises:
             InvalidRequest: The jobs are of different problems, or have one seed.
+            Conflict: One of them has no design yet that did not fail.
+        """
+
+    @abstractmethod
+    def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
+        """See how near runs of a calibration come to their targets.
+
+        Args:
+            job_ids: Calibrations that differ in name, seed, optimizer and iterations alone; at
+                least one.
+            leave_out: "target" to predict every target by the design that is best without it,
+                "walk" for without all targets of its walk; nothing is simulated.
+
+        Returns:
+            What the best design of all runs comes to, and what was left out.
+
+        Raises:
+            InvalidRequest: A job of another kind, jobs of different problems, or of one seed.
             Conflict: One of them has no design yet that did not fail.
         """
 

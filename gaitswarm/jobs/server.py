@@ -47,9 +47,11 @@ from gaitswarm.views import (
     PageView,
     RankingView,
 )
+from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.surface import SurfaceView
+from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.controllers import ControllerName
@@ -198,6 +200,11 @@ class ServerJobs(Jobs):
         """Let the server compare runs."""
         return self._send(calls.parameters(arguments.runs(job_ids)))
 
+    def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
+        """Let the server compare runs with their targets."""
+        chosen = arguments.leave_out(leave_out)
+        return self._send(calls.targets(arguments.runs(job_ids), chosen))
+
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
         """Download every evaluation as a file, in parts as they come."""
         call = calls.export(job_id, arguments.table_format(file_format))
@@ -217,7 +224,7 @@ class ServerJobs(Jobs):
 
     def simulate(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
@@ -238,7 +245,7 @@ class ServerJobs(Jobs):
 
     def replay(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
@@ -253,7 +260,7 @@ class ServerJobs(Jobs):
 
     def surface(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         controller: ControllerName = "fuzzy-pi",
         error_points: int = 65,

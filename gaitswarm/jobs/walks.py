@@ -22,7 +22,7 @@ class Walks(ABC):
     @abstractmethod
     def simulate(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
         controller: ControllerName = "fuzzy-pi",
@@ -54,7 +54,7 @@ class Walks(ABC):
     @abstractmethod
     def replay(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
@@ -80,7 +80,7 @@ class Walks(ABC):
     @abstractmethod
     def surface(
         self,
-        design: Mapping[str, float],
+        design: Mapping[str, float | str],
         *,
         controller: ControllerName = "fuzzy-pi",
         error_points: int = 65,

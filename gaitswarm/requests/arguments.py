@@ -25,6 +25,7 @@ from gaitswarm.specs import (
 )
 from gaitswarm.tables import TableFormat
 from gaitswarm.views import RankingRequest
+from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from sim.controllers import CONTROLLERS, ControllerName
 
@@ -129,6 +130,24 @@ def runs(job_ids: Sequence[str]) -> Sequence[str]:
     return job_ids
 
 
+def leave_out(text: str | None) -> LeaveOut | None:
+    """What a calibration leaves out, by name.
+
+    Args:
+        text: "target" or "walk"; None for nothing.
+
+    Returns:
+        The same.
+
+    Raises:
+        InvalidRequest: It is something else.
+    """
+    if text is not None and text not in get_args(LeaveOut):
+        known = ", ".join(get_args(LeaveOut))
+        raise InvalidRequest(f"{text!r} is none of {known}", field="leave_out")
+    return cast(LeaveOut | None, text)
+
+
 def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
     """By what to judge the designs of a job anew.
 
@@ -147,7 +166,7 @@ def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
 
 
 def simulation(
-    design: Mapping[str, float],
+    design: Mapping[str, float | str],
     *,
     scenarios: ScenarioInput | Iterable[ScenarioInput] | None,
     controller: ControllerName,
@@ -185,7 +204,7 @@ def simulation(
 
 
 def replay(
-    design: Mapping[str, float],
+    design: Mapping[str, float | str],
     *,
     scenario: ScenarioInput,
     controller: ControllerName,
@@ -218,7 +237,7 @@ def replay(
 
 
 def surface(
-    design: Mapping[str, float],
+    design: Mapping[str, float | str],
     *,
     error_points: int,
     current_points: int,
@@ -247,7 +266,7 @@ def surface(
     return _valid(SurfaceRequest, document)
 
 
-def _design(design: Mapping[str, float]) -> dict[str, float]:
+def _design(design: Mapping[str, float | str]) -> dict[str, float | str]:
     if not isinstance(design, Mapping):
         raise InvalidRequest("must be a mapping of values by name", field="design")
     return dict(design)

@@ -51,14 +51,14 @@ def run_replay(request: ReplayRequest) -> bytes:
         scenario,
         request.controller,
         tuple(request.design),
-        np.array([tuple(request.design.values())], dtype=np.float64),
+        np.array([tuple(request.numbers.values())], dtype=np.float64),
         robot=robot,
         log=True,
     )
     (log,) = walk.logs
     if log is None:
         raise AssertionError("a gait within reach is walked")
-    gait = {name: v for name, v in request.design.items() if name in GAIT_VARIABLE_NAMES}
+    gait = {name: v for name, v in request.numbers.items() if name in GAIT_VARIABLE_NAMES}
     return encoded_replay(
         replay(robot, log, rate=request.rate, load=scenario.load),
         robot,

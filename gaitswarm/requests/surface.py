@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.requests.walk import PUBLISHED_DESIGN, check_names
 from gaitswarm.views.surface import SurfaceView
 from services.optimizer.errors import InvalidRequest
+from sim.catalogue import design_numbers
 from sim.controllers import CONTROLLERS, ControllerName, Inference
 from sim.controllers.surface import surface
-from sim.variables import VariableName
+from sim.variables import VariableName, VariableValue
 
 
 class SurfaceRequest(BaseModel):
@@ -19,7 +20,7 @@ class SurfaceRequest(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    design: dict[VariableName, FiniteFloat] = Field(
+    design: dict[VariableName, VariableValue] = Field(
         description="Value of each of the controller's variables; gait variables do not matter.",
         examples=[PUBLISHED_DESIGN],
     )
@@ -66,9 +67,11 @@ def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceV
     return SurfaceView.from_surfaces(controller, surfaces)
 
 
-def _inferences(controller: ControllerName, design: Mapping[str, float]) -> tuple[Inference, ...]:
+def _inferences(
+    controller: ControllerName, design: Mapping[str, float | str]
+) -> tuple[Inference, ...]:
     try:
-        inferences = CONTROLLERS[controller].inferences(design)
+        inferences = CONTROLLERS[controller].inferences(design_numbers(controller, design))
         if inferences:
             check_names(controller, design)
     except ValueError as error:

@@ -6,18 +6,19 @@ from collections.abc import Mapping, Sequence
 from typing import Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from sim.assembly import Backend
+from sim.catalogue import design_numbers
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.robot import DEFAULT_ROBOT, RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
 from sim.simulate import check_reach, simulate
-from sim.variables import VariableName
+from sim.variables import VariableName, VariableValue
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 
@@ -35,16 +36,26 @@ class WalkRequest(BaseModel):
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller that drives it; see /v1/controllers."
     )
-    design: dict[VariableName, FiniteFloat] = Field(
+    design: dict[VariableName, VariableValue] = Field(
         description="Value of each of the controller's variables, and of any gait variable, which"
-        " then replaces the scenario's value; names and units as in /v1/controllers.",
+        " then replaces the scenario's value; names and units as in /v1/controllers. A categorical"
+        " one takes a choice's name or index.",
         examples=[PUBLISHED_DESIGN],
     )
 
     @model_validator(mode="after")
     def _design_fits(self) -> Self:
         check_names(self.controller, self.design)
+        try:
+            design_numbers(self.controller, self.design)
+        except SimulationInputError as error:
+            raise ValueError(f"design.{error}") from error
         return self
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The design as the simulator takes it: of categorical variables the index of a choice."""
+        return design_numbers(self.controller, self.design)
 
     def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
         """How long the robot walks, the measure of what the request costs.
@@ -55,7 +66,7 @@ class WalkRequest(BaseModel):
         Returns:
             Length of all walks together [s]; a cycle time of the design goes before a scenario's.
         """
-        cycle_time = self.design.get("cycle_time")
+        cycle_time = self.numbers.get("cycle_time")
         return sum(
             scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
             for scenario in scenarios
@@ -68,7 +79,7 @@ class WalkRequest(BaseModel):
             InvalidRequest: It cannot; its field is `design`.
         """
         try:
-            CONTROLLERS[self.controller].compile(self.design)
+            CONTROLLERS[self.controller].compile(self.numbers)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field="design") from error
 
@@ -82,14 +93,14 @@ class WalkRequest(BaseModel):
         Raises:
             InvalidRequest: They do not; names scenario, leg and distance.
         """
-        names, values = tuple(self.design), tuple(self.design.values())
+        names, values = tuple(self.design), tuple(self.numbers.values())
         try:
             check_reach(scenario, names, values, robot=self.robot)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field=field) from error
 
 
-def check_names(controller: ControllerName, design: Mapping[str, float]) -> None:
+def check_names(controller: ControllerName, design: Mapping[str, float | str]) -> None:
     """Check that a design has all variables of a controller, and beside them only optional ones.
 
     Args:
@@ -192,7 +203,7 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
             scenario,
             request.controller,
             tuple(request.design),
-            np.array([tuple(request.design.values())], dtype=np.float64),
+            np.array([tuple(request.numbers.values())], dtype=np.float64),
             robot=request.robot,
             log=request.log,
             backend=backend,
@@ -202,7 +213,7 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
     return SimulationView.from_walks(
         robot=request.robot,
         controller=request.controller,
-        design=request.design,
+        design=request.numbers,
         preference=request.resolved_preference(),
         names=[scenario.name for scenario in scenarios],
         statuses=np.concatenate([walk.outcome.statuses for walk in walks]),

@@ -108,7 +108,7 @@ class RankedDesignView(View):
         description="Place by the job's own preference, from 1; null if that has none."
     )
     fitness_before: float | None = Field(description="By the job's own preference [1].")
-    design: dict[str, float] = Field(
+    design: dict[str, float | str] = Field(
         description="Value of every variable, by name; units as in /v1/controllers.",
         examples=[{"I": 0.171, "FI1R": 5837.0, "FI2R": 20111.0, "FOR": 781.0, "FOMF": 2.0}],
     )

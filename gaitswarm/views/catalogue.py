@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field
 from gaitswarm.views.base import View, listing_name
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
 from services.optimizer.search.pso import OPTIMIZERS, OptimizerName, PsoSettings
+from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
 from sim.robot import SHIPPED, RobotName, load_robot
 from sim.scenario import GAIT_VARIABLES, PRESETS, Scenario
@@ -87,7 +88,7 @@ class ControllerView(View):
     gait_variables: list[Variable] = Field(
         description="Gait parameters that a design may set as well, in place of the scenario's."
     )
-    published: dict[str, dict[str, float]] = Field(
+    published: dict[str, dict[str, float | str]] = Field(
         description="Designs from the literature, by preference or study: {name: value}.",
         examples=[{"A": {"I": 0.171, "FI1R": 5837.0}}],
     )
@@ -128,7 +129,9 @@ def controller_views() -> list[ControllerView]:
             variables=list(controller.variables),
             conventions=list(controller.conventions),
             gait_variables=list(GAIT_VARIABLES),
-            published={study: dict(design) for study, design in controller.published.items()},
+            published={
+                study: design_shown(name, design) for study, design in controller.published.items()
+            },
         )
-        for controller in CONTROLLERS.values()
+        for name, controller in CONTROLLERS.items()
     ]

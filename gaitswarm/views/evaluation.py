@@ -107,9 +107,9 @@ class EvaluationView(View):
         " preference chapter-3; null under any other, and if the design failed.",
         examples=[6.9],
     )
-    design: dict[str, float] = Field(
-        description="Value of every variable, searched and fixed, by name; units as in"
-        " /v1/controllers.",
+    design: dict[str, float | str] = Field(
+        description="Value of every variable, searched and fixed, by name: of a categorical one the"
+        " name of the choice; units as in /v1/controllers.",
         examples=[{"I": 0.171, "FI1R": 5837.0, "FI2R": 20111.0, "FOR": 781.0, "FOMF": 2.0}],
     )
     scenarios: dict[str, ScenarioResultView] = Field(
@@ -149,7 +149,7 @@ def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[Eval
     """
     if not evaluations:
         return []
-    variables = spec.design_space().names
+    space = spec.design_space()
     objectives = np.stack([evaluation.objectives for evaluation in evaluations])
     statuses = np.stack([evaluation.statuses for evaluation in evaluations])
     logs = spec.judge(objectives, statuses != Status.OK).log_utilities
@@ -159,7 +159,7 @@ def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[Eval
             particle=evaluation.particle,
             fitness=finite(evaluation.fitness),
             figure_of_merit=spec.figure_of_merit(evaluation.fitness),
-            design=dict(zip(variables, evaluation.design.tolist(), strict=True)),
+            design=space.shown(evaluation.design.tolist()),
             scenarios=case_results(
                 spec.case_names,
                 spec.objectives,

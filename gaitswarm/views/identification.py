@@ -36,7 +36,9 @@ class ChoiceView(View):
         description="The same of each run.", examples=[[0.84, 0.91, None]]
     )
     remains: bool = Field(
-        description="Whether a run has it among its designs within 5 % of its best."
+        description="Whether a run has it among the designs that count as good as its best: within"
+        " 5 %, of a calibration those whose sum of squared differences, in tolerances, is at most 4"
+        " greater."
     )
 
     @classmethod
@@ -75,7 +77,8 @@ class ParameterView(View):
     )
     choices: list[ChoiceView] = Field(description="Those of a categorical parameter; else none.")
     trust: Trust | None = Field(
-        description="How far the runs agree at the threshold of 5 %: within 15 %, within 35 %, or"
+        description="How far the runs agree among designs as good as their best (see `remains` of"
+        " choices): within 15 %, within 35 %, or"
         " not within 35 % of the range that was searched; of a categorical parameter on one"
         " choice, on some, or on none; null for a single run, which cannot tell.",
         examples=["trusted"],

@@ -69,9 +69,9 @@ class JobSummaryView(View):
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
-    kind: Literal["tuning", "identification"] | None = Field(
-        description="Whether it tunes a drive or fits parameters of the robot to recorded walks;"
-        " null if its spec cannot be read.",
+    kind: Literal["tuning", "identification", "calibration"] | None = Field(
+        description="Whether it tunes a drive, fits parameters of the robot to recorded walks, or"
+        " fits robot and conventions to a table of results; null if its spec cannot be read.",
         examples=["tuning"],
     )
     state: JobState = Field(
@@ -88,7 +88,8 @@ class JobSummaryView(View):
         examples=["fuzzy-pi"],
     )
     scenarios: list[str] = Field(
-        description="Scenarios in which every design walks, or recordings that it is fitted to;"
+        description="Scenarios in which every design walks, or recordings or walks that it is"
+        " fitted to;"
         " empty if the spec cannot be read.",
         examples=[["normal-fast", "turn-right-fast"]],
     )

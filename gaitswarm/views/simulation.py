@@ -12,6 +12,7 @@ from pydantic import Field, WithJsonSchema
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ScenarioResultView, case_results
 from services.optimizer.jobs.preference import Preference, figure_of_merit, judge
+from sim.catalogue import design_shown
 from sim.kernel.observation import WalkLog
 from sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
 from sim.robot import RobotSource
@@ -138,7 +139,7 @@ class SimulationView(View):
         description="Robot that walked, as it was asked for.", examples=["szabadka2"]
     )
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
-    design: dict[str, float] = Field(
+    design: dict[str, float | str] = Field(
         description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]
     )
     preference: Preference = Field(description="By which utilities and fitness were computed.")
@@ -190,7 +191,7 @@ class SimulationView(View):
         return cls(
             robot=robot,
             controller=controller,
-            design=dict(design),
+            design=design_shown(controller, design),
             preference=preference,
             fitness=finite(float(judged.fitness[0])),
             figure_of_merit=figure_of_merit(float(judged.fitness[0]), preference),

@@ -396,4 +396,5 @@ class JobService:
         """
         check_comparable(jobs)
         runs = [self.columns(job) for job in jobs]
-        return identifiability(jobs[0].spec.design_space().variables, runs)
+        spec = jobs[0].spec
+        return identifiability(spec.design_space().variables, runs, spec.as_good_as)

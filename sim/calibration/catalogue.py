@@ -71,7 +71,9 @@ def walk_variables(controllers: Iterable[ControllerName]) -> tuple[Variable, ...
     for controller in dict.fromkeys(controllers):
         fixed = {variable.name for variable in CONTROLLERS[controller].variables}
         for name, variable in design_catalogue(controller).items():
-            if name not in fixed and found.setdefault(name, variable) != variable:
+            # Controllers may have defaults of their own for the same thing.
+            same = variable.model_copy(update={"default": None})
+            if name not in fixed and found.setdefault(name, same) != same:
                 raise SimulationInputError(f"{name}: means different things to two controllers")
     return tuple(found.values())
 

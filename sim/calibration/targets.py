@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from sim.catalogue import design_catalogue, design_numbers
 from sim.controllers import CONTROLLERS, ControllerName
+from sim.errors import SimulationInputError
 from sim.scenario import Scenario, ScenarioChoice, find_scenario
 from sim.variables import VariableName, VariableValue
 
@@ -108,7 +109,10 @@ class TargetWalk(BaseModel):
         missing = [name for name in needed if name not in self.design]
         if missing:
             raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
-        design_numbers(self.controller, self.design)
+        try:
+            design_numbers(self.controller, self.design)
+        except SimulationInputError as error:
+            raise ValueError(f"design: {error}") from error
         names = [scenario.name for scenario in self.resolved_scenarios()]
         for name in names:
             if names.count(name) > 1:

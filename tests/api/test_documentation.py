@@ -46,6 +46,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/particles",
         f"post {job}/ranking",
         f"get {job}/parameters",
+        f"get {job}/targets",
         "post /v1/estimates",
         "post /v1/recordings",
         "get /v1/recordings/{recording_id}",
@@ -105,7 +106,7 @@ def test_every_error_is_a_problem(document: Document) -> None:
 def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -> None:
     schemas = document["components"]["schemas"]
 
-    kinds = ["JobSpec", "IdentificationSpec"]
+    kinds = ["JobSpec", "IdentificationSpec", "CalibrationSpec"]
     assert not [name for name in schemas if name.startswith(tuple(f"{kind}-" for kind in kinds))]
     spec, null = schemas["JobView"]["properties"]["spec"]["anyOf"]
     answered = spec["oneOf"]

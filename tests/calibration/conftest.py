@@ -22,7 +22,7 @@ WALKS: Final[list[dict[str, Any]]] = [
 
 def true_targets() -> list[dict[str, Any]]:
     """What a robot with the hidden parameters and law of friction comes to."""
-    robot = with_parameters(load_robot(RobotVariant(contact_law=TRUE_LAW)), TRUTH)
+    robot = with_parameters(load_robot(RobotVariant(name="szabadka2", contact_law=TRUE_LAW)), TRUTH)
     targets = []
     for asked in WALKS:
         found = walk(short_walk(), asked["design"], asked["controller"], robot=robot)
@@ -47,6 +47,7 @@ def spec(**changes: object) -> CalibrationSpec:
     """A small calibration to made-up targets."""
     document: dict[str, object] = {
         "kind": "calibration",
+        "robot": "szabadka2",
         "walks": WALKS,
         "targets": [{"walk": "stiff", "quantity": "speed", "value": 0.15, "tolerance": 0.1}],
         "variables": ["battery_voltage", "contact_law"],

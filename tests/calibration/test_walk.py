@@ -30,7 +30,9 @@ def test_a_robot_walks_as_it_would_alone(law: Any) -> None:
     index = CONTACT_LAW.number(law)
     found = case("body_mass", "contact_law").run(np.array([[4.0, index], [2.5, index]]))
     for row, mass in enumerate((4.0, 2.5)):
-        robot = with_parameters(load_robot(RobotVariant(contact_law=law)), {"body_mass": mass})
+        robot = with_parameters(
+            load_robot(RobotVariant(name="szabadka2", contact_law=law)), {"body_mass": mass}
+        )
         alone = walk(short_walk(), PI, "pi", robot=robot).outcome
         np.testing.assert_array_equal(found.objectives[row, :6], alone.objectives[0])
 
@@ -50,7 +52,7 @@ def test_what_a_walks_own_design_gives_is_not_varied() -> None:
     own, open_ = case("stride", stride=0.14).run(designs), case("stride").run(designs)
     assert own.objectives[0].tolist() == own.objectives[1].tolist()
     assert open_.objectives[0].tolist() != open_.objectives[1].tolist()
-    with_own = walk(short_walk(stride=0.14), PI, "pi").outcome
+    with_own = walk(short_walk(stride=0.14), PI, "pi", robot="szabadka2").outcome
     np.testing.assert_array_equal(own.objectives[0, :6], with_own.objectives[0])
 
 

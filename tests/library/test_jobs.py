@@ -20,6 +20,7 @@ import pytest
 import gaitswarm
 from services.runtime import open_store
 from sim.robot import load_robot
+from tests.examples.walks import SHORT_WALK
 from tests.library.conftest import SMALL, Finished, Reach
 
 pytestmark = pytest.mark.slow
@@ -132,6 +133,11 @@ REFUSED: dict[str, tuple[Callable[[gaitswarm.Jobs, str], Any], str]] = {
     "spent budget": (lambda jobs, job: jobs.extend(job, 1), "iterations"),
     "compare nothing": (lambda jobs, _: jobs.parameters([]), "job_ids"),
     "one id as text": (lambda jobs, job: jobs.parameters(job), "job_ids"),
+    "targets of a drive": (lambda jobs, job: jobs.targets([job]), "job_id"),
+    "leave out what": (
+        lambda jobs, job: jobs.targets([job], leave_out=cast(Any, "row")),
+        "leave_out",
+    ),
     "no design": (lambda jobs, _: jobs.simulate(cast(Any, 3)), "design"),
     "half a design": (lambda jobs, _: jobs.simulate({"P": 0.4}, controller="pi"), "design"),
     "gait out of reach": (
@@ -168,6 +174,7 @@ MISSING: tuple[Callable[[gaitswarm.Jobs], Any], ...] = (
     lambda jobs: jobs.wait("nosuchjob"),
     lambda jobs: jobs.ranking("nosuchjob", "B"),
     lambda jobs: jobs.parameters(["nosuchjob"]),
+    lambda jobs: jobs.targets(["nosuchjob"]),
     lambda jobs: list(jobs.export("nosuchjob")),
     lambda jobs: jobs.recording("0" * 32),
     lambda jobs: jobs.surface(PUBLISHED, controller=cast(Any, "bang-bang")),
@@ -357,6 +364,28 @@ def test_runs_of_other_seeds_tell_which_parameters_agree(reach: Reach, finished:
         jobs.parameters([finished.id, queued.id])
     with pytest.raises(gaitswarm.InvalidRequest, match="another problem"):
         jobs.parameters([finished.id, jobs.submit(seed=10).id])
+
+
+def test_a_calibration_is_compared_with_its_targets(reach: Reach, db: Path) -> None:
+    walk = {"name": "pi", "controller": "pi", "design": PI, "scenarios": [SHORT_WALK]}
+    target = {"walk": "pi", "quantity": "speed", "value": 0.15, "tolerance": 0.1}
+    spec = {
+        "kind": "calibration",
+        "walks": [walk],
+        "targets": [target, target | {"quantity": "energy", "value": 45.0}],
+        "variables": ["contact_law"],
+        "optimizer": {"particles": 3},
+        "iterations": 1,
+    }
+    run = gaitswarm.optimize(spec, db=db, evaluator="in-process")
+    reached = reach(db).targets([run.job.id], leave_out="target")
+    assert (reached.job, reached.fitness) == (run.job.id, run.best.fitness)
+    assert reached.design == run.best.design
+    speed, energy = reached.targets
+    assert speed.simulated == pytest.approx(
+        1.0 / (run.best.scenarios["pi"].objectives["reciprocal_speed"] or 0.0)
+    )
+    assert energy.left_out is not None
 
 
 def test_a_recorded_walk_is_kept_and_taken_back(reach: Reach, db: Path) -> None:

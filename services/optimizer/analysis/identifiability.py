@@ -7,7 +7,7 @@ the intervals here are over all runs together, each run's good designs by its ow
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.spec import DECISIVE, Spec
 from services.optimizer.search.pso import PsoSettings
 from sim.variables import Variable
 
@@ -26,9 +26,6 @@ Floats = NDArray[np.float64]
 
 THRESHOLDS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
 """Twelve distances from a run's best fitness, as shares of it."""
-
-DECISIVE: Final = 0.05
-"""The threshold at which a parameter is judged."""
 
 _TRUSTED: Final = 0.15
 _ROUGH: Final = 0.35
@@ -62,8 +59,7 @@ class ChoiceEvidence:
     Attributes:
         name: of the choice.
         fitness: each run's least among designs with this choice, +inf where there is none.
-        remains: whether it is among the designs of any run within the decisive threshold of that
-            run's best.
+        remains: whether it is among the designs of any run that are as good as that run's best.
     """
 
     name: str
@@ -133,13 +129,16 @@ class Identifiability:
 
 
 def identifiability(
-    variables: Sequence[Variable], runs: Sequence[EvaluationColumns]
+    variables: Sequence[Variable],
+    runs: Sequence[EvaluationColumns],
+    as_good_as: Callable[[float], float] = lambda fitness: fitness * (1.0 + DECISIVE),
 ) -> Identifiability:
     """Find the intervals of parameters over runs of one problem.
 
     Args:
         variables: that were searched, the first columns of the runs' designs.
         runs: all evaluations of each run.
+        as_good_as: best fitness of a run -> greatest that counts as good; see `Spec.as_good_as`.
 
     Returns:
         Intervals and, of several runs, how far each parameter can be trusted.
@@ -156,7 +155,7 @@ def identifiability(
         [run.fitness <= least * (1.0 + threshold) for run, least in zip(runs, fitness, strict=True)]
         for threshold in THRESHOLDS
     ]
-    near = within[THRESHOLDS.index(DECISIVE)]
+    near = [run.fitness <= as_good_as(least) for run, least in zip(runs, fitness, strict=True)]
     parameters = []
     for column, variable in enumerate(variables):
         bests = tuple(float(run.designs[row, column]) for run, row in zip(runs, best, strict=True))
@@ -167,7 +166,13 @@ def identifiability(
         parameter = ParameterIdentifiability(
             variable, bests[overall], bests, intervals, None, _choices(variable, column, runs, near)
         )
-        parameters.append(parameter if len(runs) == 1 else _judged(parameter))
+        if len(runs) > 1:
+            low, high = _interval(
+                [run.designs[rows, column] for run, rows in zip(runs, near, strict=True)]
+            )
+            width = (high - low) / (variable.high - variable.low)
+            parameter = replace(parameter, trust=_trust(parameter, width))
+        parameters.append(parameter)
     designs = tuple(int(sum(rows.sum() for rows in good)) for good in within)
     return Identifiability(fitness, designs, tuple(parameters))
 
@@ -237,13 +242,13 @@ def _choices(
     return tuple(found)
 
 
-def _judged(found: ParameterIdentifiability) -> ParameterIdentifiability:
+def _trust(found: ParameterIdentifiability, width: float) -> Trust:
+    """width: of the interval of designs as good as the best, as a share of the range."""
     if found.choices:
         remaining = sum(choice.remains for choice in found.choices)
-        decided = remaining == 1
-        undecided = remaining == len(found.choices)
-    else:
-        width = found.width()
-        decided, undecided = width <= _TRUSTED, width > _ROUGH
-    trust = Trust.UNKNOWN if undecided else Trust.TRUSTED if decided else Trust.ROUGH
-    return replace(found, trust=trust)
+        if remaining == len(found.choices):
+            return Trust.UNKNOWN
+        return Trust.TRUSTED if remaining == 1 else Trust.ROUGH
+    if width > _ROUGH:
+        return Trust.UNKNOWN
+    return Trust.TRUSTED if width <= _TRUSTED else Trust.ROUGH

@@ -12,17 +12,13 @@ from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.preference import (
-    PREFERENCES,
-    PreferenceName,
-    figure_of_merit,
-    judge,
-)
+from services.optimizer.jobs.misfit import difference, quantity, root_mean_square
 from services.optimizer.jobs.spec import Judgement, Spec
 from sim.calibration.catalogue import robot_variables, varied_robot, walk_variables
 from sim.calibration.targets import QUANTITIES, Target, TargetWalk
 from sim.calibration.walk import RESULTS, CalibrationWalk
 from sim.case import Case
+from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import Recordings
@@ -31,8 +27,12 @@ from sim.robot import RobotSource
 from sim.robot.shipped import RobotName
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
 from sim.simulate import check_reach
+from sim.variables import Variable
 
 Floats = NDArray[np.float64]
+
+_NO_EVIDENCE: Final = 4.0
+"""Growth of the sum of squares, in tolerances, that may be chance: two standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +157,12 @@ class CalibrationSpec(Spec):
             of_walk[walk.name] = tuple(indices)
         return Layout(tuple(cases), of_walk)
 
-    def design_space(self) -> DesignSpace:
-        """Any of the robot's variables, of the gait's, and of the controllers' conventions."""
+    def catalogue(self) -> tuple[Variable, ...]:
+        """All that may be searched or fixed: of the robot, of controllers and of the gait.
+
+        Raises:
+            ValueError: two of them have one name.
+        """
         try:
             of_robot = robot_variables(self.described)
             of_walks = walk_variables(walk.controller for walk in self.walks)
@@ -167,12 +171,15 @@ class CalibrationSpec(Spec):
         for variable in of_walks:
             if any(variable.name == known.name for known in of_robot):
                 raise ValueError(f"{variable.name}: both the robot and a controller have it")
-        chosen = self.variables
+        return (*of_robot, *of_walks)
+
+    def design_space(self) -> DesignSpace:
+        """Any of the catalogue."""
+        known, chosen = self.catalogue(), self.variables
         if chosen is None:
+            of_robot = robot_variables(self.described)
             chosen = tuple(v for v in of_robot if v.name not in self.fixed)
-        return DesignSpace.build(
-            required=(), optional=(*of_robot, *of_walks), chosen=chosen, fixed=self.fixed
-        )
+        return DesignSpace.build(required=(), optional=known, chosen=chosen, fixed=self.fixed)
 
     def _check_every_variable_matters(self) -> None:
         of_robot = {variable.name for variable in robot_variables(self.described)}
@@ -270,9 +277,9 @@ class CalibrationSpec(Spec):
         """
         of_walk, columns = self.layout().of_walk, []
         for target in self.targets:
-            values = _quantity(target, objectives, failed, of_walk[target.walk])
+            values = _of_walk(target, objectives, failed, of_walk[target.walk])
             if target.relative_to is not None:
-                other = _quantity(target, objectives, failed, of_walk[target.relative_to])
+                other = _of_walk(target, objectives, failed, of_walk[target.relative_to])
                 with np.errstate(divide="ignore", invalid="ignore"):
                     values = values / other
             columns.append(values)
@@ -290,7 +297,7 @@ class CalibrationSpec(Spec):
             where there is no value.
         """
         rows = [
-            [_difference(target, value) for target, value in zip(self.targets, row, strict=True)]
+            [difference(target, value) for target, value in zip(self.targets, row, strict=True)]
             for row in simulated.tolist()
         ]
         return np.array(rows).reshape(simulated.shape)
@@ -324,65 +331,39 @@ class CalibrationSpec(Spec):
         with np.errstate(divide="ignore"):
             return Judgement(root_mean_square(differences[:, fitted]), np.log(utilities))
 
+    def as_good_as(self, fitness: float) -> float:
+        """Read tolerances as standard deviations: two of them more in all is no evidence.
+
+        Args:
+            fitness: the best one.
+
+        Returns:
+            The fitness at which the sum of squares over fitted targets is greater by 4.
+        """
+        return math.sqrt(fitness * fitness + _NO_EVIDENCE / int(self.fitted.sum()))
+
     def resolved(self) -> CalibrationSpec:
         """The same job with scenarios and variables written out."""
         space = self.design_space()
         walks = tuple(
-            walk.model_copy(update={"scenarios": walk.resolved_scenarios()}) for walk in self.walks
+            walk.model_copy(
+                update={
+                    "scenarios": walk.resolved_scenarios(),
+                    "design": design_shown(walk.controller, dict(walk.numbers)),
+                }
+            )
+            for walk in self.walks
         )
         return self.model_copy(
             update={"walks": walks, "variables": space.variables, "fixed": space.shown_fixed},
         )
 
 
-def root_mean_square(differences: Floats) -> Floats:
-    """Root mean square of each row.
-
-    Args:
-        differences: (n, t).
-
-    Returns:
-        (n,), 0 for no columns, +inf where a value is not finite.
-    """
-    rows = [[difference * difference for difference in row] for row in differences.tolist()]
-    return np.array([math.sqrt(math.fsum(row) / len(row)) if row else 0.0 for row in rows])
-
-
-def _quantity(
-    target: Target, objectives: Floats, failed: NDArray[np.bool_], cases: tuple[int, ...]
-) -> Floats:
-    """(n,) what a walk came to, NaN where it failed."""
-    rows, bad = objectives[:, cases], failed[:, cases]
-    values = _of_all(target.quantity, rows, bad)
-    values[bad.any(axis=1)] = np.nan
-    return values
-
-
-def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:
-    """(n, k, m) results of a walk's k scenarios -> (n,) values, any where it failed."""
-    if quantity == "F":
-        preference = PREFERENCES["chapter-3"]
-        fitness = judge(rows, bad, preference).fitness.tolist()
-        found = [figure_of_merit(value, preference) for value in fitness]
-        return np.array([math.nan if value is None else value for value in found])
-    if quantity.startswith("fitness:"):
-        name: PreferenceName = quantity.removeprefix("fitness:")  # type: ignore[assignment]
-        return judge(rows, bad, PREFERENCES[name]).fitness
-    return rows[:, 0, _COLUMNS[quantity]].copy()
-
-
-_COLUMNS: Final = {result.name: column for column, result in enumerate(RESULTS)}
-
-
-def _difference(target: Target, value: float) -> float:
-    if not math.isfinite(value):
-        return math.inf
-    if not QUANTITIES[target.quantity].positive:
-        return (value - target.value) / target.tolerance
-    if value <= 0.0:
-        return math.inf
-    return math.log(value / target.value) / math.log1p(target.tolerance)
-
-
 def _is_nan(value: float | None) -> bool:
     return value is not None and math.isnan(value)
+
+
+def _of_walk(
+    target: Target, objectives: Floats, failed: NDArray[np.bool_], cases: tuple[int, ...]
+) -> Floats:
+    return quantity(target.quantity, objectives[:, cases], failed[:, cases])

@@ -19,6 +19,7 @@ _SOURCES: Final = (
     "jobs/calibration.py",
     "jobs/design_space.py",
     "jobs/identification.py",
+    "jobs/misfit.py",
     "jobs/preference.py",
     "jobs/spec.py",
     "jobs/tuning.py",

@@ -12,7 +12,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,10 @@ from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from sim.variables import VariableChoice, VariableName, VariableValue
 
 Floats = NDArray[np.float64]
+
+
+DECISIVE: Final = 0.05
+"""Distance from the best fitness, as a share of it, within which designs count as good as it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,6 +198,17 @@ class Spec(BaseModel):
             The figure, None for a job that has none.
         """
         return None
+
+    def as_good_as(self, fitness: float) -> float:
+        """What may be worse than the best and still count as evidence that it is as good.
+
+        Args:
+            fitness: the best one.
+
+        Returns:
+            The greatest fitness of a design that counts as good as the best.
+        """
+        return fitness * (1.0 + DECISIVE)
 
     @abstractmethod
     def resolved(self) -> Self:

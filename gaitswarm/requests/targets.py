@@ -1,0 +1,61 @@
+"""How near runs of a calibration come to their targets. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from gaitswarm.views.calibration import TargetsView
+from services.optimizer.analysis.identifiability import check_comparable
+from services.optimizer.analysis.targets import LeaveOut, target_results
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
+
+
+class Histories(Protocol):
+    """Where jobs and their evaluations are."""
+
+    def job(self, job_id: str) -> Job:
+        """A job.
+
+        Args:
+            job_id: identifier of the job.
+        """
+
+    def columns(self, job: Job) -> EvaluationColumns:
+        """All evaluations of a job.
+
+        Args:
+            job: as it was read.
+        """
+
+
+def run_targets(
+    histories: Histories, job_ids: Sequence[str], leave_out: LeaveOut | None
+) -> TargetsView:
+    """Compare the best design of several runs with their targets, from what is stored.
+
+    Args:
+        histories: Where the runs are.
+        job_ids: Identifiers of the runs, at least one.
+        leave_out: What to leave out and predict, each in its turn; None for nothing.
+
+    Returns:
+        What the best design comes to in every target.
+
+    Raises:
+        InvalidRequest: A job of another kind, jobs of different problems, or two of one seed.
+        Conflict: A job has no design yet that did not fail, or is too large to be held in memory.
+    """
+    jobs = [histories.job(job_id) for job_id in job_ids]
+    first, spec = jobs[0], jobs[0].spec
+    if not isinstance(spec, CalibrationSpec):
+        raise InvalidRequest(
+            f"job {first.id} is of kind {spec.kind}; only a calibration has targets", field="job_id"
+        )
+    check_comparable(jobs)
+    runs = [histories.columns(job) for job in jobs]
+    results = target_results(spec, runs, leave_out)
+    return TargetsView.from_results([job.id for job in jobs], spec, results)

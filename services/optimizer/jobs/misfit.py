@@ -1,0 +1,84 @@
+"""How far designs of a calibration are from its targets."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.jobs.preference import (
+    PREFERENCES,
+    PreferenceName,
+    figure_of_merit,
+    judge,
+)
+from sim.calibration.targets import QUANTITIES, QuantityName, Target
+from sim.calibration.walk import RESULTS
+
+Floats = NDArray[np.float64]
+
+_COLUMNS: Final = {result.name: column for column, result in enumerate(RESULTS)}
+
+
+def quantity(name: QuantityName, results: Floats, failed: NDArray[np.bool_]) -> Floats:
+    """What designs come to in one walk.
+
+    Args:
+        name: of the quantity.
+        results: (n, k, m) raw results in the walk's k scenarios, in their units.
+        failed: (n, k), true for a scenario without a result.
+
+    Returns:
+        (n,) values, NaN where any scenario failed.
+    """
+    values = _of_all(name, results, failed)
+    values[failed.any(axis=1)] = np.nan
+    return values
+
+
+def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:
+    """(n, k, m) results in a walk's k scenarios -> (n,) values, any where it failed."""
+    if quantity == "F":
+        preference = PREFERENCES["chapter-3"]
+        fitness = judge(rows, bad, preference).fitness.tolist()
+        found = [figure_of_merit(value, preference) for value in fitness]
+        return np.array([math.nan if value is None else value for value in found])
+    if quantity.startswith("fitness:"):
+        name: PreferenceName = quantity.removeprefix("fitness:")  # type: ignore[assignment]
+        return judge(rows, bad, PREFERENCES[name]).fitness
+    return rows[:, 0, _COLUMNS[quantity]].copy()
+
+
+def difference(target: Target, value: float) -> float:
+    """How far off a value is, in tolerances.
+
+    Args:
+        target: what it should be.
+        value: in the target's unit.
+
+    Returns:
+        ln(value / target) / ln(1 + tolerance), of height_loss (value - target) / tolerance; +inf
+        where there is no value.
+    """
+    if not math.isfinite(value):
+        return math.inf
+    if not QUANTITIES[target.quantity].positive:
+        return (value - target.value) / target.tolerance
+    if value <= 0.0:
+        return math.inf
+    return math.log(value / target.value) / math.log1p(target.tolerance)
+
+
+def root_mean_square(differences: Floats) -> Floats:
+    """Root mean square of each row.
+
+    Args:
+        differences: (n, t).
+
+    Returns:
+        (n,), 0 for no columns, +inf where a value is not finite.
+    """
+    rows = [[difference * difference for difference in row] for row in differences.tolist()]
+    return np.array([math.sqrt(math.fsum(row) / len(row)) if row else 0.0 for row in rows])

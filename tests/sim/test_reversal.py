@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import Inference
+from sim.controllers.fuzzy_sets import LARGE_BEGINS
 
 FUZZY: Final = CONTROLLERS["fuzzy-pi"]
 
@@ -34,6 +35,8 @@ REVERSING: Final[Mapping[str, Mapping[str, float]]] = {
 
 CURRENTS: Final = np.linspace(0.0, 1.0, 64)
 """Shares of the current's range, at the columns of the table."""
+
+LARGE: Final = CURRENTS > (LARGE_BEGINS.default or 0.0)
 
 
 def inferred(source: Inference, error: float) -> Floats:
@@ -83,10 +86,21 @@ def test_with_the_small_weight_of_optimum_c_the_drive_goes_soft_and_no_further(
 
 
 @pytest.mark.parametrize("name", REVERSING)
-def test_up_to_half_the_range_of_the_current_the_drive_follows_the_error(name: str) -> None:
+def test_a_drive_follows_its_error_until_currents_are_large_then_falls_and_reverses(
+    name: str,
+) -> None:
     (source,) = FUZZY.inferences(REVERSING[name])
+    turns = []
     for error in (0.25, 0.5, 1.0):
-        assert (inferred(source, error)[CURRENTS <= 0.5] > 0.0).all()
+        output = inferred(source, error)
+        follows, falls = output[~LARGE], output[LARGE]
+        assert follows[0] > 0.0
+        np.testing.assert_allclose(follows, follows[0])
+        assert (falls < follows[0]).all()
+        turns.append(CURRENTS[int(np.argmax(output < 0.0))])
+    assert LARGE_BEGINS.default is not None
+    # The larger the error, the more current it takes; half of the range is enough for any.
+    assert LARGE_BEGINS.default < turns[0] < turns[1] < turns[2] <= 0.5
 
 
 @pytest.mark.parametrize("name", REVERSING)
@@ -105,6 +119,7 @@ def test_chapter_3s_voltage_reverses_where_rules_5_and_6_weigh_more_than_3_and_4
     source, _ = CONTROLLERS["fuzzy-pi-3"].inferences(design)
     crisp = source.system.infer({"error": np.array([1.0]), "current": CURRENTS})[0]
     assert (np.diff(crisp) <= 1e-12).all()
-    assert (crisp[CURRENTS <= 0.5] > 0.95).all()
+    assert (crisp[~LARGE] > 0.95).all()
+    assert (crisp[LARGE] < crisp[0]).all()
     assert crisp[-1] < 0.5
     assert (crisp[-1] < 0.0) is np.bool_(reverses)

@@ -56,9 +56,10 @@ def test_sets_cover_the_range(fuzzy_p: Surface) -> None:
     error, current = (fuzzy_p.inputs[name].degrees for name in ("error", "current"))
     np.testing.assert_allclose(np.sum(list(error.values()), axis=0), 1.0, atol=1e-12)
     assert error["zero"][32] == 1.0
-    # The 17th of 33 points is half the range, where small ends and large begins.
+    # Of 33 points the 4th is the last within a tenth of the range, up to which no current is large,
+    # and the 17th is half the range, from which none is small.
     assert (current["small"][:16] > 0.0).all() and not current["small"][17:].any()
-    assert (current["large"][17:] > 0.0).all() and not current["large"][:16].any()
+    assert (current["large"][4:] > 0.0).all() and not current["large"][:4].any()
     assert list(fuzzy_p.output.degrees) == [
         "null",
         "positive",

@@ -26,9 +26,11 @@ class ParticleColumnView(View):
     unit: str = Field(description="Unit of its numbers.", examples=["counts"])
     low: float | None = Field(description="Lower bound of a variable; else null.")
     high: float | None = Field(description="Upper bound of a variable; else null.")
-    kind: Literal["index", "fitness", "continuous", "integer", "utility"] = Field(
-        description="What its numbers are; `continuous` and `integer` are variables."
+    kind: Literal["index", "fitness", "continuous", "integer", "categorical", "utility"] = Field(
+        description="What its numbers are; `continuous`, `integer` and `categorical` are variables,"
+        " the last with the index of a choice."
     )
+    choices: list[str] = Field(default=[], description="Those of a categorical variable.")
 
 
 class ParticlesHeaderView(View):
@@ -77,7 +79,7 @@ def _described(job: Job) -> list[ParticleColumnView]:
     plain = [("iteration", "1", "index"), ("particle", "1", "index"), ("fitness", unit, "fitness")]
     worth = [(f"utility:{name}", unit, "utility") for name in job.spec.case_names]
     variables = [
-        {"name": v.name, "unit": v.unit, "low": v.low, "high": v.high, "kind": v.kind}
+        v.model_dump(include={"name", "unit", "low", "high", "kind", "choices"})
         for v in job.spec.design_space().variables
     ]
     unbounded = [

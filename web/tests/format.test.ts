@@ -15,6 +15,10 @@ const THIN = '\u202f'
 const SPACE = '\u00a0'
 
 describe('numbers', () => {
+  test('the name of a choice is left as it is', () => {
+    expect([formatNumber('stick'), exactQuantity('stick', '1')]).toEqual(['stick', 'stick'])
+  })
+
   test.each([
     [8.71359, '8.714'],
     [0.00123456, '0.001235'],

@@ -34,8 +34,12 @@ export type Ranking = Schemas['RankingView']
 export type RankedDesign = Schemas['RankedDesignView']
 export type Objective = Schemas['ObjectiveView']
 export type IdentificationSpec = Schemas['IdentificationSpec']
+export type CalibrationSpec = Schemas['CalibrationSpec']
 /** A spec of any kind. */
-export type AnySpec = JobSpec | IdentificationSpec
+export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec
+/** Values by variable: numbers, and names of choices. */
+export type Design = Readonly<Record<string, number | string>>
+export type TargetResult = Schemas['TargetResultView']
 export type Convergence = Schemas['IdentifiabilityView']
 export type FittedParameter = Schemas['ParameterView']
 export type RecordedWalk = Schemas['RecordedWalk']

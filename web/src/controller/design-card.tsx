@@ -7,7 +7,7 @@ import type { ResolvedDesign } from '../walk/resolve-design'
 
 interface Row {
   readonly variable: Variable
-  readonly value: number
+  readonly value: number | string
 }
 
 export function DesignCard({ design }: { design: ResolvedDesign }) {

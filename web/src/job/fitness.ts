@@ -3,8 +3,8 @@
 import type { Job, StoredJob } from '../api/types'
 
 /**
- * Unit of a job's fitness: the product that tunes a drive has none, an identification's is a mean
- * of its objectives, which are currents.
+ * Unit of a job's fitness: the product that tunes a drive has none, nor has a misfit
+ * in tolerances; an identification's is a mean of its objectives, which are currents.
  */
 export function fitnessUnit({
   kind,
@@ -28,7 +28,12 @@ export interface CaseWords {
 }
 
 export function caseWords(kind: Job['kind']): CaseWords {
-  return kind === 'tuning'
-    ? { one: 'scenario', many: 'scenarios', worth: 'utility' }
-    : { one: 'recording', many: 'recordings', worth: 'error' }
+  switch (kind) {
+    case 'tuning':
+      return { one: 'scenario', many: 'scenarios', worth: 'utility' }
+    case 'identification':
+      return { one: 'recording', many: 'recordings', worth: 'error' }
+    case 'calibration':
+      return { one: 'walk', many: 'walks', worth: 'misfit' }
+  }
 }

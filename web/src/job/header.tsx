@@ -111,7 +111,7 @@ function StreamNote({ live }: { live: LiveJob }) {
 function subtitle(job: StoredJob): string {
   const asked = isReadable(job)
     ? [
-        job.controller ?? 'identification',
+        job.controller ?? job.kind,
         `${formatCount(job.particles)} particles`,
         `seed ${job.spec.seed}`,
       ]

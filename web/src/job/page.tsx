@@ -3,7 +3,9 @@
 import { isReadable } from '../api/readable'
 import type { Job } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
+import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
+import { caseWords } from './fitness'
 import { JobHeader } from './header'
 import { IterationPanel } from './iteration-panel'
 import { IterationsPanel } from './iterations-panel'
@@ -13,12 +15,14 @@ import { ParametersPanel } from './parameters/parameters-panel'
 import { PreferencesPanel } from './preferences-panel'
 import { ReproducePanel } from './reproduce-panel'
 import { ScenariosPanel } from './scenarios-panel'
+import { TargetsPanel } from './targets-panel'
 import { type LiveJob, useJob } from './use-job'
 import { VariablesPanel } from './variables-panel'
 
 const TABS = [
   { tab: '', label: 'Overview' },
   { tab: 'scenarios', label: 'Scenarios' },
+  { tab: 'targets', label: 'Targets' },
   { tab: 'parameters', label: 'Parameters' },
   { tab: 'variables', label: 'Variables' },
   { tab: 'iterations', label: 'Iterations' },
@@ -26,10 +30,11 @@ const TABS = [
   { tab: 'reproduce', label: 'Spec' },
 ] as const
 
-/** Parts of jobs of one kind only. */
-const ONLY: Readonly<Partial<Record<string, Job['kind']>>> = {
-  parameters: 'identification',
-  preferences: 'tuning',
+/** Parts of jobs of some kinds only. */
+const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
+  targets: ['calibration'],
+  parameters: ['identification', 'calibration'],
+  preferences: ['tuning'],
 }
 
 export default function JobPage({ id, tab }: { id: string; tab: string }) {
@@ -66,7 +71,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
 }
 
 function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
-  const tabs = TABS.filter(({ tab }) => !(tab in ONLY) || ONLY[tab] === job.kind)
+  const tabs = TABS.filter(({ tab }) => ONLY[tab]?.includes(job.kind) ?? true)
   const [section] = tab.split('/')
   return (
     <>
@@ -77,7 +82,7 @@ function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
             href={jobPath(job.id, t.tab)}
             aria-current={t.tab === section ? 'page' : undefined}
           >
-            {t.tab === 'scenarios' && job.kind === 'identification' ? 'Recordings' : t.label}
+            {t.tab === 'scenarios' ? capitalized(caseWords(job.kind).many) : t.label}
           </a>
         ))}
       </nav>
@@ -88,6 +93,7 @@ function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
 
 function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
   const [section, detail] = tab.split('/')
+  if (ONLY[section]?.includes(job.kind) === false) return <NoSuchPart />
   switch (section) {
     case '':
       return <OverviewPanel live={live} job={job} />
@@ -98,12 +104,12 @@ function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
     case 'iterations':
       if (detail) return <IterationPanel job={job} index={Number(detail)} />
       return <IterationsPanel live={live} job={job} />
+    case 'targets':
+      return <TargetsPanel job={job} />
     case 'parameters':
-      if (job.kind === 'identification') return <ParametersPanel job={job} />
-      return <NoSuchPart />
+      return <ParametersPanel job={job} />
     case 'preferences':
-      if (job.kind === 'tuning') return <PreferencesPanel job={job} />
-      return <NoSuchPart />
+      return <PreferencesPanel job={job} />
     case 'reproduce':
       return <ReproducePanel job={job} />
     default:

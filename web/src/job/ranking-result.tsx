@@ -135,8 +135,9 @@ function DesignChange({ job, winner }: { job: Job; winner: RankedDesign }) {
           numeric: true,
           cell: (v) => {
             const before = job.best?.design[v.name]
-            if (before === undefined) return '–'
-            return change(((winner.design[v.name] - before) / (v.high - v.low)) * 100, '1', 2)
+            const now = winner.design[v.name]
+            if (typeof before !== 'number' || typeof now !== 'number') return '–'
+            return change(((now - before) / (v.high - v.low)) * 100, '1', 2)
           },
         },
       ]}

@@ -4,7 +4,7 @@ import { useMemo } from 'preact/hooks'
 import { get, post } from '../api/client'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
-import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
+import type { Controller, Design, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
 
 export interface Reference {
   readonly label: string
@@ -47,7 +47,7 @@ function catalogue(): Promise<readonly Controller[]> {
 function walkOf(
   { robot, scenarios, preference }: JobSpec,
   controller: JobSpec['controller'],
-  design: Record<string, number>,
+  design: Design,
 ): Promise<Simulation> {
   const body = { robot, controller, design, scenarios, preference, log: false }
   const key = JSON.stringify(body)

@@ -7,6 +7,7 @@ import { change, formatNumber } from '../format/number'
 import { capitalized, inWords } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
 import { withQuery } from '../router/routes'
+import { isTuning } from './design-variables'
 import { caseWords, fitnessUnit } from './fitness'
 import { ObjectiveNotes } from './objective-notes'
 import { utilityOf } from './preference'
@@ -92,7 +93,7 @@ function rowsOf(
   reference: Reference | null,
   recordings: readonly RecordingSummary[] | null,
 ): readonly Row[] {
-  const preference = job.spec.kind === 'identification' ? null : (job.spec.preference as Preference)
+  const preference = isTuning(job.spec) ? (job.spec.preference as Preference) : null
   return Object.entries(job.best!.scenarios).map(([scenario, own]) => {
     const other = reference?.scenarios[scenario] ?? null
     // Another job may have another preference: its utilities are not to be compared, its objectives are.

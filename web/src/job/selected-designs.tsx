@@ -43,7 +43,9 @@ export function SelectedDesigns({
             unit: column.unit,
             numeric: true,
             value: (row) => (Number.isNaN(column.values[row]) ? null : column.values[row]),
-            cell: (row) => formatNumber(column.values[row], DIGITS[column.kind] ?? 5),
+            cell: (row) =>
+              column.choices?.[column.values[row]] ??
+              formatNumber(column.values[row], DIGITS[column.kind] ?? 5),
           }),
         ),
       ]}

@@ -10,7 +10,7 @@ import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { BrushFields } from './brush-fields'
-import { columnNamed, decodeParticles, type Particles } from './particles'
+import { columnNamed, decodeParticles, isVariable, type Particles } from './particles'
 import { SelectedDesigns } from './selected-designs'
 
 const NONE: Brushes = new Map()
@@ -126,9 +126,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
 }
 
 function axesOf({ columns }: Particles, utilities: boolean): readonly AxisSource[] {
-  const wanted = columns.filter(
-    ({ kind }) => kind === 'continuous' || kind === 'integer' || (kind === 'utility' && utilities),
-  )
+  const wanted = columns.filter(({ kind }) => isVariable(kind) || (kind === 'utility' && utilities))
   const fitness = columns.filter(({ kind }) => kind === 'fitness')
   return [...wanted, ...fitness].map((column) => ({
     name: column.name.replace(/^utility:/, ''),

@@ -71,7 +71,7 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
 }
 
 function NameCell({ job }: { job: JobSummary }) {
-  const what = [job.kind === 'identification' ? 'identification' : null, job.controller]
+  const what = [job.kind === 'tuning' ? null : job.kind, job.controller]
   const details = [job.name ? job.id : null, ...what].filter((part) => part)
   return (
     <div class="job-name">

@@ -1,5 +1,6 @@
 /** A new search in the neighbourhood of a design. */
 
+import type { Design } from '../api/types'
 import type { Draft, VariableDraft } from './draft'
 
 /** Share of each variable's range that is searched around the design. */
@@ -9,16 +10,12 @@ const SHARE = 0.3
  * The draft with the bounds of searched variables drawn around a design, within those before.
  * whole: names of the integer variables.
  */
-export function around(
-  draft: Draft,
-  design: Readonly<Record<string, number>>,
-  whole: ReadonlySet<string>,
-): Draft {
+export function around(draft: Draft, design: Design, whole: ReadonlySet<string>): Draft {
   const narrowed = Object.entries(draft.variables).map(
     ([name, variable]): [string, VariableDraft] => {
       const value = design[name]
       const bounded = variable.mode === 'searched' && variable.choices.length === 0
-      if (!bounded || value === undefined) return [name, variable]
+      if (!bounded || typeof value !== 'number') return [name, variable]
       const [low, high] = [Number(variable.low), Number(variable.high)]
       const reach = ((high - low) * SHARE) / 2
       const from = Math.max(low, Math.min(value - reach, high - 2 * reach))

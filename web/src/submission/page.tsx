@@ -5,6 +5,7 @@ import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec, Preference } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
+import { isTuning } from '../job/design-variables'
 import { usePlace } from '../router/navigation'
 import { around } from './around-design'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
@@ -45,7 +46,7 @@ export default function NewJobPage() {
       )}
       {start.loading && <Loading what="the catalogue" />}
       {start.data &&
-        (from?.spec.kind === 'identification' ? (
+        (from && !isTuning(from.spec) ? (
           <JsonForm key={String(query)} spec={from.spec} />
         ) : (
           <JobForm
@@ -69,7 +70,7 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
     id === null ? null : readableJob(id, signal),
   ])
   const from = cloned && withSeed(cloned, query.get('seed'))
-  if (!from || from.spec.kind === 'identification') {
+  if (!from || from.kind !== 'tuning') {
     return { catalogue, draft: emptyDraft(catalogue), from }
   }
   let draft = draftOf(from.spec as JobSpec, catalogue)

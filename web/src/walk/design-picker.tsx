@@ -35,7 +35,7 @@ export function DesignPicker({
     })),
   )
   const best = (jobs.data?.items ?? [])
-    .filter((job) => job.kind !== 'identification' && job.best_fitness !== null)
+    .filter((job) => job.kind === 'tuning' && job.best_fitness !== null)
     .map((job) => ({ word: wordOf({ kind: 'best', job: job.id }), text: job.name || job.id }))
   const word = chosen ? wordOf(chosen) : ''
   const listed = word === '' || [...published, ...best].some((option) => option.word === word)

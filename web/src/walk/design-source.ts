@@ -1,5 +1,7 @@
 /** Where a design to look at comes from, as addresses of this page say it. Pure. */
 
+import type { Design } from '../api/types'
+
 /** A particle of a job (its best one if none is named), a published design, or values as such. */
 export type DesignSource =
   | { readonly kind: 'best'; readonly job: string }
@@ -13,7 +15,7 @@ export type DesignSource =
   | {
       readonly kind: 'values'
       readonly controller: string
-      readonly design: Readonly<Record<string, number>>
+      readonly design: Design
     }
 
 /** What is shown where an address names nothing: the thesis's optimum A. */
@@ -112,16 +114,23 @@ function jobSource(job: string, iteration: string | null, particle: string | nul
   return { kind: 'particle', job, iteration: numbers[0], particle: numbers[1] }
 }
 
-function parsed(text: string): Record<string, number> {
+function parsed(text: string): Design {
   let value: unknown
   try {
     value = JSON.parse(text)
   } catch {
-    throw new AddressError('design is not JSON; write an object of numbers such as {"P": 0.25}')
+    throw new AddressError(
+      'design is not JSON; write an object of numbers and choices such as {"P": 0.25}',
+    )
   }
   const isObject = typeof value === 'object' && value !== null && !Array.isArray(value)
-  if (!isObject || Object.values(value as object).some((v) => typeof v !== 'number')) {
-    throw new AddressError('design must be an object of numbers such as {"P": 0.25}')
+  if (
+    !isObject ||
+    Object.values(value as object).some((v) => !['number', 'string'].includes(typeof v))
+  ) {
+    throw new AddressError(
+      'design must be an object of numbers and choices such as {"P": 0.25, "fir_window": "hamming"}',
+    )
   }
-  return value as Record<string, number>
+  return value as Design
 }

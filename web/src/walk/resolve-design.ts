@@ -3,7 +3,7 @@
 import { get } from '../api/client'
 import { ApiProblem } from '../api/problem'
 import { readableJob } from '../api/readable'
-import type { Controller, Evaluation, Job, JobSpec, Scenario } from '../api/types'
+import type { Controller, Design, Evaluation, Job, JobSpec, Scenario } from '../api/types'
 import type { DesignSource } from './design-source'
 
 /** A design with all that a walk of it needs. */
@@ -13,7 +13,7 @@ export interface ResolvedDesign {
   readonly label: string
   readonly robot: JobSpec['robot']
   readonly controller: Controller
-  readonly design: Readonly<Record<string, number>>
+  readonly design: Design
   /** Scenarios in which its job judges it; none outside a job. */
   readonly scenarios: readonly Scenario[]
 }
@@ -47,10 +47,10 @@ async function ofJob(
 ): Promise<ResolvedDesign> {
   const job = await readableJob(source.job, signal)
   const { spec } = job
-  if (spec.kind === 'identification') {
+  if (spec.kind === 'identification' || spec.kind === 'calibration') {
     throw new ApiProblem(
       422,
-      'this job identifies parameters of the simulation from measured walks, so its designs drive' +
+      'this job fits parameters of the simulation to what was measured, so its designs drive' +
         ' no controller; its own page shows them',
     )
   }

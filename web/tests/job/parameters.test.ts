@@ -28,6 +28,7 @@ const voltage: FittedParameter = {
     { low: 10, high: 11 },
     { low: 10.8, high: 11 },
   ],
+  choices: [],
   trust: 'trusted',
   explanation: 'all runs agree on a small part of the range',
 }
@@ -104,6 +105,17 @@ test('fits of the same recordings are offered first, other kinds of jobs never',
   const { same, others } = candidates(jobs, jobs[0])
   expect(same.map(({ id }) => id)).toEqual(['b'])
   expect(others.map(({ id }) => id)).toEqual(['c', 'd'])
+})
+
+test('a choice lies at its index', () => {
+  const choices = ['linear_zone', 'karnopp', 'stick'].map((name) => ({
+    name,
+    fitness: 1,
+    by_run: [1],
+    remains: true,
+  }))
+  const law = { ...voltage, low: 0, high: 2, best: 'karnopp', choices }
+  expect(shareOf('karnopp', law)).toBe(0.5)
 })
 
 function job(id: string, seed: number): Job {

@@ -43,8 +43,8 @@ test('no word names no design', () => {
 test.each([
   ['job=k2q7&iteration=3', /both from 0/],
   ['job=k2q7&iteration=x&particle=1', /both from 0/],
-  ['design={"P":"much"}', /object of numbers/],
-  ['design=[1]', /object of numbers/],
+  ['design={"P":true}', /object of numbers and choices/],
+  ['design=[1]', /object of numbers and choices/],
   ['design={', /not JSON/],
 ])('%s is refused', (query, message) => {
   expect(() => sourceOf(new URLSearchParams(query))).toThrow(AddressError)

@@ -68,7 +68,7 @@ function Panel({ found, parameter }: { found: Convergence; parameter: FittedPara
   const { thresholds } = found
   const decisive = parameter.intervals[thresholds.indexOf(DECISIVE)]
   const middle = placeOf(DECISIVE, thresholds) * WIDTH
-  const y = (value: number) => (1 - shareOf(value, parameter)) * HEIGHT
+  const y = (value: number | string) => (1 - shareOf(value, parameter)) * HEIGHT
   const text = decisive && `${formatNumber(decisive.low, 3)} – ${formatNumber(decisive.high, 3)}`
   return (
     <figure class="interval" data-trust={trust ?? 'none'}>

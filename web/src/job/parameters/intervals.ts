@@ -44,8 +44,10 @@ export function placeOf(threshold: number, thresholds: readonly number[]): numbe
 }
 
 /** The share of its range at which a value lies: 0 at the lower bound, 1 at the upper. */
-export function shareOf(value: number, { low, high }: FittedParameter): number {
-  return (value - low) / (high - low)
+export function shareOf(value: number | string, parameter: FittedParameter): number {
+  const { low, high, choices } = parameter
+  const number = typeof value === 'string' ? choices.findIndex(({ name }) => name === value) : value
+  return (number - low) / (high - low)
 }
 
 /** Outline of the intervals over the thresholds, as an SVG path in a box of that size. */

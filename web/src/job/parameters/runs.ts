@@ -1,4 +1,4 @@
-/** Which jobs may be further runs of the same identification. Pure. */
+/** Which jobs may be further runs of the same fit. Pure. */
 
 import type { Job, JobSummary } from '../../api/types'
 
@@ -16,14 +16,18 @@ export function wordOfRuns(ids: readonly string[]): string | null {
   return ids.length === 0 ? null : ids.join(',')
 }
 
-/** Other identifications that have a design: those fitted to the same recordings, and the others. */
+/** Other jobs of the kind that have a design: those fitted to the same walks, and the others. */
 export function candidates(
   jobs: readonly JobSummary[],
-  own: { readonly id: string; readonly scenarios: readonly string[] },
+  own: {
+    readonly id: string
+    readonly kind: JobSummary['kind']
+    readonly scenarios: readonly string[]
+  },
 ): { readonly same: readonly JobSummary[]; readonly others: readonly JobSummary[] } {
   const recordings = (job: { readonly scenarios: readonly string[] }) =>
     [...job.scenarios].sort().join()
-  const fitted = jobs.filter((job) => job.kind === 'identification' && job.id !== own.id)
+  const fitted = jobs.filter((job) => job.kind === own.kind && job.id !== own.id)
   const isSame = (job: JobSummary) => recordings(job) === recordings(own)
   return {
     same: fitted.filter((job) => isSame(job) && job.best_fitness !== null),

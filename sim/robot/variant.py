@@ -33,7 +33,7 @@ class RobotVariant(BaseModel):
     backlash: Degrees = Field(
         default=(0.0, 0.0, 0.0),
         description="Play between gearhead and link of coxa, femur and tibia, end to end [deg];"
-        " measured at 2 to 3 on the robot. Simulated at 20 kHz, so four times as slow.",
+        " measured at 2 to 3 on the robot. Simulated at 40 kHz, so eight times as slow.",
         examples=[(2.5, 1.0, 1.0)],
     )
     planned_soles: PlannedSoles | None = Field(

@@ -35,10 +35,10 @@ import json, sys
 from sim.compiler import compilation
 narrow = compilation.Target(int(sys.argv[1]), sys.argv[2])
 compilation.target = lambda: narrow
-from sim.robot import load_robot
+from sim.robot import DEFAULT_ROBOT, load_robot
 from sim.assembly import kernel_of
 from tests.golden.numbers import objectives_of_the_optimum
-print(json.dumps([kernel_of(load_robot("szabadka2")).lanes, objectives_of_the_optimum()]))
+print(json.dumps([kernel_of(load_robot(DEFAULT_ROBOT)).lanes, objectives_of_the_optimum()]))
 """
 
 AVX512 = "X86_V4 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"

@@ -53,7 +53,7 @@ class Trace:
 
 def timestep_of(robot: Robot) -> float:
     """[s]; links without their rotors answer the ground too fast for 5 kHz."""
-    return 5e-5 if robot.has_backlash else 2e-4
+    return 2.5e-5 if robot.has_backlash else 2e-4
 
 
 def drag_of(robot: Robot, scenario: Scenario) -> float:

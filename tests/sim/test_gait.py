@@ -260,7 +260,7 @@ def test_twenty_of_them_are_of_swing_twenty_of_support_and_two_end_the_stride(
     lift = heights - heights.min()
     forward = np.tan(targets[:, ::3]) * (scenario.radius - 0.07)
     for leg in range(6):
-        ends = np.isclose(abs(forward[:, leg]), 0.08)
+        ends = np.isclose(abs(forward[:, leg]), scenario.stride / 2.0)
         assert ends.sum() == 2
         assert (lift[ends, leg] < 1e-9).all()
         assert (lift[~ends, leg] > 1e-4).sum() == 20

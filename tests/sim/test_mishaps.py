@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -35,16 +34,14 @@ def test_a_drop_is_no_loss_of_height() -> None:
     assert abs(outcome.objectives[0, 5]) < 0.01
 
 
-def coxa_travel(leg: str, **options: Any) -> float:
-    """Range of a coxa's angle [rad] over a short walk with the right middle leg jammed."""
-    log = logged_walk(short_walk(stuck_leg="right_middle"), PI, "pi", **options)
-    robot = load_robot("szabadka2")
-    return float(np.ptp(log.joint_angle[:, robot.joint_names.index(f"{leg}_coxa")]))
-
-
-def test_a_jammed_coxa_stays_where_it_was_and_the_others_walk() -> None:
-    assert coxa_travel("right_middle") < 0.02
-    assert coxa_travel("left_middle") > 0.3
+def test_a_jammed_leg_stays_where_it_was_and_the_others_walk() -> None:
+    log = logged_walk(short_walk(stuck_leg="right_middle"), PI, "pi")
+    coxa, femur, tibia = np.ptp(log.joint_angle, axis=0).reshape(6, 3).T
+    others = np.arange(6) != JAMMED
+    assert max(coxa[JAMMED], femur[JAMMED], tibia[JAMMED]) < 0.02
+    assert (coxa[others] > 0.3).all()
+    assert (femur[others] > 0.3).all()
+    assert (tibia[others] > 0.1).all()
 
 
 def test_a_motor_that_pushes_at_an_obstacle_is_hot_and_loads_its_gear() -> None:
@@ -81,7 +78,8 @@ def test_all_scenarios_of_a_robot_share_a_kernel_jammed_or_not() -> None:
     held = Layout(robot).slices["jam_stiffness"]
     assert free.shape == stuck.shape
     assert not free[held].any()
-    assert np.flatnonzero(stuck[held]).tolist() == [5]
+    jammed = [robot.joint_names[joint] for joint in np.flatnonzero(stuck[held])]
+    assert jammed == ["left_rear_coxa", "left_rear_femur", "left_rear_tibia"]
 
 
 def test_the_published_optimum_falls_onto_its_feet_and_walks_on() -> None:

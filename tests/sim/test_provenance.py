@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from sim.provenance import Provenance, provenance_of, simulator_files, source_digest
-from sim.robot import RobotFiles, RobotVariant
+from sim.robot import DEFAULT_ROBOT, RobotFiles, RobotVariant
 from tests.examples.paths import ROOT
 from tests.examples.processes import python
 
@@ -52,14 +52,15 @@ def test_all_modules_that_a_case_runs_through_are_in_the_digest_which_any_proces
 
 def test_a_robot_is_known_by_its_content_and_not_by_how_it_is_named() -> None:
     shipped = provenance_of("szabadka2")
-    assert provenance_of(RobotVariant()) == provenance_of(SHIPPED) == shipped
+    assert provenance_of(RobotVariant(name="szabadka2")) == provenance_of(SHIPPED) == shipped
+    assert provenance_of(RobotVariant()) == provenance_of(DEFAULT_ROBOT) != shipped
 
 
 @pytest.mark.parametrize(
     "robot",
     [
-        RobotVariant(contact_law="stick"),
-        RobotVariant(backlash=(2.5, 1.0, 1.0)),
+        RobotVariant(name="szabadka2", contact_law="stick"),
+        RobotVariant(name="szabadka2", backlash=(2.5, 1.0, 1.0)),
         RobotFiles(
             toml=SHIPPED.toml.replace("\nfriction = 1.0", "\nfriction = 0.9"), urdf=SHIPPED.urdf
         ),

@@ -36,7 +36,7 @@ REVERSING: Final[Mapping[str, Mapping[str, float]]] = {
 CURRENTS: Final = np.linspace(0.0, 1.0, 64)
 """Shares of the current's range, at the columns of the table."""
 
-LARGE: Final = CURRENTS > (LARGE_BEGINS.default or 0.0)
+LARGE: Final = (LARGE_BEGINS.default or 0.0) < CURRENTS
 
 
 def inferred(source: Inference, error: float) -> Floats:

@@ -32,7 +32,7 @@ class Coded(ABC):
     def __call__(self, tick: int, angles: Floats, current: Floats) -> Floats:
         s, full = self._sensors, self._pwm.counts
         error = self._desired[tick] - _stepped(np.rint(angles * s.angle_counts), s.angle_step)
-        load = _stepped(np.rint(np.abs(current) * s.current_counts), s.current_step)
+        load = _stepped(np.rint(current * s.current_counts), s.current_step)
         limit = full << 32
         self._integral = np.clip(self._integral + error * self._integral_gain, -limit, limit)
         output = self.proportional(error, load) + _shifted(self._integral, 32)

@@ -83,8 +83,6 @@ def mjcf(
     motor_voltage: one actuator a joint that turns a motor's voltage into its torque at the joint,
         quasi-static, friction included. Without it, torques are applied from outside.
     """
-    # An own mass of the body would have to be exported, too.
-    assert robot.description.body_mass is None
     urdf = ET.fromstring(robot.urdf.text)  # noqa: S314
     root = ET.Element("mujoco", model=robot.description.name)
     # URDF's roll, pitch, yaw turn about fixed axes.
@@ -164,17 +162,23 @@ def _inertial(body: ET.Element, link: ET.Element) -> None:
 
 
 def _base_inertial(body: ET.Element, link: ET.Element, robot: Robot, load: float) -> None:
-    """The body's inertia; a load is a point mass that moves the common centre of mass."""
-    if not load:
+    """The body's inertia, of the robot's own mass of it if it has one and the URDF's shape.
+
+    A load is a point mass that moves the common centre of mass.
+    """
+    inertial = _child(link, "inertial")
+    drawn = float(_attribute(_child(inertial, "mass"), "value"))
+    own = robot.description.body_mass or drawn
+    if not load and own == drawn:
         _inertial(body, link)
         return
-    inertial = _child(link, "inertial")
-    own = float(_attribute(_child(inertial, "mass"), "value"))
     place = _placement(inertial)
     assert "euler" not in place
     centre = np.array([float(x) for x in place["pos"].split()])
     element = _child(inertial, "inertia")
-    xx, yy, zz, xy, xz, yz = (float(_attribute(element, f"i{axes}")) for axes in TENSOR)
+    xx, yy, zz, xy, xz, yz = (
+        float(_attribute(element, f"i{axes}")) * (own / drawn) for axes in TENSOR
+    )
     between = np.array([0.0, 0.0, robot.description.load_height]) - centre
     reduced = own * load / (own + load)
     total = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + reduced * (

@@ -19,10 +19,11 @@ from tests.mujoco.walker import Controller, Floats, Trace, drag_of, walk
 
 pytestmark = pytest.mark.slow
 
-PLAIN = RobotVariant()
-DEAD_ZONE = RobotVariant(contact_law="dead_zone")
-KARNOPP, STICK = RobotVariant(contact_law="karnopp"), RobotVariant(contact_law="stick")
-LOOSE = RobotVariant(backlash=(2.5, 1.0, 1.0))
+DEFAULT, PLAIN = RobotVariant(), RobotVariant(name="szabadka2")
+DEAD_ZONE, KARNOPP, STICK = (
+    RobotVariant(name="szabadka2", contact_law=law) for law in ("dead_zone", "karnopp", "stick")
+)
+LOOSE = RobotVariant(name="szabadka2", backlash=(2.5, 1.0, 1.0))
 NORMAL_FAST, LOADED_FAST, LOADED_SLOW, SLOPE_FAST = (SCENARIOS[k] for k in (0, 2, 3, 4))
 DRIVES: Mapping[str, tuple[str, Mapping[str, float], type[Coded]]] = {
     "published optimum A": ("fuzzy-pi", walks.PUBLISHED_A, FuzzyPi),
@@ -35,7 +36,7 @@ def named(value: object) -> str:
     """What tells a case from the others."""
     if isinstance(value, RobotVariant):
         play = " and backlash" if any(value.backlash) else ""
-        return f"{value.contact_law}{play}"
+        return f"{value.name} {value.contact_law}{play}"
     return value.name if isinstance(value, Scenario) else str(value)
 
 
@@ -55,10 +56,10 @@ def our_walk(
     return result.outcome.objectives[0], log
 
 
-def own_controller(drive: str, log: WalkLog) -> Controller:
+def own_controller(drive: str, log: WalkLog, variant: RobotVariant = PLAIN) -> Controller:
     """The drive's controller in closed loop, in the tests' own integers."""
     _, design, controller = DRIVES[drive]
-    return controller(load_robot(PLAIN), log, design)
+    return controller(load_robot(variant), log, design)
 
 
 def deviations(trace: Trace, log: WalkLog, seconds: float = np.inf) -> dict[str, float]:
@@ -73,6 +74,8 @@ def deviations(trace: Trace, log: WalkLog, seconds: float = np.inf) -> dict[str,
 @pytest.mark.parametrize(
     ("variant", "drive", "scenario"),
     [
+        (DEFAULT, "published optimum A", LOADED_FAST),
+        (DEFAULT, "stiff PI", SLOPE_FAST),
         (PLAIN, "published optimum A", NORMAL_FAST),
         (PLAIN, "stiff PI", NORMAL_FAST),
         (PLAIN, "published optimum A", LOADED_FAST),
@@ -90,7 +93,7 @@ def test_a_walk_is_the_same_in_mujoco_to_rounding(
 ) -> None:
     """Same step in the same frame: nothing but rounding is left between the engines."""
     objectives, log = our_walk(drive, scenario, variant)
-    controller = own_controller(drive, log)
+    controller = own_controller(drive, log, variant)
     trace = walk(load_robot(variant), scenario, log, controller, integration="body frame")
     assert max(deviations(trace, log).values()) < 1e-9
     np.testing.assert_allclose(trace.foot_force, log.foot_force, atol=1e-6)
@@ -112,7 +115,7 @@ def test_under_mujocos_integrator_a_walk_stays_within_a_micrometre_and_two_perce
 ) -> None:
     """MuJoCo's semi-implicit Euler differs from ours in second order of the step."""
     objectives, log = our_walk(drive, NORMAL_FAST, variant)
-    controller = own_controller(drive, log)
+    controller = own_controller(drive, log, variant)
     trace = walk(load_robot(variant), NORMAL_FAST, log, controller, integration="mujoco")
     assert max(deviations(trace, log, seconds=0.1).values()) < 1e-6
     # Half a play of 2.5 degrees is 0.022 rad: loose joints may lie at either end of it.

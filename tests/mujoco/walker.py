@@ -32,7 +32,7 @@ class Controller(Protocol):
     """What sets the duty cycles at every control tick."""
 
     def __call__(self, tick: int, angles: Floats, current: Floats) -> Floats:
-        """Encoders' angles (J,) [rad], currents of the last step (J,) [A] -> duty (J,) [1]."""
+        """Encoders' angles (J,) [rad], sensed |currents| (J,) [A] -> duty (J,) [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,16 +97,18 @@ def walk(
     gears = gears_of(robot, d.qpos[7:], m.opt.timestep)
     advance = _advance_in_body_frame if integration == "body frame" else mujoco.mj_step2
     measures = _Measures(gears.armature)
-    current, forces = np.zeros(n), np.zeros((legs, 3))
+    sensed, forces = np.zeros(n), np.zeros((legs, 3))
+    settling = robot.description.sensors.current_filter
+    share = 1.0 - np.exp(-m.opt.timestep / settling) if settling > 0.0 else 1.0
     states, turned = np.empty((ticks, 7 + n)), np.empty((ticks, n))
     trodden = np.empty((ticks, legs, 3))
     for tick in range(ticks):
         states[tick], turned[tick] = d.qpos, gears.encoders(d.qpos[7:])
-        duty = controller(tick, turned[tick], current)
+        duty = controller(tick, turned[tick], sensed)
         for substep in range(substeps):
             mujoco.mj_step1(m, d)
             actuation = gears.actuate(duty, d.qpos[7:], d.qvel[6:])
-            current = actuation.current
+            sensed = sensed + share * (np.abs(actuation.current) - sensed)
             d.qfrc_applied[:6] = 0.0
             d.qfrc_applied[6:] = actuation.torque
             if push is not None:
@@ -114,8 +116,9 @@ def walk(
             if substep == 0:
                 trodden[tick] = forces
             before = d.qpos[3:7].copy(), d.qvel[:3].copy()
+            power = float(actuation.voltage @ actuation.current)
             advance(m, d)
-            measures.add(*before, d.qacc, actuation.torque, float(actuation.voltage @ current))
+            measures.add(*before, d.qacc, actuation.torque, power)
     objectives = measures.objectives(m.opt.timestep, d.qpos[2] - states[0, 2])
     return Trace(states[:, :3], states[:, [4, 5, 6, 3]], states[:, 7:], turned, trodden, objectives)
 

@@ -27,10 +27,13 @@ class ParticleColumnView(View):
     low: float | None = Field(description="Lower bound of a variable; else null.")
     high: float | None = Field(description="Upper bound of a variable; else null.")
     kind: Literal["index", "fitness", "continuous", "integer", "categorical", "utility"] = Field(
-        description="What its numbers are; `continuous`, `integer` and `categorical` are variables,"
-        " the last with the index of a choice."
+        description="What its numbers are; `continuous`, `integer` and `categorical` are variables."
     )
-    choices: list[str] = Field(default=[], description="Those of a categorical variable.")
+    choices: list[str] = Field(
+        description="Names of a categorical variable's choices, whose indices its numbers are;"
+        " else none.",
+        examples=[["linear_zone", "karnopp", "stick"]],
+    )
 
 
 class ParticlesHeaderView(View):
@@ -79,11 +82,12 @@ def _described(job: Job) -> list[ParticleColumnView]:
     plain = [("iteration", "1", "index"), ("particle", "1", "index"), ("fitness", unit, "fitness")]
     worth = [(f"utility:{name}", unit, "utility") for name in job.spec.case_names]
     variables = [
-        v.model_dump(include={"name", "unit", "low", "high", "kind", "choices"})
+        {name: getattr(v, name) for name in ParticleColumnView.model_fields}
         for v in job.spec.design_space().variables
     ]
+    nothing: dict[str, object] = {"low": None, "high": None, "choices": []}
     unbounded = [
-        [{"name": n, "unit": u, "low": None, "high": None, "kind": kind} for n, u, kind in group]
+        [{"name": n, "unit": u, "kind": kind, **nothing} for n, u, kind in group]
         for group in (plain, worth)
     ]
     described = [*unbounded[0], *variables, *unbounded[1]]

@@ -14,6 +14,7 @@ from scipy.stats import spearmanr
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit
 from tests.examples.servers import unframed
@@ -113,6 +114,7 @@ def test_particles_are_columns_of_floats_with_units_and_bounds(
         "low": second.low,
         "high": second.high,
         "kind": second.kind,
+        "choices": [],
     }
     assert columns["iteration"].tolist() == [row.iteration for row in rows]
     assert columns["particle"].tolist() == [row.particle for row in rows]
@@ -126,6 +128,21 @@ def test_particles_are_columns_of_floats_with_units_and_bounds(
     utility = math.prod((b + 11.0) ** e for b, e in zip(bias, exponent, strict=True))
     assert columns["utility:normal-fast"][1] == np.float32(utility)
     assert np.isnan(columns["utility:turn-right-fast"][0])
+
+
+def test_a_categorical_variable_is_a_column_of_indices_with_the_names_of_its_choices(
+    client: httpx2.Client, store: SqlStore, spec: JobSpec, commit: Commit
+) -> None:
+    names = [variable.name for variable in spec.design_space().variables]
+    job, _ = store.create_job(spec.model_copy(update={"variables": (*names, "fir_window")}))
+    commit(job, 3)
+    header, columns = particles(client, job)
+    (described,) = [c for c in header["columns"] if c["name"] == "fir_window"]
+    assert (described["kind"], described["choices"]) == (
+        "categorical",
+        ["moving_average", "hamming"],
+    )
+    assert set(columns["fir_window"].tolist()) == {0.0, 1.0}
 
 
 def test_particles_after_an_iteration_are_the_later_ones(

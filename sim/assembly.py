@@ -16,7 +16,7 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import Trajectory, desired_angles
 from sim.kernel.native import native_kernel
 from sim.kernel.parameters import gravity_on, internal_state_size, pack_parameters
-from sim.kernel.walk import Kernel, WalkResult, WalkSetup
+from sim.kernel.walk import Kernel, WalkResult, WalkSetup, current_smoothing
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
 from sim.robot import Robot
@@ -151,6 +151,7 @@ def plan_walk(
         energy=robot.description.supply.energy,
         direction=-1 if scenario.direction == "backward" else 1,
         drop=scenario.drop,
+        current_smoothing=current_smoothing(robot.description.sensors.current_filter, timestep),
         disturbance=None if noise is None else noise.samples(ticks, n_joints),
     )
 

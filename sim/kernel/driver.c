@@ -17,7 +17,6 @@ enum { FRACTION_BITS = 16, INTEGRAL_BITS = 32 };
 typedef struct {
   double angle_counts, current_counts, duty_per_count;
   int64_t angle_step, current_step, pwm_step, pwm_counts, substeps;
-  double current_smoothing; /* of the analog low-pass, a step; 1 for none */
 } Coding;
 
 /* sim.controllers.base.LookupTable; values is NULL where there is none. */
@@ -39,6 +38,7 @@ typedef struct {
   int64_t ticks;
   double fall_height;  /* of the body over the ground [m] */
   double fall_cosine;  /* of the tilt */
+  double current_smoothing; /* of the current's analog low-pass, a step; 1 for none */
   double *sums;        /* N_INTEGRANDS, summed over physics steps */
   double *end;         /* NQ, final position */
   double *log;         /* ticks x NLOG: q, v, internal state, duty; or NULL */
@@ -137,10 +137,18 @@ static void write_log(Walker *const *lane, const int *walking, int64_t tick, con
 }
 
 /* The current sensors' analog filter, of |I|, over one physics step. */
-static void low_pass(vec *sensed, const vec *current, double smoothing)
+static void low_pass(vec *sensed, const vec *current, vec smoothing)
 {
   for (int j = 0; j < NJ; j++)
-    sensed[j] += SPLAT(smoothing) * (vec_abs(current[j]) - sensed[j]);
+    sensed[j] += smoothing * (vec_abs(current[j]) - sensed[j]);
+}
+
+/* Lanes without a filter: its sum may differ from the current itself by a rounding. */
+static void unfiltered(vec *sensed, const vec *current, vec smoothing)
+{
+  for (int k = 0; k < LANES; k++)
+    if (smoothing[k] >= 1.0)
+      for (int j = 0; j < NJ; j++) sensed[j][k] = current[j][k];
 }
 
 /* Lanes whose state is finite; x - x is zero for a finite x only. */
@@ -157,11 +165,12 @@ static ivec all_finite(const vec *q, const vec *v, const vec *internal)
 static void walk(Walker *const *lane, const Coding *c)
 {
   vec q[2][NQ], v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
-  vec sensed[NJ];
+  vec sensed[NJ], smoothing;
   vec sums[N_INTEGRANDS], integrands[N_INTEGRANDS], largest, peak = SPLAT(0.0);
   Past past;
   int walking[LANES];
   int64_t last = 0;
+  int filtered = 0;
 
   memset(&past, 0, sizeof past);
   memset(v, 0, sizeof v);
@@ -173,14 +182,17 @@ static void walk(Walker *const *lane, const Coding *c)
     for (int i = 0; i < NI; i++) internal[0][i][k] = lane[k]->internal_state[i];
     for (int i = 0; i < NP; i++) p[i][k] = lane[k]->parameters[i];
     if (lane[k]->ticks > last) last = lane[k]->ticks;
+    smoothing[k] = lane[k]->current_smoothing;
+    if (smoothing[k] < 1.0) filtered = 1;
     lane[k]->status = OK;
     walking[k] = 1;
   }
 
   int now = 0;
   for (int64_t tick = 0; tick < last; tick++) {
-    control_tick(lane, c, tick, ENCODER(q[now], internal[now]),
-                 c->current_smoothing < 1.0 ? sensed : current, &past, duty, disturbance);
+    if (filtered) unfiltered(sensed, current, smoothing);
+    control_tick(lane, c, tick, ENCODER(q[now], internal[now]), filtered ? sensed : current, &past,
+                 duty, disturbance);
     write_log(lane, walking, tick, q[now], v[now], internal[now], duty);
     for (int64_t n = 0; n < c->substeps; n++) {
       step(q[now], v[now], internal[now], duty, disturbance, p, q[1 - now], v[1 - now],
@@ -188,7 +200,7 @@ static void walk(Walker *const *lane, const Coding *c)
       now = 1 - now;
       for (int i = 0; i < N_INTEGRANDS; i++) sums[i] += integrands[i];
       peak = vec_max(peak, largest);
-      if (c->current_smoothing < 1.0) low_pass(sensed, current, c->current_smoothing);
+      if (filtered) low_pass(sensed, current, smoothing);
     }
     const vec qx = q[now][3], qy = q[now][4];
     const vec upright = SPLAT(1.0) - SPLAT(2.0) * (qx * qx + qy * qy);

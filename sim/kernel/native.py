@@ -35,7 +35,6 @@ class _Coding(ctypes.Structure):
         ("pwm_step", ctypes.c_int64),
         ("pwm_counts", ctypes.c_int64),
         ("substeps", ctypes.c_int64),
-        ("current_smoothing", ctypes.c_double),
     ]
 
 
@@ -67,6 +66,7 @@ class _Walker(ctypes.Structure):
         ("ticks", ctypes.c_int64),
         ("fall_height", ctypes.c_double),
         ("fall_cosine", ctypes.c_double),
+        ("current_smoothing", ctypes.c_double),
         ("sums", ctypes.c_void_p),
         ("end", ctypes.c_void_p),
         ("log", ctypes.c_void_p),
@@ -174,6 +174,7 @@ class NativeKernel:
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height
             walker.fall_cosine = setup.fall_cosine
+            walker.current_smoothing = setup.current_smoothing
             walker.sums = sums[k].ctypes.data
             walker.end = end[k].ctypes.data
             walker.log = None if record is None else record.ctypes.data

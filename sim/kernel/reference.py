@@ -72,7 +72,7 @@ class ReferenceKernel:
                 rows.append(np.concatenate([step.q, step.v, step.internal_state, step.duty]))
             for _ in range(coding.substeps):
                 step.advance()
-                sensed = _low_pass(sensed, np.abs(step.current), coding.current_smoothing)
+                sensed = _low_pass(sensed, np.abs(step.current), setup.current_smoothing)
                 sums += step.integrands
                 peak_current = max(peak_current, float(step.largest_current[0]))
             status = _status_of(step, setup)

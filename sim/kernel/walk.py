@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.base import ControlLaw
-from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.outcome import Status
 from sim.robot import Robot
@@ -36,8 +35,6 @@ class Coding:
         pwm_step: resolution of the PWM [counts].
         pwm_counts: full scale of the PWM [counts].
         substeps: physics steps a control tick.
-        current_smoothing: share of its distance from the absolute current that the analog
-            low-pass of the current goes in a physics step; 1 for no low-pass [1].
     """
 
     angle_counts: float
@@ -48,7 +45,6 @@ class Coding:
     pwm_step: int
     pwm_counts: int
     substeps: int
-    current_smoothing: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("angle_step", "current_step", "pwm_step", "pwm_counts", "substeps"):
@@ -67,7 +63,6 @@ class Coding:
             The coding.
         """
         d = robot.description
-        timestep, settling = CONTROL_PERIOD / substeps, d.sensors.current_filter
         return cls(
             angle_counts=d.sensors.angle_counts,
             current_counts=d.sensors.current_counts,
@@ -77,8 +72,20 @@ class Coding:
             pwm_step=d.pwm.step,
             pwm_counts=d.pwm.counts,
             substeps=substeps,
-            current_smoothing=-math.expm1(-timestep / settling) if settling > 0.0 else 1.0,
         )
+
+
+def current_smoothing(time_constant: float, timestep: float) -> float:
+    """How fast the analog low-pass of the current follows.
+
+    Args:
+        time_constant: Of the low-pass [s]; 0 for none.
+        timestep: Of the physics [s].
+
+    Returns:
+        Share of its distance from the absolute current that it goes in a physics step [1].
+    """
+    return -math.expm1(-timestep / time_constant) if time_constant > 0.0 else 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +105,8 @@ class WalkSetup:
         energy: what of a motor's electrical power counts as spent.
         direction: of travel along the heading, 1 forward and -1 backward.
         drop: height of the start above the stance at which the soles carry the weight [m].
+        current_smoothing: share of its distance from the absolute current that the analog
+            low-pass of the current goes in a physics step; 1 for no low-pass [1].
     """
 
     start: Floats
@@ -111,6 +120,7 @@ class WalkSetup:
     energy: EnergyConvention = "signed"
     direction: int = 1
     drop: float = 0.0
+    current_smoothing: float = 1.0
 
     @property
     def ticks(self) -> int:

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from sim.assembly import plan_walk
+from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw, LookupTable
 from sim.kernel.native import native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import reference_kernel
-from sim.kernel.walk import Coding
+from sim.kernel.walk import Coding, current_smoothing
 from sim.robot import Robot, load_robot
 from tests.examples.robots import changed
-from tests.examples.walks import short_walk, walk
+from tests.examples.walks import PUBLISHED_A, short_walk, walk
 
 BRIEF = short_walk(cycle_time=0.4)
 
@@ -30,9 +31,9 @@ def filtered(robot: Robot, seconds: float) -> Robot:
     return changed(robot, sensors={"current_filter": seconds})
 
 
-def test_a_filters_time_constant_is_that_of_a_first_order_low_pass(robot: Robot) -> None:
-    assert Coding.of(robot, 10).current_smoothing == 1.0
-    share = Coding.of(filtered(robot, 0.005), 10).current_smoothing
+def test_a_filters_time_constant_is_that_of_a_first_order_low_pass() -> None:
+    assert current_smoothing(0.0, 2e-4) == 1.0
+    share = current_smoothing(0.005, 2e-4)
     # A step of the current is followed to 1 - 1/e after 5 ms, 25 physics steps of 0.2 ms.
     assert 1.0 - (1.0 - share) ** 25 == pytest.approx(1.0 - math.exp(-1.0), rel=1e-12)
 
@@ -55,8 +56,9 @@ def test_the_controller_reads_the_filtered_absolute_current(robot: Robot, kind: 
     setup = plan(softer_by_current())
     # Errors, and with them the currents, change sign every 20 physics steps.
     side = np.where(np.arange(100) // 20 % 2, -1, 1)[:, None]
-    setup = dataclasses.replace(setup, desired=setup.desired[:100] + 20_000 * side.astype(np.int32))
-    coding = dataclasses.replace(Coding.of(robot, 1), current_smoothing=0.1)
+    desired = setup.desired[:100] + 20_000 * side.astype(np.int32)
+    setup = dataclasses.replace(setup, desired=desired, current_smoothing=0.1)
+    coding = Coding.of(robot, 1)
     (result,) = kernel.walk([setup], coding, log=True)
     assert result.states is not None
     signed = walk_log(robot, setup, result.states).current
@@ -90,3 +92,18 @@ def test_a_filter_changes_a_fuzzy_walk_and_none_that_ignores_currents(robot: Rob
         walk(BRIEF, stiff, "pi", robot=r).outcome.objectives for r in (slow_sensor, robot)
     )
     np.testing.assert_array_equal(ignoring, unfiltered)
+
+
+def test_walks_with_different_filters_are_computed_together_as_alone(robot: Robot) -> None:
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    coding, setups = Coding.of(robot, 10), []
+    for seconds in (0.0, 0.01, 0.002, 0.0, 0.03):
+        plan = plan_walk(filtered(robot, seconds), BRIEF, 2e-4)
+        assert plan is not None
+        setups.append(plan(CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A)))
+    together = kernel.walk(setups, coding, log=False)
+    alone = [kernel.walk([setup], coding, log=False)[0] for setup in setups]
+    for a, b in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(a.sums, b.sums)
+    assert len({tuple(result.end) for result in together}) == 4

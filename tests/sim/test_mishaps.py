@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any, Final
 
 import numpy as np
 import pytest
 
+from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.kernel.parameters import GRAVITY, Layout, pack_parameters
 from sim.outcome import Status
-from sim.robot import RobotVariant, load_robot
+from sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
 from sim.scenario import find_scenario
-from sim.simulate import check_reach
+from sim.simulate import Simulation, check_reach
+from tests.examples.robots import changed
 from tests.examples.walks import logged_walk, short_walk, walk
 
 JAMMED = 2
 """Index of the right middle leg."""
 
 PI = {"P": 0.45, "I": 0.1}
+
+RULES_5_AND_6: Final[Mapping[str, tuple[ControllerName, str]]] = {
+    "A": ("fuzzy-pi", "FW56"),
+    "B": ("fuzzy-pi", "FW56"),
+    "C": ("fuzzy-pi", "FW56"),
+    "fuzzy-pso-ps": ("fuzzy-pi-3", "W56"),
+}
+"""By published optimum: its controller, and the weight of the rules."""
 
 
 def test_a_robot_is_dropped_from_above_its_stance() -> None:
@@ -101,6 +113,59 @@ def test_the_published_optimum_walks_slower_and_hotter_with_a_stuck_leg() -> Non
     assert stuck.outcome.statuses.tolist() == [Status.OK]
     assert 0.0 < stuck.measurements.speed[0] < 0.9 * free.measurements.speed[0]
     assert stuck.measurements.motor_heat[0] > 2.0 * free.measurements.motor_heat[0]
+
+
+def with_a_stuck_leg(study: str, *, protected: bool = True, **options: Any) -> Simulation:
+    """A published optimum with its rules 5 and 6, or with the weight 0 in place of theirs."""
+    controller, weight = RULES_5_AND_6[study]
+    design = dict(CONTROLLERS[controller].published[study])
+    if not protected:
+        design[weight] = 0.0
+    simulated = walk(find_scenario("stuck-leg"), design, controller, **options)
+    assert simulated.outcome.statuses.tolist() == [Status.OK]
+    return simulated
+
+
+def peak_and_heat(study: str, **options: Any) -> tuple[float, float]:
+    """Peak current and motor heat with rules 5 and 6, each as a share of that without."""
+    guarded, open_ = (
+        with_a_stuck_leg(study, protected=protected, **options).measurements
+        for protected in (True, False)
+    )
+    return (
+        float(guarded.peak_current[0] / open_.peak_current[0]),
+        float(guarded.motor_heat[0] / open_.motor_heat[0]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("study", "peak", "heat"), [("A", 0.98, 0.97), ("B", 0.985, 0.96), ("fuzzy-pso-ps", 0.75, 0.6)]
+)
+def test_rules_5_and_6_protect_the_motors_of_a_stuck_leg(
+    study: str, peak: float, heat: float
+) -> None:
+    """The protection of 4.3.2: less peak current and less heat, by the same design else."""
+    found = peak_and_heat(study)
+    assert found[0] < peak
+    assert found[1] < heat
+
+
+def test_the_small_weight_of_optimum_c_protects_nothing() -> None:
+    assert peak_and_heat("C") == pytest.approx((1.0, 1.0), abs=0.015)
+
+
+@pytest.mark.parametrize("study", ["A", "fuzzy-pso-ps"])
+def test_without_the_low_pass_of_the_current_the_protection_chatters(study: str) -> None:
+    """A reversed motor's current falls at once, so that it is driven ahead again, and so on."""
+    unfiltered = changed(load_robot(DEFAULT_ROBOT), sensors={"current_filter": 0.0})
+    assert peak_and_heat(study, robot=unfiltered)[0] > 1.05
+    reversals = {}
+    for name, robot in (("filtered", load_robot(DEFAULT_ROBOT)), ("unfiltered", unfiltered)):
+        (log,) = with_a_stuck_leg(study, robot=robot, log=True).logs
+        assert log is not None
+        current = log.current[:, robot.joint_names.index("right_middle_femur")]
+        reversals[name] = np.count_nonzero(np.diff(np.sign(current)))
+    assert reversals["unfiltered"] > 100 + reversals["filtered"]
 
 
 def test_a_leg_that_the_robot_does_not_have_cannot_be_jammed() -> None:

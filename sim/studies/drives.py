@@ -83,7 +83,7 @@ DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
             ),
             NamedDrive(
                 "2016",
-                "published Fuzzy-PI A, half-ellipse at 500 Hz (section 5.4)",
+                "published Fuzzy-PI A, trajectory at 500 Hz (section 5.4)",
                 "fuzzy-pi",
                 _published("fuzzy-pi", "A"),
             ),

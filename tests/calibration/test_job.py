@@ -11,8 +11,10 @@ from services.optimizer.jobs.job import JobState
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from services.runtime import open_evaluator, run_embedded
-from tests.calibration.conftest import TRUE_LAW, TRUTH, WALKS, spec, true_targets
+from sim.robot import RobotVariant, load_robot
+from tests.calibration.conftest import PI, TRUE_LAW, TRUTH, WALKS, spec, true_targets
 from tests.examples.jobs import history
+from tests.examples.walks import short_walk, walk
 
 
 def finished(store: SqlStore, wanted: CalibrationSpec) -> str:
@@ -40,6 +42,18 @@ def test_it_finds_hidden_parameters_and_the_hidden_law_of_friction(store: SqlSto
     assert found["battery_voltage"] == pytest.approx(TRUTH["battery_voltage"], abs=0.2)
     assert found["body_mass"] == pytest.approx(TRUTH["body_mass"], abs=0.1)
     assert best.fitness < 0.2
+
+
+def test_some_choices_are_searched_and_walk_by_their_names(store: SqlStore) -> None:
+    laws = ("stick", "linear_zone")
+    law = {"name": "contact_law", "kind": "categorical", "choices": laws}
+    wanted = spec(walks=WALKS[:1], variables=[law], iterations=1)
+    job_id = finished(store, wanted)
+    for evaluation in store.evaluations_between(job_id, 0, 1):
+        index = int(evaluation.design[0])
+        robot = load_robot(RobotVariant(name="szabadka2", contact_law=laws[index]))
+        alone = walk(short_walk(), PI, "pi", robot=robot).outcome.objectives[0]
+        assert evaluation.objectives[0, :6].tolist() == alone.tolist()
 
 
 @pytest.mark.slow

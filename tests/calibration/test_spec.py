@@ -89,6 +89,7 @@ def test_a_failed_walk_is_infinitely_bad_unless_it_is_only_predicted() -> None:
     found = spec(targets=targets).judge(rows, np.array([[True, False], [False, True]]))
     assert found.fitness[0] == math.inf
     assert math.isfinite(found.fitness[1])
+    assert np.isinf(found.utilities).tolist() == [[True, False], [False, True]]
 
 
 def test_walks_that_are_the_same_are_walked_once() -> None:

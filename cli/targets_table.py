@@ -42,7 +42,7 @@ def targets_table(reached: TargetsView) -> Table:
     title = "Targets; off: in tolerances"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     for column in ("walk", "quantity", "unit"):
-        table.add_column(column, no_wrap=column == "walk")
+        table.add_column(column, overflow="fold")
     columns = ("target", "simulated", "off", *(("left out", "off") if left_out else ()))
     for column in columns:
         table.add_column(column, justify="right")
@@ -57,7 +57,7 @@ def targets_table(reached: TargetsView) -> Table:
             number(t.simulated),
             _off(t),
             *(_left_out(t.left_out) if left_out else ()),
-            "" if t.use == "fit" else "not fitted",
+            "" if t.use == "fit" else "predict",
         )
     return table
 

@@ -38,7 +38,7 @@ class ChoiceView(View):
     remains: bool = Field(
         description="Whether a run has it among the designs that count as good as its best: within"
         " 5 %, of a calibration those whose sum of squared differences, in tolerances, is at most 4"
-        " greater."
+        " (times the best fitness squared, if that is above 1) greater."
     )
 
     @classmethod

@@ -92,6 +92,14 @@ def test_a_failed_walk_is_infinitely_bad_unless_it_is_only_predicted() -> None:
     assert np.isinf(found.utilities).tolist() == [[True, False], [False, True]]
 
 
+@pytest.mark.parametrize(("best", "square"), [(0.0, 2.0), (0.5, 2.25), (3.0, 9.0 + 18.0)])
+def test_as_good_is_what_two_standard_deviations_explain(best: float, square: float) -> None:
+    wanted = spec(
+        targets=[target("torque"), target("energy"), target("speed", use="predict")],
+    )
+    assert wanted.as_good_as(best) == pytest.approx(math.sqrt(square))
+
+
 def test_walks_that_are_the_same_are_walked_once() -> None:
     walks = [
         {"name": "all", "controller": "pi", "design": PI, "scenarios": [SHORT_WALK, UPHILL_WALK]},

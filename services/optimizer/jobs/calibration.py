@@ -334,13 +334,17 @@ class CalibrationSpec(Spec):
     def as_good_as(self, fitness: float) -> float:
         """Read tolerances as standard deviations: two of them more in all is no evidence.
 
+        Where even the best is off by more than tolerances, so are they taken to be too small.
+
         Args:
             fitness: the best one.
 
         Returns:
-            The fitness at which the sum of squares over fitted targets is greater by 4.
+            The fitness at which the sum of squares over fitted targets is greater by 4, or by 4
+            times the best mean square where that is above 1.
         """
-        return math.sqrt(fitness * fitness + _NO_EVIDENCE / int(self.fitted.sum()))
+        square = fitness * fitness
+        return math.sqrt(square + _NO_EVIDENCE * max(1.0, square) / int(self.fitted.sum()))
 
     def resolved(self) -> CalibrationSpec:
         """The same job with scenarios and variables written out."""

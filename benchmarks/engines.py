@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from mujoco.rollout import Rollout
 
-from benchmarks.physics import native, pinocchio_aba
+from benchmarks.physics import ROBOT, native, pinocchio_aba
 from sim.assembly import PHYSICS_RATE
 from sim.kernel.observation import WalkLog
 from sim.robot import load_robot
@@ -29,7 +29,6 @@ from sim.simulate import simulate
 from tests.mujoco.export import Feet, model
 from tests.mujoco.walker import CONTROL_PERIOD, drag_of
 
-ROBOT = "szabadka2"
 SCENARIO = SCENARIOS[0]
 SUBSTEPS = round(CONTROL_PERIOD * PHYSICS_RATE)
 

@@ -19,6 +19,9 @@ from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
+_DECIMALS: Final = 12
+"""Of angles in radians that are kept: a start pose is not coded, and must be the same anywhere."""
+
 _CURVES: Final = {"half_ellipse": half_ellipse, "quadratic_spline": quadratic_spline}
 
 
@@ -90,7 +93,8 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
         columns.append(angles)
         misses.append(float(miss.max()))
     angles = low_pass(np.concatenate(columns, axis=1), scenario.fir_ms, scenario.fir_window)
-    return Trajectory(angles, np.array(misses))
+    # numpy's arc functions differ in the last bit between processors.
+    return Trajectory(np.round(angles, _DECIMALS), np.array(misses))
 
 
 def require_reachable(robot: Robot, scenario: Scenario) -> None:

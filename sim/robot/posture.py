@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +25,8 @@ def feet_below_body(robot: Robot, joints: Floats) -> Floats:
     angles = joints.reshape(-1, 3)
     return np.array(
         [
-            leg.hip[2] + leg.femur * np.sin(theta1) + leg.tibia * np.sin(theta1 + theta2)
-            for leg, (_, theta1, theta2) in zip(robot.legs, angles, strict=True)
+            leg.hip[2] + leg.femur * math.sin(theta1) + leg.tibia * math.sin(theta1 + theta2)
+            for leg, (_, theta1, theta2) in zip(robot.legs, angles.tolist(), strict=True)
         ]
     )
 

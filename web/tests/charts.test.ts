@@ -4,8 +4,10 @@ import {
   bestRows,
   buildModel,
   FAILED,
+  marksOf,
   placeOf,
   selectRows,
+  stretchOf,
   valueAt,
 } from '../src/charts/parallel-model'
 import { grouped } from '../src/job/grouped'
@@ -42,9 +44,27 @@ describe('parallel coordinates', () => {
         low: 0,
         high: 10,
         logarithmic: false,
+        choices: [],
         values: Float32Array.from([0, 5, 10, 7.5]),
       },
-      { name: 'fitness', unit: '1', low: null, high: null, logarithmic: true, values: fitness },
+      {
+        name: 'fitness',
+        unit: '1',
+        low: null,
+        high: null,
+        logarithmic: true,
+        choices: [],
+        values: fitness,
+      },
+      {
+        name: 'contact_law',
+        unit: '1',
+        low: 0,
+        high: 2,
+        logarithmic: false,
+        choices: ['linear_zone', 'karnopp', 'stick'],
+        values: Float32Array.from([0, 2, 1, 0]),
+      },
     ],
     fitness,
   )
@@ -57,6 +77,18 @@ describe('parallel coordinates', () => {
 
   test('find the value of a place again', () => {
     expect(valueAt(model.axes[1], placeOf(model.axes[1], 2))).toBeCloseTo(2, 12)
+  })
+
+  test('mark an axis with its bounds, or with the names of its choices', () => {
+    expect(marksOf(model.axes[0])).toEqual([0, 10])
+    expect(marksOf(model.axes[2])).toEqual(['linear_zone', 'karnopp', 'stick'])
+    expect([...model.axes[2].places]).toEqual([0, 1, 0.5, 0])
+  })
+
+  test('say which numbers or choices are selected', () => {
+    expect(stretchOf(model.axes[0], [0.2, 0.5])).toBe('2 to 5')
+    expect(stretchOf(model.axes[2], [0, 0.6])).toBe('linear zone, karnopp')
+    expect(stretchOf(model.axes[2], [0.6, 0.9])).toBe('none')
   })
 
   test('hold every row once in their order', () => {

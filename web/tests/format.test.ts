@@ -10,15 +10,33 @@ import {
   writtenUnit,
 } from '../src/format/number'
 import { formatAge, formatDuration, formatMoment } from '../src/format/time'
+import { exactValueQuantity, formatValue, named, valueQuantity } from '../src/format/value'
 
 const THIN = '\u202f'
 const SPACE = '\u00a0'
 
-describe('numbers', () => {
-  test('the name of a choice is left as it is', () => {
-    expect([formatNumber('stick'), exactQuantity('stick', '1')]).toEqual(['stick', 'stick'])
+describe('values of a design', () => {
+  test('are names of choices in words, without a unit', () => {
+    expect(formatValue('linear_zone')).toBe('linear zone')
+    expect([valueQuantity('stick', 'V'), exactValueQuantity('stick', 'V')]).toEqual([
+      'stick',
+      'stick',
+    ])
   })
 
+  test('or numbers as all are', () => {
+    expect(formatValue(8.71359)).toBe('8.714')
+    expect(exactValueQuantity(0.5, 's')).toBe(`0.5${SPACE}s`)
+  })
+
+  test('are named by the index of a choice', () => {
+    const laws = ['karnopp', 'stick']
+    expect([0, 1].map((index) => named(index, laws))).toEqual(laws)
+    expect(named(1, [])).toBe(1)
+  })
+})
+
+describe('numbers', () => {
   test.each([
     [8.71359, '8.714'],
     [0.00123456, '0.001235'],

@@ -207,7 +207,7 @@ describe('the neighbourhood of a design', () => {
   test('leaves a categorical variable its choices', () => {
     const window = { ...empty.variables.window, mode: 'searched' as const }
     const draft = { ...empty, variables: { ...empty.variables, window } }
-    expect(around(draft, { window: 1 }, new Set()).variables.window).toEqual(window)
+    expect(around(draft, { window: 'hamming' }, new Set()).variables.window).toEqual(window)
   })
 
   test('of an integer variable has whole bounds that differ', () => {

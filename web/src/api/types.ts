@@ -37,10 +37,9 @@ export type IdentificationSpec = Schemas['IdentificationSpec']
 export type CalibrationSpec = Schemas['CalibrationSpec']
 /** A spec of any kind. */
 export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec
-/** Values by variable: numbers, and names of choices. */
-export type Design = Readonly<Record<string, number | string>>
-export type TargetResult = Schemas['TargetResultView']
 export type Convergence = Schemas['IdentifiabilityView']
 export type FittedParameter = Schemas['ParameterView']
+export type Targets = Schemas['TargetsView']
+export type TargetResult = Schemas['TargetResultView']
 export type RecordedWalk = Schemas['RecordedWalk']
 export type Estimate = Schemas['EstimateView']

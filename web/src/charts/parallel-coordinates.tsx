@@ -4,7 +4,15 @@ import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/ho
 import { BrokenName } from '../components/broken-name'
 import { formatExact, writtenUnit } from '../format/number'
 import { themeColour, useTheme } from '../theme'
-import { type Brush, BUCKETS, type ParallelModel, selectRows, valueAt } from './parallel-model'
+import {
+  type Brush,
+  BUCKETS,
+  marksOf,
+  type ParallelModel,
+  placeOf,
+  selectRows,
+  stretchOf,
+} from './parallel-model'
 import { type Palette, ProgressivePainter } from './progressive-painter'
 
 export type Brushes = ReadonlyMap<number, Brush>
@@ -71,12 +79,29 @@ export function ParallelCoordinates({
                 <BrokenName name={axis.name} />
               </strong>
               <span class="unit">{axis.unit === '1' ? '\u00a0' : writtenUnit(axis.unit)}</span>
-              <span class="muted">{formatExact(axis.high, 4)}</span>
+              <span class="muted">
+                <Mark mark={marksOf(axis).at(-1)!} />
+              </span>
             </span>
           ))}
         </div>
         <div class="parallel-plot" style={{ height: `${height}px` }}>
           <canvas ref={canvas} role="img" aria-label={label} />
+          {model.axes.map((axis, index) =>
+            // Those at the ends stand above and below.
+            axis.choices.slice(1, -1).map((choice, k) => (
+              <span
+                key={`${axis.name} ${choice}`}
+                class="axis-mark small muted"
+                style={{
+                  left: `${((index + 0.5) / model.axes.length) * 100}%`,
+                  bottom: `${placeOf(axis, k + 1) * 100}%`,
+                }}
+              >
+                <Mark mark={choice} />
+              </span>
+            )),
+          )}
           {model.axes.map((axis, index) => (
             <AxisBrush
               key={axis.name}
@@ -90,13 +115,17 @@ export function ParallelCoordinates({
         <div class="parallel-heads">
           {model.axes.map((axis) => (
             <span key={axis.name} class="small muted">
-              {formatExact(axis.low, 4)}
+              <Mark mark={marksOf(axis)[0]} />
             </span>
           ))}
         </div>
       </div>
     </section>
   )
+}
+
+function Mark({ mark }: { mark: number | string }) {
+  return <BrokenName name={typeof mark === 'string' ? mark : formatExact(mark, 4)} />
 }
 
 /** The brushes with one of them changed; null takes it away. */
@@ -161,8 +190,7 @@ function AxisBrush({
 function readBrush(model: ParallelModel, index: number, brushes: Brushes): string {
   const brush = brushes.get(index)
   if (!brush) return 'drag along the axis to select'
-  const [low, high] = brush.map((place) => formatExact(valueAt(model.axes[index], place), 4))
-  return `${low} to ${high} selected`
+  return `${stretchOf(model.axes[index], brush)} selected`
 }
 
 /** From the best colour to the worst, through one between them. */

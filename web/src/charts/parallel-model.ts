@@ -1,5 +1,8 @@
 /** Parallel coordinates as numbers: where each row crosses each axis, its colour, its selection. */
 
+import { formatExact } from '../format/number'
+import { inWords } from '../format/words'
+
 export interface AxisSource {
   readonly name: string
   readonly unit: string
@@ -7,6 +10,8 @@ export interface AxisSource {
   readonly low: number | null
   readonly high: number | null
   readonly logarithmic: boolean
+  /** Names of what the values are indices of; empty for quantities. */
+  readonly choices: readonly string[]
   readonly values: Float32Array
 }
 
@@ -16,9 +21,13 @@ export interface Axis {
   readonly low: number
   readonly high: number
   readonly logarithmic: boolean
+  /** As those of its source. */
+  readonly choices: readonly string[]
   /** Place of each row on the axis, 0 at its low end and 1 at its high end; NaN for none. */
   readonly places: Float32Array
 }
+
+type Scale = Pick<Axis, 'low' | 'high' | 'logarithmic'>
 
 /** A stretch of an axis, in places. */
 export type Brush = readonly [low: number, high: number]
@@ -47,13 +56,32 @@ export function buildModel(sources: readonly AxisSource[], fitness: Float32Array
   }
 }
 
+/** What an axis is marked with, from its low end to its high end: bounds, or names of choices. */
+export function marksOf(
+  axis: Pick<Axis, 'low' | 'high' | 'choices'>,
+): readonly (number | string)[] {
+  return axis.choices.length > 0 ? axis.choices : [axis.low, axis.high]
+}
+
+/** A stretch of an axis in words: `2 to 5`, or the names inside. */
+export function stretchOf(axis: Axis, [low, high]: Brush): string {
+  if (axis.choices.length > 0) {
+    const inside = axis.choices.filter((_, k) => {
+      const place = placeOf(axis, k)
+      return place >= low && place <= high
+    })
+    return inside.map(inWords).join(', ') || 'none'
+  }
+  return [low, high].map((place) => formatExact(valueAt(axis, place), 4)).join(' to ')
+}
+
 /** Value at a place of an axis. */
 export function valueAt({ low, high, logarithmic }: Axis, place: number): number {
   return logarithmic ? low * (high / low) ** place : low + place * (high - low)
 }
 
 /** Place of a value on an axis. */
-export function placeOf({ low, high, logarithmic }: Omit<Axis, 'places'>, value: number): number {
+export function placeOf({ low, high, logarithmic }: Scale, value: number): number {
   return logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)
 }
 
@@ -101,7 +129,7 @@ export function bestRows({ fitness }: ParallelModel, rows: Uint32Array, most: nu
 }
 
 function axisOf(source: AxisSource): Axis {
-  const { name, unit, values } = source
+  const { name, unit, values, choices } = source
   let [least, greatest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
   for (const value of values) {
     if (value < least) least = value
@@ -110,7 +138,7 @@ function axisOf(source: AxisSource): Axis {
   const low = source.low ?? (Number.isFinite(least) ? least : 0)
   let high = source.high ?? (Number.isFinite(greatest) ? greatest : 1)
   if (!(high > low)) high = low + (Math.abs(low) || 1) * 1e-6
-  const scale = { name, unit, low, high, logarithmic: source.logarithmic && low > 0 }
+  const scale = { name, unit, low, high, choices, logarithmic: source.logarithmic && low > 0 }
   return { ...scale, places: values.map((value) => placeOf(scale, value)) }
 }
 

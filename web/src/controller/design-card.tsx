@@ -3,17 +3,19 @@
 import type { Variable } from '../api/types'
 import { type Column, Table } from '../components/table'
 import { formatExact, writtenUnit } from '../format/number'
+import { formatExactValue, type Value } from '../format/value'
+import { inWords } from '../format/words'
+import { variablesOf } from '../submission/catalogue'
 import type { ResolvedDesign } from '../walk/resolve-design'
 
 interface Row {
   readonly variable: Variable
-  readonly value: number | string
+  readonly value: Value
 }
 
 export function DesignCard({ design }: { design: ResolvedDesign }) {
   const { controller } = design
-  const known = [...controller.variables, ...controller.gait_variables]
-  const rows = known
+  const rows = variablesOf(controller)
     .filter(({ name }) => name in design.design)
     .map((variable): Row => ({ variable, value: design.design[variable.name] }))
   const columns: Column<Row>[] = [
@@ -22,7 +24,7 @@ export function DesignCard({ design }: { design: ResolvedDesign }) {
       key: 'value',
       label: 'Value',
       numeric: true,
-      cell: ({ value }) => formatExact(value),
+      cell: ({ value }) => formatExactValue(value),
     },
     {
       key: 'unit',
@@ -34,7 +36,7 @@ export function DesignCard({ design }: { design: ResolvedDesign }) {
       label: 'Bounds of the search',
       numeric: true,
       minor: true,
-      cell: ({ variable }) => `${formatExact(variable.low)} to ${formatExact(variable.high)}`,
+      cell: ({ variable }) => searched(variable),
     },
     { key: 'meaning', label: 'Meaning', cell: ({ variable }) => variable.description },
   ]
@@ -52,4 +54,10 @@ export function DesignCard({ design }: { design: ResolvedDesign }) {
       />
     </section>
   )
+}
+
+/** Its bounds, or its choices. */
+function searched({ low, high, choices = [] }: Variable): string {
+  if (choices.length > 0) return choices.map(inWords).join(', ')
+  return `${formatExact(low)} to ${formatExact(high)}`
 }

@@ -1,6 +1,6 @@
 /** What a controller without rules does: its law and its gains. */
 
-import { formatExact } from '../format/number'
+import { formatExactValue } from '../format/value'
 import type { ResolvedDesign } from '../walk/resolve-design'
 
 interface Term {
@@ -45,14 +45,14 @@ export function LinearCard({ design }: { design: ResolvedDesign }) {
         {terms.map(({ gain, text }, k) => (
           <span key={gain}>
             {k > 0 && ' + '}
-            <b>{formatExact(design.design[gain])}</b> · {text}
+            <b>{formatExactValue(design.design[gain])}</b> · {text}
           </span>
         ))}
       </p>
       <ul>
         {terms.map(({ gain, meaning }) => (
           <li key={gain}>
-            <b>{gain}</b> = {formatExact(design.design[gain])}{' '}
+            <b>{gain}</b> = {formatExactValue(design.design[gain])}{' '}
             <span class="unit">
               {design.controller.variables.find(({ name }) => name === gain)?.unit}
             </span>

@@ -62,12 +62,10 @@ function Controller({ source, query }: { source: DesignSource; query: URLSearchP
 
 function Fuzzy({ design, velocity }: { design: ResolvedDesign; velocity: number }) {
   const key = JSON.stringify([design.controller.name, design.design, velocity])
-  const own = new Set(design.controller.variables.map(({ name }) => name))
-  const values = Object.entries(design.design).filter(([name]) => own.has(name))
   const surface = useResource(key, (signal) =>
     post('/v1/controllers/{controller}/surface', {
       path: { controller: design.controller.name },
-      body: { design: Object.fromEntries(values), ...GRID, velocity_error: velocity },
+      body: { design: { ...design.design }, ...GRID, velocity_error: velocity },
       signal,
     }),
   )

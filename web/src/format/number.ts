@@ -7,15 +7,8 @@ const NARROW_SPACE = '\u202f'
 const NO_BREAK_SPACE = '\u00a0'
 const MINUS = '\u2212'
 
-/** A number, the name of a choice, or nothing. */
-type Value = number | string | null | undefined
-
-/**
- * `digits` significant digits at least, integer digits in full: 12 345, 8.714, 0.00123, 1.2e-9. The
- * name of a choice is left as it is.
- */
-export function formatNumber(value: Value, digits = 4): string {
-  if (typeof value === 'string') return value
+/** `digits` significant digits at least, integer digits in full: 12 345, 8.714, 0.00123, 1.2e-9. */
+export function formatNumber(value: number | null | undefined, digits = 4): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NONE
   if (value === 0) return '0'
   const size = Math.abs(value)
@@ -25,8 +18,7 @@ export function formatNumber(value: Value, digits = 4): string {
 }
 
 /** As formatNumber, without zeros at the end: 0.5, 25, 781. */
-export function formatExact(value: Value, digits = 6): string {
-  if (typeof value === 'string') return value
+export function formatExact(value: number | null | undefined, digits = 6): string {
   const text = formatNumber(value, digits)
   if (!text.includes('.') || text.includes('e')) return text
   return text.replace(/\.?0+$/, '')
@@ -39,12 +31,12 @@ export function formatCount(value: number | null | undefined): string {
 }
 
 /** A number with its unit; the unit `1` is not written. */
-export function quantity(value: Value, unit: string, digits = 4): string {
+export function quantity(value: number | null | undefined, unit: string, digits = 4): string {
   return beside(formatNumber(value, digits), unit)
 }
 
 /** As quantity, without zeros at the end: 2, 0.5 s. */
-export function exactQuantity(value: Value, unit: string, digits = 5): string {
+export function exactQuantity(value: number | null | undefined, unit: string, digits = 5): string {
   return beside(formatExact(value, digits), unit)
 }
 

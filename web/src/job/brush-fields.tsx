@@ -4,6 +4,7 @@ import { type Brushes, withBrush } from '../charts/parallel-coordinates'
 import { type Axis, type ParallelModel, placeOf, valueAt } from '../charts/parallel-model'
 import { BrokenName } from '../components/broken-name'
 import { Unit } from '../components/unit'
+import { inWords } from '../format/words'
 
 export function BrushFields({
   model,
@@ -53,6 +54,25 @@ function Bound({
   place: number
   onChange: (text: string) => void
 }) {
+  const label = `${axis.name} ${name}`
+  if (axis.choices.length > 0) {
+    return (
+      <label class="row small">
+        {name}
+        <select
+          aria-label={label}
+          value={Math.round(valueAt(axis, place))}
+          onChange={(event) => onChange(event.currentTarget.value)}
+        >
+          {axis.choices.map((choice, index) => (
+            <option key={choice} value={index}>
+              {inWords(choice)}
+            </option>
+          ))}
+        </select>
+      </label>
+    )
+  }
   return (
     <label class="row small">
       {name}
@@ -60,7 +80,7 @@ function Bound({
         class="short"
         type="number"
         step="any"
-        aria-label={`${axis.name} ${name}`}
+        aria-label={label}
         value={Number(valueAt(axis, place).toPrecision(4))}
         onChange={(event) => onChange(event.currentTarget.value)}
       />

@@ -1,11 +1,6 @@
 /** The variables of a job, as its spec writes them out. */
 
-import type { AnySpec, Job, JobSpec, Variable } from '../api/types'
-
-/** A spec without a kind tunes a drive. */
-export function isTuning(spec: AnySpec): spec is JobSpec {
-  return (spec.kind ?? 'tuning') === 'tuning'
-}
+import type { Job, Variable } from '../api/types'
 
 /** What the optimizer searches, with bounds and units. */
 export function searchedVariables(spec: Job['spec']): readonly Variable[] {

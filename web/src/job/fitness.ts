@@ -3,8 +3,8 @@
 import type { Job, StoredJob } from '../api/types'
 
 /**
- * Unit of a job's fitness: the product that tunes a drive has none, nor has a misfit
- * in tolerances; an identification's is a mean of its objectives, which are currents.
+ * Unit of a job's fitness: the product that tunes a drive has none, nor has a calibration's count of
+ * tolerances; an identification's is a mean of its objectives, which are currents.
  */
 export function fitnessUnit({
   kind,
@@ -23,17 +23,39 @@ export interface CaseWords {
   /** One walk of which several are judged, and several. */
   readonly one: string
   readonly many: string
-  /** What a walk is worth. */
+  /** What a walk is worth, and what several are. */
   readonly worth: string
+  readonly worths: string
+  /** What that is to the fitness. */
+  readonly bars: string
+}
+
+const MEAN = 'What the fitness is the mean of'
+
+const WORDS: Readonly<Record<Job['kind'], CaseWords>> = {
+  tuning: {
+    one: 'scenario',
+    many: 'scenarios',
+    worth: 'utility',
+    worths: 'utilities',
+    bars: MEAN,
+  },
+  identification: {
+    one: 'recording',
+    many: 'recordings',
+    worth: 'error',
+    worths: 'errors',
+    bars: MEAN,
+  },
+  calibration: {
+    one: 'walk',
+    many: 'walks',
+    worth: 'misfit',
+    worths: 'misfits',
+    bars: 'Root mean square of how many tolerances the fitted targets of a walk are off',
+  },
 }
 
 export function caseWords(kind: Job['kind']): CaseWords {
-  switch (kind) {
-    case 'tuning':
-      return { one: 'scenario', many: 'scenarios', worth: 'utility' }
-    case 'identification':
-      return { one: 'recording', many: 'recordings', worth: 'error' }
-    case 'calibration':
-      return { one: 'walk', many: 'walks', worth: 'misfit' }
-  }
+  return WORDS[kind]
 }

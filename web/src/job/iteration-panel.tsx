@@ -6,6 +6,7 @@ import type { Evaluation, Job } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
+import { formatValue } from '../format/value'
 import { jobPath, withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
 import { caseWords, fitnessUnit } from './fitness'
@@ -83,9 +84,9 @@ function columns(job: Job): readonly Column<Evaluation>[] {
         key: `design ${variable.name}`,
         label: variable.name,
         unit: variable.unit,
-        numeric: true,
+        numeric: variable.kind !== 'categorical',
         value: (e) => e.design[variable.name] ?? null,
-        cell: (e) => formatNumber(e.design[variable.name], variable.kind === 'integer' ? 1 : 4),
+        cell: (e) => formatValue(e.design[variable.name], variable.kind === 'integer' ? 1 : 4),
       }),
     ),
     ...scenarioNames(job).map(

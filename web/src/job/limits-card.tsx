@@ -3,7 +3,8 @@
 import type { Job, JobSpec, Preference } from '../api/types'
 import { BrokenName } from '../components/broken-name'
 import { Table } from '../components/table'
-import { exactQuantity, formatNumber, percent, quantity } from '../format/number'
+import { formatNumber, percent, quantity } from '../format/number'
+import { exactValueQuantity } from '../format/value'
 import { inWords } from '../format/words'
 import { withQuery } from '../router/routes'
 import { variableUnits } from './design-variables'
@@ -123,7 +124,7 @@ export function BestCard({ job }: { job: Job }) {
             <dt>
               <BrokenName name={name} />
             </dt>
-            <dd>{exactQuantity(value, units.get(name) ?? '1')}</dd>
+            <dd>{exactValueQuantity(value, units.get(name) ?? '1')}</dd>
           </div>
         ))}
       </dl>

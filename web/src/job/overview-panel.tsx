@@ -3,7 +3,6 @@
 import type { Job } from '../api/types'
 import { Empty, ErrorNotice } from '../components/feedback'
 import { ConvergenceChart } from './convergence-chart'
-import { isTuning } from './design-variables'
 import { DistributionChart } from './distribution-chart'
 import { DiversityChart } from './diversity-chart'
 import { BestCard, LimitsCard } from './limits-card'
@@ -42,7 +41,7 @@ export function OverviewPanel({ live, job }: { live: LiveJob; job: Job }) {
       {job.best && (
         <>
           <BestCard job={job} />
-          {isTuning(job.spec) && <LimitsCard job={job} spec={job.spec} />}
+          {job.spec.kind === 'tuning' && <LimitsCard job={job} spec={job.spec} />}
         </>
       )}
     </div>

@@ -21,8 +21,8 @@ import { VariablesPanel } from './variables-panel'
 
 const TABS = [
   { tab: '', label: 'Overview' },
-  { tab: 'scenarios', label: 'Scenarios' },
   { tab: 'targets', label: 'Targets' },
+  { tab: 'scenarios', label: 'Scenarios' },
   { tab: 'parameters', label: 'Parameters' },
   { tab: 'variables', label: 'Variables' },
   { tab: 'iterations', label: 'Iterations' },
@@ -35,6 +35,10 @@ const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
   targets: ['calibration'],
   parameters: ['identification', 'calibration'],
   preferences: ['tuning'],
+}
+
+function hasPart({ kind }: Job, tab: string): boolean {
+  return ONLY[tab]?.includes(kind) ?? true
 }
 
 export default function JobPage({ id, tab }: { id: string; tab: string }) {
@@ -71,7 +75,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
 }
 
 function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
-  const tabs = TABS.filter(({ tab }) => ONLY[tab]?.includes(job.kind) ?? true)
+  const tabs = TABS.filter(({ tab }) => hasPart(job, tab))
   const [section] = tab.split('/')
   return (
     <>
@@ -93,10 +97,12 @@ function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
 
 function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
   const [section, detail] = tab.split('/')
-  if (ONLY[section]?.includes(job.kind) === false) return <NoSuchPart />
+  if (!hasPart(job, section)) return <NoSuchPart />
   switch (section) {
     case '':
       return <OverviewPanel live={live} job={job} />
+    case 'targets':
+      return <TargetsPanel job={job} />
     case 'scenarios':
       return <ScenariosPanel job={job} />
     case 'variables':
@@ -104,8 +110,6 @@ function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
     case 'iterations':
       if (detail) return <IterationPanel job={job} index={Number(detail)} />
       return <IterationsPanel live={live} job={job} />
-    case 'targets':
-      return <TargetsPanel job={job} />
     case 'parameters':
       return <ParametersPanel job={job} />
     case 'preferences':

@@ -7,8 +7,8 @@ export interface ParticleColumn {
   readonly low: number | null
   readonly high: number | null
   readonly kind: string
-  /** Of a categorical variable, by its numbers. */
-  readonly choices?: readonly string[]
+  /** Names of what a categorical variable's values are indices of; else none. */
+  readonly choices: readonly string[]
   /** One per particle; NaN where there is none. */
   readonly values: Float32Array
 }
@@ -24,11 +24,6 @@ interface Header {
   rows: number
   total: number
   columns: Omit<ParticleColumn, 'values'>[]
-}
-
-/** Whether a column of this kind is a variable that is searched. */
-export function isVariable(kind: ParticleColumn['kind']): boolean {
-  return kind === 'continuous' || kind === 'integer' || kind === 'categorical'
 }
 
 /** Read the answer: length of the header (uint32), header (JSON, padded), columns (float32). */

@@ -7,6 +7,7 @@ import { ChartFrame } from '../components/chart-frame'
 import { Empty } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { change, formatCount, formatNumber } from '../format/number'
+import { formatValue } from '../format/value'
 import { withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
 import { Where } from './selected-designs'
@@ -119,13 +120,13 @@ function DesignChange({ job, winner }: { job: Job; winner: RankedDesign }) {
           key: 'before',
           label: 'Job’s winner',
           numeric: true,
-          cell: (v) => formatNumber(job.best?.design[v.name]),
+          cell: (v) => formatValue(job.best?.design[v.name]),
         },
         {
           key: 'now',
           label: 'New winner',
           numeric: true,
-          cell: (v) => formatNumber(winner.design[v.name]),
+          cell: (v) => formatValue(winner.design[v.name]),
         },
         { key: 'unit', label: 'Unit', cell: (v) => (v.unit === '1' ? '–' : v.unit) },
         {
@@ -134,8 +135,7 @@ function DesignChange({ job, winner }: { job: Job; winner: RankedDesign }) {
           unit: '% of range',
           numeric: true,
           cell: (v) => {
-            const before = job.best?.design[v.name]
-            const now = winner.design[v.name]
+            const [before, now] = [job.best?.design[v.name], winner.design[v.name]]
             if (typeof before !== 'number' || typeof now !== 'number') return '–'
             return change(((now - before) / (v.high - v.low)) * 100, '1', 2)
           },

@@ -4,7 +4,8 @@ import { useMemo } from 'preact/hooks'
 import { get, post } from '../api/client'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
-import type { Controller, Design, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
+import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
+import type { Design } from '../format/value'
 
 export interface Reference {
   readonly label: string
@@ -49,7 +50,7 @@ function walkOf(
   controller: JobSpec['controller'],
   design: Design,
 ): Promise<Simulation> {
-  const body = { robot, controller, design, scenarios, preference, log: false }
+  const body = { robot, controller, design: { ...design }, scenarios, preference, log: false }
   const key = JSON.stringify(body)
   const known = simulated.get(key)
   if (known) return known

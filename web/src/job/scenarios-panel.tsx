@@ -7,7 +7,6 @@ import { change, formatNumber } from '../format/number'
 import { capitalized, inWords } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
 import { withQuery } from '../router/routes'
-import { isTuning } from './design-variables'
 import { caseWords, fitnessUnit } from './fitness'
 import { ObjectiveNotes } from './objective-notes'
 import { utilityOf } from './preference'
@@ -51,7 +50,9 @@ export function ScenariosPanel({ job }: { job: Job }) {
       {isFit && <RecordingsCard recordings={recordings} />}
       <div class="row spread">
         <ReferencePicker job={job} choice={choice} onChoose={(against) => setQuery({ against })} />
-        {reference.data && <Summary job={job} rows={rows} label={reference.data.label} />}
+        {reference.data && isRanked(job) && (
+          <Summary job={job} rows={rows} label={reference.data.label} />
+        )}
       </div>
       {reference.loading && <Loading what="the reference" />}
       {reference.error && (
@@ -79,7 +80,7 @@ export function ScenariosPanel({ job }: { job: Job }) {
         {reference.data && (
           <p class="muted small table-note">
             In each cell: the winner, then {reference.data.label} and how much the winner is above
-            or below it. Less is better everywhere.
+            or below it.{isRanked(job) && ' Less is better everywhere.'}
           </p>
         )}
         <ObjectiveNotes job={job} />
@@ -88,12 +89,17 @@ export function ScenariosPanel({ job }: { job: Job }) {
   )
 }
 
+/** Whether less is better; the results of a calibration are to come near to its targets instead. */
+function isRanked({ kind }: Job): boolean {
+  return kind !== 'calibration'
+}
+
 function rowsOf(
   job: Job,
   reference: Reference | null,
   recordings: readonly RecordingSummary[] | null,
 ): readonly Row[] {
-  const preference = isTuning(job.spec) ? (job.spec.preference as Preference) : null
+  const preference = job.spec.kind === 'tuning' ? (job.spec.preference as Preference) : null
   return Object.entries(job.best!.scenarios).map(([scenario, own]) => {
     const other = reference?.scenarios[scenario] ?? null
     // Another job may have another preference: its utilities are not to be compared, its objectives are.
@@ -207,6 +213,7 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
         value: (row) => row.own.objectives[objective.name] ?? null,
         cell: (row) => (
           <Compared
+            ranked={isRanked(job)}
             own={row.own.objectives[objective.name]}
             other={reference ? (row.other?.objectives[objective.name] ?? null) : undefined}
           />
@@ -216,12 +223,22 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
   ]
 }
 
-function Compared({ own, other }: { own: number | null; other: number | null | undefined }) {
+function Compared({
+  ranked,
+  own,
+  other,
+}: {
+  /** Whether less is better. */
+  ranked: boolean
+  own: number | null
+  other: number | null | undefined
+}) {
   if (other === undefined) return <>{formatNumber(own)}</>
   // Between numbers that change their sign, a share says nothing.
   const comparable = own !== null && other !== null && own > 0 && other > 0
   const share = comparable ? (own / other - 1) * 100 : null
-  const tone = share === null || Math.abs(share) < 0.05 ? 'same' : share < 0 ? 'better' : 'worse'
+  const tone =
+    !ranked || share === null || Math.abs(share) < 0.05 ? 'same' : share < 0 ? 'better' : 'worse'
   return (
     <span class="compared">
       <span>{formatNumber(own)}</span>

@@ -2,7 +2,7 @@
 
 import type { Job } from '../api/types'
 import { type Column, Table } from '../components/table'
-import { formatNumber } from '../format/number'
+import { formatValue, named } from '../format/value'
 import { jobPath, withQuery } from '../router/routes'
 import { caseWords } from './fitness'
 import { columnNamed, type Particles } from './particles'
@@ -41,11 +41,10 @@ export function SelectedDesigns({
             key: column.name,
             label: column.name.replace(/^utility:/, `${caseWords(job.kind).worth} `),
             unit: column.unit,
-            numeric: true,
+            numeric: column.kind !== 'categorical',
             value: (row) => (Number.isNaN(column.values[row]) ? null : column.values[row]),
             cell: (row) =>
-              column.choices?.[column.values[row]] ??
-              formatNumber(column.values[row], DIGITS[column.kind] ?? 5),
+              formatValue(named(column.values[row], column.choices), DIGITS[column.kind] ?? 5),
           }),
         ),
       ]}

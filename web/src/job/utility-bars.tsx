@@ -30,7 +30,7 @@ export function UtilityBars({
   return (
     <ChartFrame
       title={`${capitalized(words.worth)} by ${words.one}`}
-      note={`What the fitness is the mean of; less is better. The longest bar is the ${words.one} that limits the winner.`}
+      note={`${words.bars}; less is better. The longest bar is the ${words.one} that limits the winner.`}
       legend={
         <>
           <LegendEntry colour="--series-1" label="winner" area />

@@ -10,10 +10,13 @@ import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { BrushFields } from './brush-fields'
-import { columnNamed, decodeParticles, isVariable, type Particles } from './particles'
+import { caseWords } from './fitness'
+import { columnNamed, decodeParticles, type Particles } from './particles'
 import { SelectedDesigns } from './selected-designs'
 
 const NONE: Brushes = new Map()
+/** Kinds of columns that are variables. */
+const VARIABLES = new Set(['continuous', 'integer', 'categorical'])
 /** How often a running job's particles are asked for again [ms]. */
 const RENEW_MS = 8000
 
@@ -50,6 +53,7 @@ export function VariablesPanel({ job }: { job: Job }) {
 }
 
 function Designs({ job, particles }: { job: Job; particles: Particles }) {
+  const words = caseWords(job.kind)
   const [utilities, setUtilities] = useState(false)
   const [brushes, setBrushes] = useState(NONE)
   const sources = useMemo(() => axesOf(particles, utilities), [particles, utilities])
@@ -79,7 +83,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
                   setBrushes(NONE)
                 }}
               />
-              {job.kind === 'tuning' ? 'utilities too' : 'errors by recording too'}
+              {words.worths} by {words.one} too
             </label>
             <button
               type="button"
@@ -126,7 +130,9 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
 }
 
 function axesOf({ columns }: Particles, utilities: boolean): readonly AxisSource[] {
-  const wanted = columns.filter(({ kind }) => isVariable(kind) || (kind === 'utility' && utilities))
+  const wanted = columns.filter(
+    ({ kind }) => VARIABLES.has(kind) || (kind === 'utility' && utilities),
+  )
   const fitness = columns.filter(({ kind }) => kind === 'fitness')
   return [...wanted, ...fitness].map((column) => ({
     name: column.name.replace(/^utility:/, ''),
@@ -134,6 +140,7 @@ function axesOf({ columns }: Particles, utilities: boolean): readonly AxisSource
     low: column.low,
     high: column.high,
     logarithmic: column.kind === 'fitness' || column.kind === 'utility',
+    choices: column.choices,
     values: column.values,
   }))
 }

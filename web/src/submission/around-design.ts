@@ -1,13 +1,14 @@
 /** A new search in the neighbourhood of a design. */
 
-import type { Design } from '../api/types'
+import type { Design } from '../format/value'
 import type { Draft, VariableDraft } from './draft'
 
 /** Share of each variable's range that is searched around the design. */
 const SHARE = 0.3
 
 /**
- * The draft with the bounds of searched variables drawn around a design, within those before.
+ * The draft with the bounds of searched variables drawn around a design, within those before;
+ * choices of categorical ones stay.
  * whole: names of the integer variables.
  */
 export function around(draft: Draft, design: Design, whole: ReadonlySet<string>): Draft {

@@ -5,7 +5,6 @@ import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec, Preference } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
-import { isTuning } from '../job/design-variables'
 import { usePlace } from '../router/navigation'
 import { around } from './around-design'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
@@ -46,7 +45,7 @@ export default function NewJobPage() {
       )}
       {start.loading && <Loading what="the catalogue" />}
       {start.data &&
-        (from && !isTuning(from.spec) ? (
+        (from && from.kind !== 'tuning' ? (
           <JsonForm key={String(query)} spec={from.spec} />
         ) : (
           <JobForm

@@ -1,6 +1,6 @@
 /** Where a design to look at comes from, as addresses of this page say it. Pure. */
 
-import type { Design } from '../api/types'
+import type { Design } from '../format/value'
 
 /** A particle of a job (its best one if none is named), a published design, or values as such. */
 export type DesignSource =
@@ -119,17 +119,13 @@ function parsed(text: string): Design {
   try {
     value = JSON.parse(text)
   } catch {
-    throw new AddressError(
-      'design is not JSON; write an object of numbers and choices such as {"P": 0.25}',
-    )
+    throw new AddressError('design is not JSON; write an object such as {"P": 0.25}')
   }
   const isObject = typeof value === 'object' && value !== null && !Array.isArray(value)
-  if (
-    !isObject ||
-    Object.values(value as object).some((v) => !['number', 'string'].includes(typeof v))
-  ) {
+  const isValue = (v: unknown) => typeof v === 'number' || typeof v === 'string'
+  if (!isObject || !Object.values(value as object).every(isValue)) {
     throw new AddressError(
-      'design must be an object of numbers and choices such as {"P": 0.25, "fir_window": "hamming"}',
+      'design must be an object of numbers and names of choices such as {"P": 0.25}',
     )
   }
   return value as Design

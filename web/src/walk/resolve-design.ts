@@ -3,7 +3,8 @@
 import { get } from '../api/client'
 import { ApiProblem } from '../api/problem'
 import { readableJob } from '../api/readable'
-import type { Controller, Design, Evaluation, Job, JobSpec, Scenario } from '../api/types'
+import type { Controller, Evaluation, Job, JobSpec, Scenario } from '../api/types'
+import type { Design } from '../format/value'
 import type { DesignSource } from './design-source'
 
 /** A design with all that a walk of it needs. */
@@ -47,11 +48,11 @@ async function ofJob(
 ): Promise<ResolvedDesign> {
   const job = await readableJob(source.job, signal)
   const { spec } = job
-  if (spec.kind === 'identification' || spec.kind === 'calibration') {
+  if (spec.kind !== 'tuning') {
     throw new ApiProblem(
       422,
-      'this job fits parameters of the simulation to what was measured, so its designs drive' +
-        ' no controller; its own page shows them',
+      'this job fits parameters of the simulation, so its designs drive no controller; its own' +
+        ' page shows them',
     )
   }
   const evaluation = await evaluationOf(source, job, signal)

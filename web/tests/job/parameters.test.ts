@@ -1,6 +1,7 @@
 import { expect, test } from 'vitest'
 import type { Convergence, FittedParameter, Job, JobSummary } from '../../src/api/types'
 import {
+  isCategorical,
   outline,
   placeOf,
   rankOf,
@@ -48,6 +49,18 @@ test('a width is a share of the range that was searched', () => {
 
 test('a threshold that was not asked for has no width', () => {
   expect(widthAt(found, voltage, 0.05)).toBeNull()
+})
+
+test('between choices there are no widths', () => {
+  const choices = ['karnopp', 'stick'].map((name) => ({
+    name,
+    fitness: 1,
+    by_run: [1, 1],
+    remains: true,
+  }))
+  const law: FittedParameter = { ...voltage, name: 'contact_law', low: 0, high: 1, choices }
+  expect([voltage, law].map(isCategorical)).toEqual([false, true])
+  expect(widthAt(found, law, 0.1)).toBeNull()
 })
 
 test('verdicts are counted from the best to the worst, with their meaning', () => {
@@ -107,15 +120,10 @@ test('fits of the same recordings are offered first, other kinds of jobs never',
   expect(others.map(({ id }) => id)).toEqual(['c', 'd'])
 })
 
-test('a choice lies at its index', () => {
-  const choices = ['linear_zone', 'karnopp', 'stick'].map((name) => ({
-    name,
-    fitness: 1,
-    by_run: [1],
-    remains: true,
-  }))
-  const law = { ...voltage, low: 0, high: 2, best: 'karnopp', choices }
-  expect(shareOf('karnopp', law)).toBe(0.5)
+test('calibrations are compared with calibrations', () => {
+  const jobs = ['a', 'b'].map((id) => summary({ id, kind: 'calibration' }))
+  const { same } = candidates([...jobs, summary({ id: 'c' })], jobs[0])
+  expect(same.map(({ id }) => id)).toEqual(['b'])
 })
 
 function job(id: string, seed: number): Job {

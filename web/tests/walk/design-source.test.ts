@@ -13,7 +13,7 @@ const SOURCES: DesignSource[] = [
   { kind: 'best', job: 'k2q7' },
   { kind: 'particle', job: 'k2q7', iteration: 24, particle: 0 },
   { kind: 'published', controller: 'fuzzy-pi', study: 'A' },
-  { kind: 'values', controller: 'p', design: { P: 0.25 } },
+  { kind: 'values', controller: 'p', design: { P: 0.25, fir_window: 'hamming' } },
 ]
 
 describe.each(SOURCES)('$kind', (source) => {
@@ -43,8 +43,8 @@ test('no word names no design', () => {
 test.each([
   ['job=k2q7&iteration=3', /both from 0/],
   ['job=k2q7&iteration=x&particle=1', /both from 0/],
-  ['design={"P":true}', /object of numbers and choices/],
-  ['design=[1]', /object of numbers and choices/],
+  ['design={"P":true}', /object of numbers/],
+  ['design=[1]', /object of numbers/],
   ['design={', /not JSON/],
 ])('%s is refused', (query, message) => {
   expect(() => sourceOf(new URLSearchParams(query))).toThrow(AddressError)

@@ -5,7 +5,8 @@ import { BrokenName } from '../../components/broken-name'
 import { ChartFrame } from '../../components/chart-frame'
 import { type Column, Table } from '../../components/table'
 import { Unit } from '../../components/unit'
-import { exactQuantity, formatExact, formatNumber, percent, quantity } from '../../format/number'
+import { formatExact, formatNumber, percent } from '../../format/number'
+import { exactValueQuantity, type Value, valueQuantity } from '../../format/value'
 import { DECISIVE, outline, placeOf, shareOf } from './intervals'
 import { TrustBadge } from './verdicts'
 
@@ -17,10 +18,14 @@ export function IntervalPanels({
   found,
   shown,
   labels,
+  judgedAt,
 }: {
   found: Convergence
+  /** Those that have intervals. */
   shown: readonly FittedParameter[]
   labels: readonly string[]
+  /** The threshold at which agreement is judged; null if none is. */
+  judgedAt: number | null
 }) {
   const { thresholds } = found
   const [least, most] = [Math.min(...thresholds), Math.max(...thresholds)]
@@ -49,7 +54,10 @@ export function IntervalPanels({
               best of each run
             </span>
           )}
-          <span>dotted: {percent(DECISIVE, 1)}, where it is judged</span>
+          <span>
+            dotted: {percent(DECISIVE, 1)}
+            {judgedAt === DECISIVE && ', where it is judged'}
+          </span>
         </>
       }
       table={() => <IntervalTable found={found} shown={shown} />}
@@ -68,7 +76,7 @@ function Panel({ found, parameter }: { found: Convergence; parameter: FittedPara
   const { thresholds } = found
   const decisive = parameter.intervals[thresholds.indexOf(DECISIVE)]
   const middle = placeOf(DECISIVE, thresholds) * WIDTH
-  const y = (value: number | string) => (1 - shareOf(value, parameter)) * HEIGHT
+  const y = (value: Value) => (1 - shareOf(value, parameter)) * HEIGHT
   const text = decisive && `${formatNumber(decisive.low, 3)} – ${formatNumber(decisive.high, 3)}`
   return (
     <figure class="interval" data-trust={trust ?? 'none'}>
@@ -84,7 +92,7 @@ function Panel({ found, parameter }: { found: Convergence; parameter: FittedPara
           viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
           preserveAspectRatio="none"
           role="img"
-          aria-label={`${name}: best ${quantity(best, unit)}, at 5 % ${text ?? 'unknown'}`}
+          aria-label={`${name}: best ${valueQuantity(best, unit)}, at 5 % ${text ?? 'unknown'}`}
         >
           <path class="area" d={outline(found, parameter, WIDTH, HEIGHT)} />
           <line class="decisive" x1={middle} x2={middle} y1={0} y2={HEIGHT} />
@@ -97,7 +105,7 @@ function Panel({ found, parameter }: { found: Convergence; parameter: FittedPara
         <span class="interval-bound">{formatExact(low, 3)}</span>
       </div>
       <p class="muted small">
-        {exactQuantity(best, unit, 4)}
+        {exactValueQuantity(best, unit, 4)}
         {text && <> (5&nbsp;%: {text})</>}
       </p>
     </figure>

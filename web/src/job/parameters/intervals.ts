@@ -1,6 +1,7 @@
 /** Intervals of fitted parameters among good designs (fig. 2.14 of the thesis). Pure. */
 
 import type { Convergence, FittedParameter } from '../../api/types'
+import type { Value } from '../../format/value'
 
 export type Trust = NonNullable<FittedParameter['trust']>
 
@@ -13,14 +14,22 @@ export const LISTED = [0.2, 0.1, 0.05, 0.02] as const
 /** Threshold at which a parameter is judged. */
 export const DECISIVE = 0.05
 
+/** Whether a parameter is one of several choices, between which there are no intervals. */
+export function isCategorical({ choices }: FittedParameter): boolean {
+  return choices.length > 0
+}
+
 /** Width of the interval at a threshold, as a share of the range searched; null if there is none. */
 export function widthAt(
   { thresholds }: Convergence,
-  { intervals, low, high }: FittedParameter,
+  parameter: FittedParameter,
   threshold: number,
 ): number | null {
+  const { intervals, low, high } = parameter
   const interval = intervals[thresholds.indexOf(threshold)]
-  return interval ? (interval.high - interval.low) / (high - low) : null
+  return interval && !isCategorical(parameter)
+    ? (interval.high - interval.low) / (high - low)
+    : null
 }
 
 /** A parameter's verdict as a number to sort by; those without one come last. */
@@ -44,10 +53,8 @@ export function placeOf(threshold: number, thresholds: readonly number[]): numbe
 }
 
 /** The share of its range at which a value lies: 0 at the lower bound, 1 at the upper. */
-export function shareOf(value: number | string, parameter: FittedParameter): number {
-  const { low, high, choices } = parameter
-  const number = typeof value === 'string' ? choices.findIndex(({ name }) => name === value) : value
-  return (number - low) / (high - low)
+export function shareOf(value: Value, { low, high }: FittedParameter): number {
+  return (Number(value) - low) / (high - low)
 }
 
 /** Outline of the intervals over the thresholds, as an SVG path in a box of that size. */

@@ -9,8 +9,10 @@ import type { Convergence, FittedParameter, Job } from '../../api/types'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { matching } from '../../components/rows'
 import { setQuery, usePlace } from '../../router/navigation'
+import { caseWords, fitnessUnit } from '../fitness'
+import { ChoicesCard } from './choices-card'
 import { IntervalPanels } from './interval-panels'
-import type { Trust } from './intervals'
+import { DECISIVE, isCategorical, type Trust } from './intervals'
 import './parameters.css'
 import { ParametersTable } from './parameters-table'
 import { RunPicker } from './run-picker'
@@ -20,6 +22,15 @@ import { Verdicts } from './verdicts'
 /** How often the parameters of a job that runs are asked for again [ms]. */
 const RENEW_MS = 15_000
 
+/** Among which designs runs are to agree. */
+const AGREEMENT: Readonly<Record<Job['kind'], string>> = {
+  tuning: 'at 5 %',
+  identification: 'at 5 %',
+  calibration:
+    'among designs whose sum of squared differences, in tolerances, exceeds that of their run’s' +
+    ' best by 4 at most',
+}
+
 export function ParametersPanel({ job }: { job: Job }) {
   const { query } = usePlace()
   if (!job.best) {
@@ -27,8 +38,8 @@ export function ParametersPanel({ job }: { job: Job }) {
       <section class="card">
         <Empty title="No parameters yet">
           <p>
-            No set of parameters has walked through every recording so far. The first one that does
-            appears here.
+            No set of parameters has walked through every {caseWords(job.kind).one} so far. The
+            first one that does appears here.
           </p>
         </Empty>
       </section>
@@ -74,7 +85,9 @@ function Fitted({ job, also }: { job: Job; also: readonly string[] }) {
         </>
       )}
       {!found.data && found.loading && <Loading what="all designs of these runs" />}
-      {found.data && <Parameters found={found.data} labels={labelsOf(found.data.jobs, compared)} />}
+      {found.data && (
+        <Parameters job={job} found={found.data} labels={labelsOf(found.data.jobs, compared)} />
+      )}
     </div>
   )
 }
@@ -84,7 +97,15 @@ function isMissing(error: Error): boolean {
   return error instanceof ApiProblem && error.status === 404
 }
 
-function Parameters({ found, labels }: { found: Convergence; labels: readonly string[] }) {
+function Parameters({
+  job,
+  found,
+  labels,
+}: {
+  job: Job
+  found: Convergence
+  labels: readonly string[]
+}) {
   const [text, setText] = useState('')
   const [trust, setTrust] = useState<Trust | null>(null)
   const judged = found.jobs.length > 1
@@ -92,6 +113,8 @@ function Parameters({ found, labels }: { found: Convergence; labels: readonly st
   const shown: readonly FittedParameter[] = matching(wanted, text, ({ name }) =>
     name.replaceAll('_', ' '),
   )
+  const categorical = shown.filter(isCategorical)
+  const others = shown.filter((parameter) => !isCategorical(parameter))
   return (
     <>
       <Verdicts
@@ -117,8 +140,23 @@ function Parameters({ found, labels }: { found: Convergence; labels: readonly st
         </section>
       ) : (
         <div class="fitted">
-          <ParametersTable found={found} shown={shown} labels={labels} />
-          <IntervalPanels found={found} shown={shown} labels={labels} />
+          <ParametersTable
+            found={found}
+            shown={shown}
+            labels={labels}
+            agreement={AGREEMENT[job.kind]}
+          />
+          {categorical.length > 0 && (
+            <ChoicesCard shown={categorical} labels={labels} unit={fitnessUnit(job)} />
+          )}
+          {others.length > 0 && (
+            <IntervalPanels
+              found={found}
+              shown={others}
+              labels={labels}
+              judgedAt={job.kind === 'calibration' ? null : DECISIVE}
+            />
+          )}
         </div>
       )}
     </>

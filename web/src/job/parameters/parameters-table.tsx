@@ -3,7 +3,9 @@
 import type { Convergence, FittedParameter } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
 import { type Column, Table } from '../../components/table'
-import { formatExact, formatNumber, percent, writtenUnit } from '../../format/number'
+import { formatExact, percent, writtenUnit } from '../../format/number'
+import { formatValue } from '../../format/value'
+import { inWords } from '../../format/words'
 import { LISTED, rankOf, widthAt } from './intervals'
 import { TrustBadge } from './verdicts'
 
@@ -11,11 +13,14 @@ export function ParametersTable({
   found,
   shown,
   labels,
+  agreement,
 }: {
   found: Convergence
   shown: readonly FittedParameter[]
   /** Of the runs. */
   labels: readonly string[]
+  /** Among which designs agreement is judged, in words. */
+  agreement: string
 }) {
   return (
     <section class="card" aria-labelledby="fitted">
@@ -23,8 +28,8 @@ export function ParametersTable({
         <h2 id="fitted">Parameters</h2>
         <p class="muted small">
           Widths are shares of the range that was searched, among all designs whose fitness lies
-          within 20, 10, 5 and 2&nbsp;% of their run’s best. The verdict is about agreement at
-          5&nbsp;%, not about truth.
+          within 20, 10, 5 and 2&nbsp;% of their run’s best. The verdict is about agreement{' '}
+          {agreement}, not about truth.
         </p>
       </header>
       <Table
@@ -83,7 +88,7 @@ function columns(
       label: 'Best',
       numeric: true,
       value: (p) => p.best,
-      cell: (p) => <strong>{formatNumber(p.best)}</strong>,
+      cell: (p) => <strong>{formatValue(p.best)}</strong>,
     },
     ...LISTED.map(
       (threshold): Column<FittedParameter> => ({
@@ -101,7 +106,7 @@ function columns(
             label: label,
             numeric: true,
             value: (p) => p.bests[run],
-            cell: (p) => formatNumber(p.bests[run]),
+            cell: (p) => formatValue(p.bests[run]),
           }),
         )
       : []),
@@ -109,7 +114,13 @@ function columns(
       key: 'range',
       label: 'Searched',
       numeric: true,
-      cell: (p) => `${formatExact(p.low, 3)} – ${formatExact(p.high, 3)}`,
+      cell: searched,
     },
   ]
+}
+
+/** Bounds of the search, or its choices. */
+function searched({ low, high, choices }: FittedParameter): string {
+  if (choices.length > 0) return choices.map(({ name }) => inWords(name)).join(', ')
+  return `${formatExact(low, 3)} – ${formatExact(high, 3)}`
 }

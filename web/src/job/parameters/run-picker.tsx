@@ -6,7 +6,7 @@ import type { Job, JobSummary } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
 import { formatCount, quantity } from '../../format/number'
 import { jobPath, withQuery } from '../../router/routes'
-import { fitnessUnit } from '../fitness'
+import { caseWords, fitnessUnit } from '../fitness'
 import { candidates, MOST_RUNS, repeatedSeeds } from './runs'
 
 export function RunPicker({
@@ -22,9 +22,10 @@ export function RunPicker({
   also: readonly string[]
   onChoose: (also: readonly string[]) => void
 }) {
-  const listed = useResource('identifications', (signal) =>
+  const listed = useResource('fits', (signal) =>
     get('/v1/jobs', { query: { limit: 200 }, signal }).then((page) => page.items),
   )
+  const words = caseWords(job.kind)
   const { same, others } = candidates(listed.data ?? [], job)
   const known = new Set([...same, ...others].map(({ id }) => id))
   const unlisted = listed.data ? also.filter((id) => !known.has(id)) : []
@@ -53,7 +54,7 @@ export function RunPicker({
         <span class="row">
           {all.length > 0 && all.some((id) => !also.includes(id)) && (
             <button type="button" class="compact primary" onClick={() => onChoose(all)}>
-              Compare all {all.length + 1} runs on these recordings
+              Compare all {all.length + 1} runs on these {words.many}
             </button>
           )}
           <a class="button compact" href={nextRun(job, [...runs])}>
@@ -75,8 +76,7 @@ export function RunPicker({
       {others.length > 0 && (
         <details open={others.some(({ id }) => also.includes(id))}>
           <summary>
-            Identifications on other recordings, or without parameters yet (
-            {formatCount(others.length)})
+            Jobs on other {words.many}, or without parameters yet ({formatCount(others.length)})
           </summary>
           <ul class="runs">{others.map(run)}</ul>
         </details>
@@ -138,7 +138,7 @@ function described(job: JobSummary | Job, seed: number | undefined): string {
   const fitness =
     job.best_fitness === null
       ? 'no parameters yet'
-      : `error ${quantity(job.best_fitness, fitnessUnit(job))}`
+      : `fitness ${quantity(job.best_fitness, fitnessUnit(job))}`
   const parts = [
     seed === undefined ? null : `seed ${seed}`,
     fitness,

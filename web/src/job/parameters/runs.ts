@@ -16,19 +16,14 @@ export function wordOfRuns(ids: readonly string[]): string | null {
   return ids.length === 0 ? null : ids.join(',')
 }
 
-/** Other jobs of the kind that have a design: those fitted to the same walks, and the others. */
+/** Other jobs of the same kind: those with a design that were fitted to the same, and the others. */
 export function candidates(
   jobs: readonly JobSummary[],
-  own: {
-    readonly id: string
-    readonly kind: JobSummary['kind']
-    readonly scenarios: readonly string[]
-  },
+  own: Pick<JobSummary, 'id' | 'kind' | 'scenarios'>,
 ): { readonly same: readonly JobSummary[]; readonly others: readonly JobSummary[] } {
-  const recordings = (job: { readonly scenarios: readonly string[] }) =>
-    [...job.scenarios].sort().join()
+  const cases = (job: { readonly scenarios: readonly string[] }) => [...job.scenarios].sort().join()
   const fitted = jobs.filter((job) => job.kind === own.kind && job.id !== own.id)
-  const isSame = (job: JobSummary) => recordings(job) === recordings(own)
+  const isSame = (job: JobSummary) => cases(job) === cases(own)
   return {
     same: fitted.filter((job) => isSame(job) && job.best_fitness !== null),
     others: fitted.filter((job) => !isSame(job) || job.best_fitness === null),

@@ -1,0 +1,128 @@
+"""A calibration on the page: targets, choices by their names, and no part that it does not have."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.examples.servers import ServerProcess
+from tests.examples.walks import SHORT_WALK
+from tests.web.test_views import TOO_WIDE
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+CALIBRATION: Final[dict[str, Any]] = {
+    "kind": "calibration",
+    "name": "two laws of friction",
+    "walks": [
+        {
+            "name": "stiff",
+            "controller": "pi",
+            "design": {"P": 0.45, "I": 0.1},
+            "scenarios": [SHORT_WALK],
+        }
+    ],
+    "targets": [
+        {"walk": "stiff", "quantity": "speed", "value": 0.15, "tolerance": 0.1},
+        {"walk": "stiff", "quantity": "energy", "value": 42.0, "tolerance": 0.2, "use": "predict"},
+    ],
+    "variables": [
+        "battery_voltage",
+        {"name": "contact_law", "kind": "categorical", "choices": ["linear_zone", "stick"]},
+    ],
+    "optimizer": {"particles": 8},
+    "iterations": 2,
+}
+
+
+@pytest.fixture(scope="module")
+def calibration(server: ServerProcess) -> str:
+    """A calibration that the server has run to its end."""
+    job_id = server.submit(CALIBRATION)
+    server.wait_for(job_id, "succeeded")
+    return job_id
+
+
+def test_the_list_of_jobs_says_what_it_is(
+    server: ServerProcess, calibration: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/jobs")
+
+    row = page.get_by_role("row").filter(has_text="two laws of friction")
+    expect(row).to_contain_text("calibration")
+    row.get_by_role("link", name="two laws of friction").click()
+    tabs = page.get_by_role("navigation", name="Parts of the job")
+    expect(tabs.get_by_role("link")).to_have_text(
+        ["Overview", "Targets", "Walks", "Parameters", "Variables", "Iterations", "Spec"]
+    )
+    best = server.job(calibration)["best"]["design"]["contact_law"]
+    expect(page.get_by_role("definition").filter(has_text=best.replace("_", " "))).to_be_visible()
+
+
+def test_targets_show_how_far_they_are_off_and_what_they_are_for(
+    server: ServerProcess, calibration: str, visit: Callable[..., Visit]
+) -> None:
+    found = server.client.get(f"/v1/jobs/{calibration}/targets").json()["targets"]
+    page = visit(server.url).go(f"/jobs/{calibration}/targets")
+
+    rows = [page.locator(f'[data-target="stiff {name}"]') for name in ("speed", "energy")]
+    for row, target, use in zip(rows, found, ("fitted", "predicted"), strict=True):
+        expect(row).to_contain_text(use)
+        numbers = [
+            float(text.replace("\u2212", "-").split("\u00a0")[0].split(" ")[0])
+            for text in row.locator("td.numeric:not(.minor)").all_inner_texts()
+        ]
+        expected = [target["value"], target["simulated"], target["difference"]]
+        assert numbers == pytest.approx(expected, rel=1e-2)
+
+    # A single target leaves nothing to fit without it.
+    page.get_by_label("Predict each target without").select_option("target")
+    expect(page.get_by_role("columnheader", name="Left out")).to_be_visible()
+
+
+def test_choices_have_their_names_wherever_variables_are_shown(
+    server: ServerProcess, calibration: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{calibration}/parameters")
+    choices = page.get_by_role("table", name="Least fitness by choice")
+    expect(choices.get_by_role("rowheader")).to_have_text(["linear zone", "stick"])
+
+    page.goto(f"/jobs/{calibration}/variables")
+    names = page.get_by_label("contact_law from").locator("option")
+    page.get_by_text("Select by numbers").click()
+    expect(names).to_have_text(["linear zone", "stick"])
+    page.get_by_label("contact_law from").select_option("stick")
+    designs = page.get_by_role("table", name="Designs", exact=True)
+    expect(designs.get_by_role("cell", name="stick").first).to_be_visible()
+    expect(designs.get_by_role("cell", name="linear zone")).to_have_count(0)
+
+    page.goto(f"/jobs/{calibration}/iterations/0")
+    particles = page.get_by_role("table", name="Particles of iteration 0")
+    expect(particles.get_by_role("row").filter(has_text="linear zone")).not_to_have_count(0)
+
+
+@pytest.mark.parametrize("part", ["", "/targets", "/scenarios", "/parameters", "/variables"])
+def test_no_part_has_to_be_scrolled_sideways(
+    server: ServerProcess, calibration: str, visit: Callable[..., Visit], part: str
+) -> None:
+    visited = visit(server.url, viewport={"width": 360, "height": 740})
+    page = visited.go(f"/jobs/{calibration}{part}")
+    page.wait_for_load_state("networkidle")
+    expect(page.get_by_role("main").get_by_role("heading", level=2).first).to_be_visible()
+
+    assert page.evaluate(TOO_WIDE) == []
+
+
+def test_it_is_cloned_as_a_spec(
+    server: ServerProcess, calibration: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{calibration}")
+    page.get_by_role("link", name="Clone").click()
+
+    spec = page.get_by_role("textbox", name="Spec as JSON")
+    expect(spec).to_have_value(re.compile('"kind": "calibration"'))

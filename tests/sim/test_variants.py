@@ -18,7 +18,7 @@ from sim.kernel.physics_step import physics_model
 from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status
-from sim.robot import RobotVariant, load_robot
+from sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
 from sim.robot.description import ContactLaw
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate
@@ -28,10 +28,10 @@ pytestmark = pytest.mark.slow
 
 PI = np.array([[0.45, 0.1]])
 BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
-KARNOPP = RobotVariant(contact_law="karnopp")
-DEAD_ZONE = RobotVariant(contact_law="dead_zone")
-STICK = RobotVariant(contact_law="stick")
-LASH = RobotVariant(backlash=(2.5, 1.0, 1.0))
+KARNOPP = RobotVariant(name="szabadka2", contact_law="karnopp")
+DEAD_ZONE = RobotVariant(name="szabadka2", contact_law="dead_zone")
+STICK = RobotVariant(name="szabadka2", contact_law="stick")
+LASH = RobotVariant(name="szabadka2", backlash=(2.5, 1.0, 1.0))
 VARIANTS = pytest.mark.parametrize("variant", [KARNOPP, STICK, DEAD_ZONE, LASH], ids=str)
 
 
@@ -53,9 +53,11 @@ def test_kernels_agree_on_every_variant(variant: RobotVariant) -> None:
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_every_variant_walks_every_scenario(variant: RobotVariant, scenario: Scenario) -> None:
     outcome = simulate(scenario, "pi", ["P", "I"], PI, robot=variant).outcome
-    plain = simulate(scenario, "pi", ["P", "I"], PI).outcome
+    plain = simulate(scenario, "pi", ["P", "I"], PI, robot="szabadka2").outcome
     assert outcome.statuses.tolist() == [Status.OK]
-    assert outcome.objectives[0, 4] == pytest.approx(plain.objectives[0, 4], rel=0.1)
+    # Uphill the plain law creeps back by a tenth of these strides, and one that sticks does not.
+    near = 0.15 if variant is STICK and scenario.slope else 0.1
+    assert outcome.objectives[0, 4] == pytest.approx(plain.objectives[0, 4], rel=near)
     assert (outcome.objectives != plain.objectives).all()
 
 
@@ -102,7 +104,7 @@ def test_a_dead_zone_that_reaches_beyond_the_linear_one_is_refused() -> None:
 
 def resting_creep(law: ContactLaw) -> float:
     """Distance [m] that a robot standing on a slope of 20 degrees slides in the second second."""
-    robot = load_robot(RobotVariant(contact_law=law))
+    robot = load_robot(RobotVariant(name="szabadka2", contact_law=law))
     kernel = native_kernel(robot)
     assert kernel is not None
     steep = SCENARIOS[0].model_copy(update={"slope": 20.0})
@@ -134,9 +136,10 @@ def test_gravity_of_a_slope_points_down_it() -> None:
         (log,) = run.logs
         assert log is not None
         pulls.append(log.foot_force.sum(axis=1).mean(axis=0))
-    # The feet hold against m g sin(10 deg) = 11.5 N, uphill.
-    assert pulls[0][0] == pytest.approx(11.5, abs=1.5)
-    assert pulls[1][1] == pytest.approx(11.5, abs=1.5)
+    # The feet hold against m g sin(10 deg), uphill.
+    downhill = load_robot(DEFAULT_ROBOT).mass * 9.81 * math.sin(math.radians(10.0))
+    assert pulls[0][0] == pytest.approx(downhill, abs=1.5)
+    assert pulls[1][1] == pytest.approx(downhill, abs=1.5)
 
 
 def test_backlash_lets_motor_and_link_part_by_no_more_than_the_play() -> None:
@@ -157,7 +160,7 @@ def test_backlash_lets_motor_and_link_part_by_no_more_than_the_play() -> None:
 
 def test_backlash_shakes_the_body() -> None:
     shaken = simulate(SCENARIOS[0], "pi", ["P", "I"], PI, robot=LASH).outcome.objectives[0]
-    firm = simulate(SCENARIOS[0], "pi", ["P", "I"], PI).outcome.objectives[0]
+    firm = simulate(SCENARIOS[0], "pi", ["P", "I"], PI, robot="szabadka2").outcome.objectives[0]
     assert shaken[2] > 1.5 * firm[2]
 
 

@@ -121,7 +121,9 @@ def test_other_bad_input_is_exit_code_2_too(measured: Path, tmp_path: Path) -> N
     ):
         refused = validate(path)
         assert (refused.code, problem in refused.err) == (2, True), refused.err
-    assert run_command("validate", measured, "--design", "published:A", "--scenario", "9").code == 2
+    assert (
+        run_command("validate", measured, "--design", "published:A", "--scenario", "99").code == 2
+    )
     assert run_command("synthesize", *WALK, "-o", tmp_path / "log.txt").code == 2
     (tmp_path / "file").write_text("")
     assert validate(measured, "--report", tmp_path / "file").code == 2

@@ -68,13 +68,19 @@ def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
         kernel.walk([plan(FuzzyPi().without_table(PUBLISHED_A))], Coding.of(robot, 10), log=False)
 
 
-def test_five_kilohertz_keep_every_objective_within_one_percent() -> None:
-    found = step_halving("fuzzy-pi", PUBLISHED_A)
+def test_on_feet_of_the_datasheet_five_kilohertz_keep_every_objective_within_one_percent() -> None:
+    found = step_halving("fuzzy-pi", PUBLISHED_A, robot="szabadka2")
     assert [(d.variant, d.scenario) for d in found] == [
         (rate, scenario.name) for scenario in SCENARIOS for rate in ("5 kHz", "10 kHz", "20 kHz")
     ]
     for deviation in found:
         assert deviation.relative[:5].max() < 0.01
+
+
+def test_on_feet_of_table_2_7_five_kilohertz_keep_energy_and_speed_and_twenty_all() -> None:
+    coarse, _, fine = step_halving("fuzzy-pi", PUBLISHED_A, SCENARIOS[:1])
+    assert coarse.relative[3:5].max() < 0.01
+    assert fine.relative[:5].max() < 0.02
 
 
 def test_noise_is_reported_for_each_link_against_the_noiseless_walk() -> None:

@@ -68,7 +68,7 @@ def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
         kernel.walk([plan(FuzzyPi().without_table(PUBLISHED_A))], Coding.of(robot, 10), log=False)
 
 
-def test_on_feet_of_the_datasheet_five_kilohertz_keep_every_objective_within_one_percent() -> None:
+def test_five_kilohertz_keep_every_objective_of_the_datasheets_robot_within_one_percent() -> None:
     found = step_halving("fuzzy-pi", PUBLISHED_A, robot="szabadka2")
     assert [(d.variant, d.scenario) for d in found] == [
         (rate, scenario.name) for scenario in SCENARIOS for rate in ("5 kHz", "10 kHz", "20 kHz")
@@ -77,10 +77,12 @@ def test_on_feet_of_the_datasheet_five_kilohertz_keep_every_objective_within_one
         assert deviation.relative[:5].max() < 0.01
 
 
-def test_on_feet_of_table_2_7_five_kilohertz_keep_energy_and_speed_and_twenty_all() -> None:
+def test_on_the_dampers_of_table_2_7_five_kilohertz_keep_torque_energy_and_speed() -> None:
+    """What they do to accelerations is in docs/model.md; 20 kHz keep those, too."""
     coarse, _, fine = step_halving("fuzzy-pi", PUBLISHED_A, SCENARIOS[:1])
-    assert coarse.relative[3:5].max() < 0.01
-    assert fine.relative[:5].max() < 0.02
+    assert (coarse.variant, fine.variant) == ("5 kHz", "20 kHz")
+    assert coarse.relative[[0, 3, 4]].max() < 0.03
+    assert fine.relative[:5].max() < 0.03
 
 
 def test_noise_is_reported_for_each_link_against_the_noiseless_walk() -> None:

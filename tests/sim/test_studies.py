@@ -35,7 +35,8 @@ def test_figures_of_a_drive_are_those_of_its_objectives() -> None:
 def test_the_steps_of_2011_shake_the_body() -> None:
     old = find_drive("2011")
     smooth = drive_of_design("smooth", "p", {**old.design, "trajectory_rate": 500.0})
-    rough, calm = (walk_figures(drive, SCENARIOS[0]) for drive in (old, smooth))
+    # On the dampers of table 2.7 touch-downs shake it as well, whatever the drive.
+    rough, calm = (walk_figures(drive, SCENARIOS[0], robot="szabadka2") for drive in (old, smooth))
     assert rough.objectives["angular_acceleration"] > 2.0 * calm.objectives["angular_acceleration"]  # type: ignore[operator]
 
 

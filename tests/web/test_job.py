@@ -157,3 +157,41 @@ def test_a_job_is_extended_and_cloned(server: ServerProcess, visit: Callable[...
     expect(page.get_by_label("Name", exact=True)).to_have_value("small")
     expect(page.get_by_label(re.compile("^particles", re.IGNORECASE))).to_have_value("8")
     expect(page.locator("[data-own]")).to_have_count(2)
+
+
+def test_a_clone_asks_for_the_same(server: ServerProcess, visit: Callable[..., Visit]) -> None:
+    window = {"name": "fir_window", "kind": "categorical", "choices": ["hamming", "moving_average"]}
+    job_id = server.submit(
+        SMALL_JOB
+        | {
+            "name": "of everything",
+            "robot": "szabadka2",
+            "controller": "pi",
+            "scenarios": ["stuck-leg", "drop", "backward"],
+            "variables": ["P", "I", window],
+            "fixed": {"duty_phase": "swing"},
+            "preference": "chapter-3",
+            "optimizer": "pso-thesis",
+            "iterations": 1,
+        }
+    )
+    page = visit(server.url).go(f"/jobs/new?clone={job_id}")
+
+    page.get_by_role("button", name="Submit the job").click()
+
+    assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
+
+
+def test_the_form_offers_robots_and_folds_away_what_is_seldom_changed(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    robots = [robot["name"] for robot in server.client.get("/v1/robots").json()["items"]]
+    page = visit(server.url).go("/jobs/new")
+
+    picker = page.get_by_label("Robot that ships")
+    expect(picker.locator("option")).to_have_text(robots)
+    expect(picker).to_have_value(robots[0])
+    conventions = page.locator("details").filter(has_text="Conventions")
+    expect(conventions.locator("table")).to_be_hidden()
+    conventions.locator("summary").click()
+    expect(conventions.locator("table")).to_be_visible()

@@ -32,6 +32,14 @@ class Recording:
         offset = next(c["offset"] for c in self.header["channels"] if c["name"] == "link_pose")
         return [float(value) for value in self.frames[frame, offset : offset + 3]]
 
+    def travel(self) -> list[list[float]]:
+        """How far each leg's joints turn [rad]."""
+        offset, (joints,) = next(
+            (c["offset"], c["shape"]) for c in self.header["channels"] if c["name"] == "joint_angle"
+        )
+        travel = np.ptp(self.frames[:, offset : offset + joints], axis=0)
+        return [[float(angle) for angle in leg] for leg in travel.reshape(-1, 3)]
+
 
 def replay(client: httpx2.Client, **request: Any) -> Recording:
     content = client.post("/v1/replays", json=request | {"rate": 100}).content
@@ -99,6 +107,47 @@ def test_a_replay_is_scrubbed_stepped_and_played(
     expect(player(page)).to_have_attribute("data-playing", "true")
     expect(player(page)).to_have_attribute("data-playing", "false")
     expect_frame(page, recording.header["frames"] - 1, recording)
+
+
+def goes_backward(walk: Recording) -> bool:
+    return walk.body(-1)[0] < -0.2
+
+
+def falls_onto_its_feet(walk: Recording) -> bool:
+    """From 30 mm above the stance, within 0.2 s."""
+    return walk.body(0)[2] - walk.body(20)[2] > 0.03
+
+
+def holds_one_leg_still(walk: Recording) -> bool:
+    return [max(leg) < 0.05 for leg in walk.travel()].count(True) == 1
+
+
+@pytest.mark.parametrize(
+    ("scenario", "shows"),
+    [
+        ("backward", goes_backward),
+        ("drop", falls_onto_its_feet),
+        ("stuck-leg", holds_one_leg_still),
+    ],
+)
+def test_a_preset_beyond_the_table_is_shown_to_its_end(
+    server: ServerProcess,
+    visit: Callable[..., Visit],
+    scenario: str,
+    shows: Callable[[Recording], bool],
+) -> None:
+    published = server.client.get("/v1/controllers").json()["items"]
+    design = next(c["published"]["A"] for c in published if c["name"] == "fuzzy-pi")
+    recording = replay(server.client, controller="fuzzy-pi", design=design, scenario=scenario)
+    assert shows(recording)
+    page = visit(server.url).go(f"/walk?published=A&scenario={scenario}")
+    expect_frame(page, 0, recording)
+
+    last = recording.header["frames"] - 1
+    page.get_by_label("Moment of the walk").fill(str(last))
+    expect_frame(page, last, recording)
+    # The camera has followed: the robot is in the picture still.
+    assert colours(pixels(player(page).locator("canvas"))) > 200
 
 
 def test_two_walks_are_shown_together(

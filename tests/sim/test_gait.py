@@ -233,8 +233,8 @@ def test_a_hamming_filter_convolves_the_angles_from_rest_and_delays_by_half_its_
         for window in windows
     )
     unfiltered = desired_angles(robot, rough.model_copy(update={"fir_ms": 0})).angles
-    np.testing.assert_array_equal(averaged, low_pass(unfiltered, 100))
-    np.testing.assert_array_equal(hamming, low_pass(unfiltered, 100, "hamming"))
+    np.testing.assert_allclose(averaged, low_pass(unfiltered, 100), rtol=0, atol=2e-12)
+    np.testing.assert_allclose(hamming, low_pass(unfiltered, 100, "hamming"), rtol=0, atol=2e-12)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from services.optimizer.jobs.preference import PREFERENCES, Preference, Preferen
 from services.optimizer.search.pso import OPTIMIZERS, OptimizerName, PsoSettings
 from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
-from sim.robot import SHIPPED, RobotName, load_robot
+from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
 from sim.scenario import GAIT_VARIABLES, PRESETS, Scenario
 from sim.variables import Variable
 
@@ -98,7 +98,7 @@ def robot_views() -> list[RobotView]:
     """The robots that ship, the default one first."""
     return [
         RobotView(name=name, description=load_robot(name).description.description)
-        for name in SHIPPED
+        for name in sorted(SHIPPED, key=lambda name: name != DEFAULT_ROBOT)
     ]
 
 

@@ -5,6 +5,9 @@ export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const
 
 type Listener = () => void
 
+/** Share of a frame by which moments, which come as float32, may be early. */
+const ROUNDING = 1e-3
+
 export class Playback {
   private at = 0
   private moving = false
@@ -25,11 +28,11 @@ export class Playback {
 
   /** Recorded frame that is shown, from 0. */
   get frame(): number {
-    return Math.floor(this.at * this.frameRate + 1e-6)
+    return Math.floor(this.at * this.frameRate + ROUNDING)
   }
 
   get lastFrame(): number {
-    return Math.floor(this.duration * this.frameRate + 1e-6)
+    return Math.floor(this.duration * this.frameRate + ROUNDING)
   }
 
   get playing(): boolean {

@@ -62,3 +62,9 @@ test('a walk without frames cannot be played', () => {
   playback.play()
   expect(playback.playing).toBe(false)
 })
+
+test('the last frame is reached though its moment is a float32', () => {
+  const playback = new Playback(Math.fround(4.49), 100)
+  playback.seek(playback.lastFrame / playback.frameRate)
+  expect([playback.frame, playback.lastFrame]).toEqual([449, 449])
+})

@@ -12,7 +12,7 @@ from cli.exit_codes import JobEnded
 from cli.output import note, print_json, stdout_console
 from cli.progress import show_progress
 from gaitswarm.jobs.database import DatabaseJobs
-from gaitswarm.jobs.embedded import check_same, taken_up
+from gaitswarm.jobs.embedded import check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.settings import read_settings
 from services.optimizer.jobs.job import JobState
@@ -124,6 +124,32 @@ class Embedded:
                 progress.remark("connecting to Ray" if address else "starting Ray")
             self._evaluator = open_evaluator(kind, address=address, cpus=self._settings.cpus)
         return self._evaluator
+
+
+def job_run(spec: Spec, store: Store, jobs: DatabaseJobs, embedded: Embedded) -> Job:
+    """The job that was submitted before to do the same, or a new one, run to its end.
+
+    spec: its name should be its alone. jobs: of the store.
+
+    Raises JobEnded if it does not succeed, and KeyboardInterrupt if a signal comes.
+    """
+    service, claim = JobService(store), None
+    job = earlier_job(service, spec)
+    if job is None:
+        claim = service.submit_embedded(spec)
+        job = claim.job
+    elif job.state is not JobState.SUCCEEDED:
+        job = taken_up(service, job.id, accept_changes=False)
+    if job.state is JobState.SUCCEEDED:
+        return job
+    note(f"job {job.id}: {spec.name}")
+    if embedded.run(jobs, store, job, claim):
+        note("stopped; the same command goes on")
+        raise KeyboardInterrupt
+    job = store.job(job.id)
+    if job.state is not JobState.SUCCEEDED:
+        raise ended(jobs.job(job.id), jobs.place)
+    return job
 
 
 def run_seeds(

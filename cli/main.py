@@ -24,6 +24,7 @@ from cli.commands import (
     optimize,
     plot,
     rank,
+    reconstruct,
     serve,
     simulate,
     study,
@@ -61,6 +62,7 @@ for _module in (
     synthesize,
     identify,
     calibrate,
+    reconstruct,
 ):
     _module.register(app)
 

@@ -10,11 +10,6 @@ from cli.options import Json, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
     from cli.controllers_study import Comparison, Runs
-    from cli.embedded import Embedded
-    from gaitswarm.jobs.database import DatabaseJobs
-    from services.optimizer.jobs.job import Job
-    from services.optimizer.jobs.tuning import JobSpec
-    from services.optimizer.store.base import Store
 
 
 @with_groups
@@ -77,7 +72,7 @@ def _run(planned: list[Comparison], workers: WorkerOptions) -> list[Comparison]:
     from contextlib import closing
     from dataclasses import asdict, replace
 
-    from cli.embedded import Embedded
+    from cli.embedded import Embedded, job_run
     from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
@@ -91,34 +86,7 @@ def _run(planned: list[Comparison], workers: WorkerOptions) -> list[Comparison]:
 
         def run(runs: Runs) -> Runs:
             return replace(
-                runs, jobs=tuple(_job_run(spec, store, jobs, embedded) for spec in runs.specs)
+                runs, jobs=tuple(job_run(spec, store, jobs, embedded) for spec in runs.specs)
             )
 
         return [replace(c, pi=run(c.pi), fuzzy=run(c.fuzzy)) for c in planned]
-
-
-def _job_run(spec: JobSpec, store: Store, jobs: DatabaseJobs, embedded: Embedded) -> Job:
-    """The job that does this, run to its end. Raises as `_run`."""
-    from cli.embedded import ended
-    from cli.output import note
-    from gaitswarm.jobs.embedded import earlier_job, taken_up
-    from services.optimizer.jobs.job import JobState
-    from services.optimizer.service import JobService
-
-    service, claim = JobService(store), None
-    job = earlier_job(service, spec)
-    if job is None:
-        claim = service.submit_embedded(spec)
-        job = claim.job
-    elif job.state is not JobState.SUCCEEDED:
-        job = taken_up(service, job.id, accept_changes=False)
-    if job.state is JobState.SUCCEEDED:
-        return job
-    note(f"job {job.id}: {spec.name}")
-    if embedded.run(jobs, store, job, claim):
-        note("stopped; the same command goes on")
-        raise KeyboardInterrupt
-    job = store.job(job.id)
-    if job.state is not JobState.SUCCEEDED:
-        raise ended(jobs.job(job.id), jobs.place)
-    return job

@@ -1,0 +1,158 @@
+"""Optima must be optimal: how many random designs beat the published ones (thesis table 4.6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.preference import PREFERENCES, PreferenceName, judge
+from sim.calibration.catalogue import robot_variables, varied_robot
+from sim.controllers import CONTROLLERS
+from sim.robot import RobotSource
+from sim.scenario import SCENARIOS
+from sim.simulate import simulate
+
+Floats = NDArray[np.float64]
+
+OPTIMA: Final[tuple[PreferenceName, ...]] = ("A", "B", "C")
+"""Published optima of chapter 4, each of the preference of its name."""
+
+_CONTROLLER: Final = "fuzzy-pi"
+
+_CHUNK: Final = 64
+"""Designs in a task: fills the lanes, and few enough for their tables to stay in the cache."""
+
+
+class Optimality(BaseModel):
+    """How good the published optima are among random designs of their bounds.
+
+    Attributes:
+        samples: number of random designs.
+        failed: share of them that fails in a scenario [1].
+        fitness: of each optimum by each preference, by preference and optimum; null if it fails.
+        beaten: by preference, share of the random designs that beat its own optimum [1].
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    samples: int
+    failed: float
+    fitness: dict[str, dict[str, float | None]]
+    beaten: dict[str, float] = Field(default_factory=dict)
+
+    def place(self, preference: str) -> int | None:
+        """Place of an optimum among the three under its own preference.
+
+        Args:
+            preference: A, B or C.
+
+        Returns:
+            1 for the best; None if it fails.
+        """
+        row = self.fitness[preference]
+        own = row[preference]
+        if own is None:
+            return None
+        return 1 + sum(value is not None and value < own for value in row.values())
+
+
+def random_designs(samples: int, seed: int) -> Floats:
+    """Designs of chapter 4's controller, uniform in the bounds of table 4.4.
+
+    Args:
+        samples: Their number.
+        seed: Of the random numbers.
+
+    Returns:
+        (n, 9) in the order of the controller's variables.
+    """
+    space = DesignSpace.build(
+        required=CONTROLLERS[_CONTROLLER].variables, optional=(), chosen=None, fixed={}
+    )
+    shares = np.random.Generator(np.random.Philox(key=seed)).random((samples, len(space.low)))
+    return space.designs(space.low + shares * (space.high - space.low))
+
+
+def published_designs() -> Floats:
+    """A, B and C.
+
+    Returns:
+        (3, 9) in the order of `OPTIMA` and of the controller's variables.
+    """
+    controller = CONTROLLERS[_CONTROLLER]
+    rows = [[controller.published[o][v.name] for v in controller.variables] for o in OPTIMA]
+    return np.array(rows)
+
+
+def walk_all(
+    choice: Mapping[str, float],
+    designs: Floats,
+    *,
+    robots: Sequence[RobotSource],
+    workers: Executor,
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Let designs walk through the six scenarios of table 4.2 under a choice of conventions.
+
+    Args:
+        choice: Conventions of robot, gait and controller by name; of a categorical one the index.
+        designs: (n, 9), as `random_designs`.
+        robots: Those that `robot` chooses among.
+        workers: What the walks run on, threads.
+
+    Returns:
+        Objectives (n, 6, 6), and (n, 6) whether a walk has none.
+    """
+    of_robot = {variable.name for variable in robot_variables(robots)}
+    values = {name: value for name, value in choice.items() if name in of_robot}
+    planner, robot = varied_robot(robots, values)
+    names = [variable.name for variable in CONTROLLERS[_CONTROLLER].variables]
+    rest = {name: value for name, value in choice.items() if name not in of_robot}
+    columns = (*names, *rest)
+    held = np.tile(list(rest.values()), (len(designs), 1))
+    whole = np.concatenate([designs, held], axis=1)
+
+    def walk(start: int) -> tuple[list[Floats], list[NDArray[np.bool_]]]:
+        rows = whole[start : start + _CHUNK]
+        outcomes = [
+            simulate(s, _CONTROLLER, columns, rows, robot=robot, planner=planner).outcome
+            for s in SCENARIOS
+        ]
+        return [o.objectives for o in outcomes], [o.statuses != 0 for o in outcomes]
+
+    pieces = list(workers.map(walk, range(0, len(whole), _CHUNK)))
+    objectives = np.concatenate([np.stack(walked, axis=1) for walked, _ in pieces])
+    failed = np.concatenate([np.stack(bad, axis=1) for _, bad in pieces])
+    return objectives, failed
+
+
+def optimality(objectives: Floats, failed: NDArray[np.bool_]) -> Optimality:
+    """Judge the optima among random designs.
+
+    Args:
+        objectives: (3 + n, K, 6) of A, B, C and n random designs in K scenarios.
+        failed: (3 + n, K) whether a walk has none.
+
+    Returns:
+        Their place.
+    """
+    fitness, beaten = {}, {}
+    for index, name in enumerate(OPTIMA):
+        found = judge(objectives, failed, PREFERENCES[name]).fitness
+        own, others = found[: len(OPTIMA)], found[len(OPTIMA) :]
+        fitness[name] = {
+            optimum: float(value) if np.isfinite(value) else None
+            for optimum, value in zip(OPTIMA, own, strict=True)
+        }
+        beaten[name] = float((others < own[index]).mean())
+    return Optimality(
+        samples=len(failed) - len(OPTIMA),
+        failed=float(failed[len(OPTIMA) :].any(axis=1).mean()),
+        fitness=fitness,
+        beaten=beaten,
+    )

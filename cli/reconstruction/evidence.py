@@ -31,7 +31,11 @@ from cli.reconstruction.optimality import (
     walk_all,
 )
 from cli.reconstruction.plan import Size
-from services.optimizer.analysis.identifiability import Identifiability, identifiability
+from services.optimizer.analysis.identifiability import (
+    Identifiability,
+    ParameterIdentifiability,
+    identifiability,
+)
 from services.optimizer.analysis.targets import TargetResults, target_results
 from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.columns import EvaluationColumns
@@ -134,6 +138,28 @@ class Evidence:
     def winner(self) -> Found:
         """The best of all calibrations."""
         return min(self.best, key=lambda found: found.fitness)
+
+    def remaining(self, parameter: ParameterIdentifiability) -> list[str]:
+        """Choices of a categorical convention that the evidence leaves.
+
+        A swarm may leave early what would do as well, so the default and its changes count, too.
+
+        Args:
+            parameter: The convention.
+
+        Returns:
+            Names of choices that a calibration has among designs as good as its best, or that the
+            default, or one change of it, reaches as good a misfit as the best of all with.
+        """
+        name, limit = parameter.variable.name, self.spec.as_good_as(self.winner.fitness)
+        near = {choice.name for choice in parameter.choices if choice.remains}
+        for one in (self.default, *(found for _, found in self.changed)):
+            if one.fitness <= limit:
+                given = one.choice.get(name)
+                near.add(
+                    str(self.defaults[name] if given is None else parameter.variable.shown(given))
+                )
+        return [choice.name for choice in parameter.choices if choice.name in near]
 
     def choices(self) -> Iterator[Found]:
         """All choices of conventions that random designs walked under."""

@@ -40,20 +40,20 @@ def draw_choices(found: Evidence) -> Figure:
     from matplotlib.figure import Figure
 
     rows = [
-        (f"{p.variable.name}: {choice.name}", choice)
+        (f"{p.variable.name}: {choice.name}", choice, choice.name in found.remaining(p))
         for p in found.parameters.parameters
         for choice in p.choices
     ]
     figure = Figure(figsize=(8.0, 0.26 * len(rows) + 1.2), layout="constrained")
     axes = figure.add_subplot()
     places = np.arange(len(rows))[::-1]
-    for place, (_, choice) in zip(places, rows, strict=True):
+    for place, (_, choice, remains) in zip(places, rows, strict=True):
         least = [fitness for fitness in choice.fitness if np.isfinite(fitness)]
-        color = _INK if choice.remains else _ACCENT
+        color = _INK if remains else _ACCENT
         axes.plot(least, [place] * len(least), "o", ms=5, color=color)
     for color, label in ((_INK, "remains"), (_ACCENT, "is worse")):
         axes.plot([], [], "o", ms=5, color=color, label=label)
-    axes.set_yticks(places, [label for label, _ in rows])
+    axes.set_yticks(places, [label for label, *_ in rows])
     axes.set_xlabel("least misfit with it, by calibration  [tolerances]")
     _finish(axes)
     return figure

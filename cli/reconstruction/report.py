@@ -98,16 +98,16 @@ def _summary(found: Evidence) -> Iterator[str]:
 
 
 def _names(found: Evidence, trust: Trust) -> str:
-    chosen = [p for p in found.parameters.parameters if p.trust is trust]
-    return ", ".join(_decided(p) for p in chosen) or "nothing"
+    chosen = [p for p in found.parameters.parameters if _trust(found, p) is trust]
+    return ", ".join(_decided(found, p, trust) for p in chosen) or "nothing"
 
 
-def _decided(parameter: ParameterIdentifiability) -> str:
+def _decided(found: Evidence, parameter: ParameterIdentifiability, trust: Trust) -> str:
     name = f"`{parameter.variable.name}`"
-    if parameter.trust is Trust.UNKNOWN:
+    if trust is Trust.UNKNOWN:
         return name
     if parameter.choices:
-        return f"{name} ({', '.join(c.name for c in parameter.choices if c.remains)})"
+        return f"{name} ({', '.join(found.remaining(parameter))})"
     return f"{name} (best {parameter.best:.3g})"
 
 
@@ -170,7 +170,12 @@ def _optima(found: Evidence) -> Iterator[str]:
 def _choices(found: Evidence) -> Iterator[str]:
     yield "## Misfit by choice"
     yield ""
-    yield "Least misfit of all designs with a choice, over all calibrations and of each."
+    yield (
+        "Least misfit of all designs with a choice, over all calibrations and of each. A choice"
+        " remains if a calibration has it among designs as good as its best, or if the default or"
+        f" one change of it comes with it to {found.spec.as_good_as(found.winner.fitness):.3f}, as"
+        " good as the best of all."
+    )
     yield ""
     yield "![Least misfit by choice](choices.svg)"
     yield ""
@@ -180,8 +185,8 @@ def _choices(found: Evidence) -> Iterator[str]:
             choice.name,
             _number(min(choice.fitness)),
             *map(_number, choice.fitness),
-            "yes" if choice.remains else "no",
-            _trust(p),
+            "yes" if choice.name in found.remaining(p) else "no",
+            _trusted(found, p),
         ]
         for p in found.parameters.parameters
         for choice in p.choices
@@ -208,7 +213,12 @@ def _intervals(found: Evidence) -> Iterator[str]:
                 least.append(float(run.fitness[inside].min(initial=np.inf)))
             part = f"{low:.3g} to {high:.3g}"
             rows.append(
-                [f"`{p.variable.name}`", part, *map(_number, (min(least), *least)), _trust(p)]
+                [
+                    f"`{p.variable.name}`",
+                    part,
+                    *map(_number, (min(least), *least)),
+                    _trusted(found, p),
+                ]
             )
     yield from _table(["convention", "interval", *_runs_head(found), "evidence"], rows)
 
@@ -342,8 +352,19 @@ def _runs_head(found: Evidence) -> list[str]:
     return ["misfit", *(f"seed {number}" for number in range(1, len(found.runs) + 1))]
 
 
-def _trust(parameter: ParameterIdentifiability) -> str:
-    return "one calibration" if parameter.trust is None else parameter.trust.value
+def _trust(found: Evidence, parameter: ParameterIdentifiability) -> Trust | None:
+    """Of a categorical convention with what the default and its changes tell."""
+    if parameter.trust is None or not parameter.choices:
+        return parameter.trust
+    remaining = len(found.remaining(parameter))
+    if remaining == len(parameter.choices):
+        return Trust.UNKNOWN
+    return Trust.TRUSTED if remaining == 1 else Trust.ROUGH
+
+
+def _trusted(found: Evidence, parameter: ParameterIdentifiability) -> str:
+    trust = _trust(found, parameter)
+    return "one calibration" if trust is None else trust.value
 
 
 def _reached(simulated: float, off: float) -> tuple[str, str]:

@@ -28,7 +28,7 @@ class TwoWalks:
 @pytest.fixture(scope="session")
 def walks() -> TwoWalks:
     robot, scenario = load_robot("szabadka2"), find_scenario("normal-fast")
-    walk = logged_walk(scenario)
+    walk = logged_walk(scenario, robot=robot)
     synthetic = synthetic_log(robot, scenario, "fuzzy-pi", PUBLISHED_A, seed=7)
     return TwoWalks(
         robot,

@@ -8,6 +8,7 @@ import pytest
 
 from cli.main import run
 from sim.measurement.measured_csv import format_measured_log
+from sim.robot import DEFAULT_ROBOT
 from sim.validation.comparison import compare
 from sim.validation.measures import Tolerance
 from tests.examples.commands import Result, run_command
@@ -16,7 +17,7 @@ from tests.validation.conftest import TwoWalks
 
 pytestmark = pytest.mark.slow
 
-WALK = ("--design", "published:A", "--scenario", "1")
+WALK = ("--design", "published:A", "--scenario", "1", "--robot", "szabadka2")
 
 
 @pytest.fixture
@@ -36,6 +37,21 @@ def test_synthesize_writes_the_log_of_the_seed(walks: TwoWalks, tmp_path: Path) 
     assert done.code == 0, done.err
     assert path.read_text(encoding="utf-8") == walks.text
     assert "SYNTHETIC" in done.err
+
+
+def test_the_robot_of_a_log_is_that_of_its_validation_by_default(tmp_path: Path) -> None:
+    path, brief = tmp_path / "made.csv", ("--cycles", 2)
+    walk = ("--design", "published:A", "--scenario", "1", *brief)
+    done = run_command("synthesize", *walk, "-o", path)
+    assert done.code == 0, done.err
+    assert f"# robot: {DEFAULT_ROBOT}\n" in path.read_text(encoding="utf-8")
+    shown, named = (
+        run_command("validate", path, *walk, *robot, "--json")
+        for robot in ((), ("--robot", DEFAULT_ROBOT))
+    )
+    assert shown.code == 0, shown.err
+    assert shown.json == named.json
+    assert "desired angles differ" not in shown.err
 
 
 def test_the_table_shows_links_units_and_classes(measured: Path) -> None:
@@ -83,7 +99,7 @@ def test_the_report_has_tables_and_pictures(measured: Path, tmp_path: Path) -> N
 
 
 def test_another_scenario_than_the_measured_one_is_noticed(measured: Path) -> None:
-    shown = run_command("validate", measured, "--design", "published:A", "--scenario", "2")
+    shown = run_command("validate", measured, *WALK, "--scenario", "2")
     assert shown.code == 0
     assert "desired angles differ" in shown.err
 

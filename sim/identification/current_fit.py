@@ -15,6 +15,7 @@ from sim.gait.trajectory import desired_angles
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.motor import electrical
 from sim.kernel.walk import Coding
+from sim.measurement.measured_log import sensed_currents
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
 from sim.robot.description import JOINTS_PER_LEG
@@ -95,26 +96,26 @@ class CurrentFit:
         for index, (robot, result) in enumerate(zip(robots, results, strict=True)):
             statuses[index] = result.status
             if result.status is Status.OK and result.states is not None:
-                errors[index] = self._errors(motor_currents(robot, result.states))
+                errors[index] = self._errors(recorded_currents(robot, result.states))
         return Outcome(errors, statuses)
 
     def _errors(self, currents: Floats) -> Floats:
-        """(T, J) simulated currents [A] -> (3,) mean absolute error by link [A]."""
+        """(T, J) simulated absolute currents [A] -> (3,) mean absolute error by link [A]."""
         measured = self.walk.amperes
         rows = slice(self.walk.first_tick, self.walk.first_tick + len(measured))
-        by_joint = np.abs(np.abs(currents[rows]) - measured).mean(axis=0)
+        by_joint = np.abs(currents[rows] - measured).mean(axis=0)
         return np.asarray(by_joint.reshape(-1, JOINTS_PER_LEG).mean(axis=0))
 
 
-def motor_currents(robot: Robot, states: Floats) -> Floats:
-    """Currents of every motor at every control tick, by the kernel's formula on whole columns.
+def recorded_currents(robot: Robot, states: Floats) -> Floats:
+    """What a walk's log has as its motor currents, by the kernel's formula on whole columns.
 
     Args:
         robot: That walked.
         states: What the kernel kept, as in `WalkResult`.
 
     Returns:
-        (T, J) [A].
+        Absolute, behind the current sensors' low-pass, at every control tick, (T, J) [A].
     """
     n = robot.n_joints
     duty = states[:, -n:]
@@ -126,4 +127,5 @@ def motor_currents(robot: Robot, states: Floats) -> Floats:
     actuators, supply = robot.actuators(), robot.description.supply
     columns = list(duty.T), list(rates.T), actuators.viscous.tolist()
     seen = electrical(actuators, *columns, supply.voltage, supply.resistance)
-    return np.stack(seen.currents, axis=1)
+    current, voltage = (np.stack(part, axis=1) for part in (seen.currents, seen.voltages))
+    return sensed_currents(robot, current, voltage)

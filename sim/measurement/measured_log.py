@@ -10,9 +10,11 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.kernel.observation import WalkLog
 from sim.kernel.parameters import GRAVITY
+from sim.kernel.walk import current_smoothing
 from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG
 
@@ -200,7 +202,7 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
     """A simulated walk as the robot's own instruments would have logged it, without their errors.
 
     Encoders see the motors' angles, potentiometers, which every joint has, the links'; currents are
-    absolute values; every leg's board sees the one battery.
+    those of `sensed_currents`; every leg's board sees the one battery.
 
     Args:
         robot: That walked.
@@ -222,10 +224,36 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
         desired_angle=walk.desired_angle,
         control_voltage=walk.voltage,
         joint_angle=walk.motor_angle,
-        current=np.abs(walk.current),
+        current=sensed_currents(robot, walk.current, walk.voltage),
         supply=np.repeat(walk.supply[:, None], len(legs), axis=1),
         potentiometer_joints=joints,
         potentiometer=walk.joint_angle,
         body_acceleration=walk.body_acceleration() / GRAVITY,
         metadata={ORIGIN: "simulated", "robot": robot.description.name},
     )
+
+
+def sensed_currents(robot: Robot, current: Floats, voltage: Floats) -> Floats:
+    """What reaches the converters of the current sensors: absolute currents behind the low-pass.
+
+    The low-pass of `sensors.current_filter` (thesis 2.3.6.3) begins at zero. Between two control
+    ticks the current is taken as a straight line: the duty, and all but exactly the voltage, is
+    constant there, so the line ends where the next tick's jump of the voltage begins.
+
+    Args:
+        robot: That walked.
+        current: Of the motors at every control tick, (T, J) [A].
+        voltage: Of the motors at every control tick, (T, J) [V].
+
+    Returns:
+        (T, J) [A]; the absolute currents themselves for a robot without a low-pass.
+    """
+    begins = np.abs(current)
+    smoothing = current_smoothing(robot.description.sensors.current_filter, CONTROL_PERIOD)
+    if smoothing >= 1.0:
+        return begins
+    ends = np.abs(current[1:] - np.diff(voltage, axis=0) / robot.actuators().resistance)
+    sensed = np.zeros_like(begins)
+    for tick, mean in enumerate(0.5 * (begins[:-1] + ends)):
+        sensed[tick + 1] = sensed[tick] + smoothing * (mean - sensed[tick])
+    return sensed

@@ -9,9 +9,10 @@ from pydantic import ValidationError
 from sim.assembly import control_steps, kernel_of, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
-from sim.identification.current_fit import CurrentFit, motor_currents
+from sim.identification.current_fit import CurrentFit, recorded_currents
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.walk import Coding
+from sim.measurement.measured_log import simulated_log
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
 from sim.robot.identifiable import with_parameters
@@ -23,7 +24,13 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    "source", ["szabadka2", RobotVariant(backlash=(2.5, 1.0, 1.0))], ids=["rigid", "backlash"]
+    "source",
+    [
+        "szabadka2",
+        RobotVariant(name="szabadka2", backlash=(2.5, 1.0, 1.0)),
+        "szabadka2-reconstructed",
+    ],
+    ids=["rigid", "backlash", "low-pass"],
 )
 def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
     robot = load_robot(source)
@@ -32,9 +39,9 @@ def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
     assert plan is not None
     setup = plan(CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A))
     (result,) = kernel.walk([setup], Coding.of(robot, substeps), log=True)
-    log = logged_walk(SCENARIO, robot=robot)
+    log = simulated_log(robot, logged_walk(SCENARIO, robot=robot))
     assert result.states is not None
-    np.testing.assert_allclose(motor_currents(robot, result.states), log.current, atol=1e-10)
+    np.testing.assert_allclose(recorded_currents(robot, result.states), log.current, atol=1e-10)
 
 
 def test_the_truth_leaves_nothing_but_the_instruments_errors(twin: Twin) -> None:
@@ -60,7 +67,7 @@ def test_desired_angles_are_those_of_the_described_robot(twin: Twin) -> None:
     changed = with_parameters(twin.robot, {**long_soles, "planned_soles": "own"})
     own = logged_walk(SCENARIO, robot=changed)
     planned = logged_walk(SCENARIO, robot=changed, planner=twin.robot)
-    described = logged_walk(SCENARIO)
+    described = logged_walk(SCENARIO, robot=twin.robot)
     np.testing.assert_array_equal(planned.desired_angle, described.desired_angle)
     assert not np.array_equal(own.desired_angle, described.desired_angle)
 

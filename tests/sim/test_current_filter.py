@@ -15,6 +15,7 @@ from sim.kernel.native import native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import reference_kernel
 from sim.kernel.walk import Coding, current_smoothing
+from sim.measurement.measured_log import sensed_currents
 from sim.robot import Robot, load_robot
 from tests.examples.robots import changed
 from tests.examples.walks import PUBLISHED_A, short_walk, walk
@@ -72,6 +73,29 @@ def test_the_controller_reads_the_filtered_absolute_current(robot: Robot, kind: 
     duty = result.states[:, -robot.n_joints :]
     np.testing.assert_allclose(duty / coding.duty_per_count, counts, atol=1e-6)
     assert np.ptp(counts) > 100.0
+
+
+def test_logged_currents_are_those_that_the_controller_reads(robot: Robot) -> None:
+    """A log has the currents of every control tick; the filter saw all those in between."""
+    slow_sensor = filtered(robot, 0.02)
+    kernel, plan = native_kernel(slow_sensor), plan_walk(slow_sensor, BRIEF, 2e-4)
+    assert kernel is not None
+    assert plan is not None
+    setup = plan(softer_by_current())
+    side = np.where(np.arange(setup.ticks) // 8 % 2, -1, 1)[:, None]
+    desired = setup.desired + 20_000 * side.astype(np.int32)
+    setup, coding = dataclasses.replace(setup, desired=desired), Coding.of(slow_sensor, 10)
+    (result,) = kernel.walk([setup], coding, log=True)
+    assert result.states is not None
+    log = walk_log(slow_sensor, setup, result.states)
+    sensed = sensed_currents(slow_sensor, log.current, log.voltage)
+    duty = result.states[:, -robot.n_joints :]
+    # Each 32 counts of current, which is 0.87 A on average, take 3 from the output.
+    read = (127.0 - np.abs(duty) / coding.duty_per_count / 3.0) * 32.0 / 2079.0
+    np.testing.assert_allclose(sensed, read, atol=0.06)
+    assert np.abs(np.abs(log.current) - read).mean() > 0.4
+    unfiltered = sensed_currents(robot, log.current, log.voltage)
+    np.testing.assert_array_equal(unfiltered, np.abs(log.current))
 
 
 def test_kernels_agree_on_a_filtered_current(robot: Robot) -> None:

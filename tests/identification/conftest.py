@@ -13,7 +13,7 @@ from sim.measurement.synthetic import Perturbation, synthetic_log
 from sim.robot import Robot, load_robot
 from tests.examples.walks import PUBLISHED_A, logged_walk, short_walk
 
-SCENARIO = short_walk(name="brief", cycles=2)
+SCENARIO = short_walk(name="brief", cycles=2, stride=0.16, height=0.03, curve="half_ellipse")
 TRUTH = {
     "battery_voltage": 10.4,
     "body_mass": 4.3,
@@ -34,6 +34,6 @@ def twin() -> Twin:
     log = synthetic_log(
         robot, SCENARIO, "fuzzy-pi", PUBLISHED_A, seed=3, perturbation=Perturbation.of(TRUTH)
     )
-    simulated = simulated_log(robot, logged_walk(SCENARIO))
+    simulated = simulated_log(robot, logged_walk(SCENARIO, robot=robot))
     pair = synchronise(log, simulated, SCENARIO.cycle_time)
     return Twin(robot, record(pair, SCENARIO, "fuzzy-pi", PUBLISHED_A))

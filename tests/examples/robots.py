@@ -8,6 +8,7 @@ from typing import Any
 
 from sim.robot import Robot
 from sim.robot.description import RobotDescription
+from sim.robot.identifiable import with_parameters
 
 
 def changed(robot: Robot, **tables: Any) -> Robot:
@@ -26,3 +27,11 @@ def changed(robot: Robot, **tables: Any) -> Robot:
         else:
             document[table] = document[table] | fields
     return replace(robot, description=RobotDescription.model_validate(document))
+
+
+def with_feet(robot: Robot, **values: float) -> Robot:
+    """The robot with the same stiffness, damping, sole or friction under every leg."""
+    return with_parameters(
+        robot,
+        {f"{name}_{leg.name}": v for name, v in values.items() for leg in robot.description.legs},
+    )

@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 PUBLISHED_A: Final[dict[str, float]] = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 """The thesis's optimum for preference A, a design of `fuzzy-pi`."""
 
+LONG_STRIDES: Final[dict[str, Any]] = {"stride": 0.16, "height": 0.03, "curve": "half_ellipse"}
+"""Fields of a scenario whose strides are nearly three times the default's."""
+
 SHORT_WALK: Final[dict[str, Any]] = {
     "name": "short",
     "cycle_time": 1.0,
@@ -60,6 +63,24 @@ def walk(
     """One design walks. options: of `simulate`."""
     values = np.array([list(design.values())])
     return simulate(scenario, controller, list(design), values, **options)
+
+
+def intended_speed(scenario: Scenario) -> float:
+    """Speed [m/s] of a body whose feet follow their curve: a turn shortens one side's strides."""
+    stride = scenario.stride * (1.0 - 0.5 * abs(scenario.turn))
+    return stride / (scenario.duty_factor * scenario.cycle_time)
+
+
+def share_of_the_intended_speed(scenario: Scenario, **options: Any) -> float:
+    """What a stiff drive, P of 1, reaches of `intended_speed`. options: of `simulate`."""
+    outcome = walk(scenario, {"P": 1.0, "I": 0.0}, "pi", **options).outcome
+    return float(1.0 / (outcome.objectives[0, 4] * intended_speed(scenario)))
+
+
+def heading(log: WalkLog) -> Floats:
+    """Yaw of the body at every tick [rad], left positive."""
+    x, y, z, w = log.base_orientation.T
+    return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
 def logged_walk(

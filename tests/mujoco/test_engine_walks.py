@@ -143,8 +143,7 @@ def test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts(
 def test_most_of_the_torques_difference_is_the_lever_of_the_sole() -> None:
     """In long strides, MuJoCo's forces at the tibia's end bring the gear torques nearer."""
     robot, drive = load_robot(PLAIN), "stiff PI"
-    long_strides = {"stride": 0.16, "height": 0.03, "curve": "half_ellipse"}
-    scenario = LOADED_SLOW.model_copy(update=long_strides)
+    scenario = LOADED_SLOW.model_copy(update=walks.LONG_STRIDES)
     objectives, log = our_walk(drive, scenario)
     away = {}
     for points in (False, True):

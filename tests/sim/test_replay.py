@@ -11,10 +11,11 @@ import pytest
 from sim.kernel.observation import WalkLog
 from sim.outcome import Status
 from sim.replay import Replay, replay, ticks_at
-from sim.robot import Robot, RobotVariant, load_robot
+from sim.robot import DEFAULT_ROBOT, Robot, RobotVariant, load_robot
 from sim.robot.posture import feet_below_body
 from sim.scenario import SCENARIOS, Scenario
 from tests.examples.paths import QUADRUPED
+from tests.examples.robots import with_feet
 from tests.examples.walks import quadruped_files, walk
 
 pytestmark = pytest.mark.slow
@@ -121,12 +122,25 @@ def test_frames_are_the_nearest_ticks_with_their_exact_time(
     assert shown.time[-1] < shown.duration <= shown.time[-1] + 1.0 / rate + 0.002
 
 
+def logged_share_of_the_acceleration(robot: Robot) -> float:
+    """Root mean square of a replay's, by f2; that sees every physics step, the log 4 ms."""
+    result = walk(SCENARIOS[0], robot=robot, log=True)
+    (log,) = result.logs
+    assert log is not None
+    norm = np.linalg.norm(replay(robot, log, rate=500).body_acceleration, axis=1)
+    return float(np.sqrt(np.mean(norm**2)) / result.outcome.objectives[0, 1])
+
+
 def test_the_bodys_acceleration_is_the_objectives(robot: Robot) -> None:
-    result = walk(SCENARIOS[0], log=True)
-    assert result.logs[0] is not None
-    norm = np.linalg.norm(replay(robot, result.logs[0], rate=500).body_acceleration, axis=1)
-    # f2 sees every physics step, the log differences over 4 ms.
-    assert np.sqrt(np.mean(norm**2)) == pytest.approx(result.outcome.objectives[0, 1], rel=0.03)
+    assert logged_share_of_the_acceleration(robot) == pytest.approx(1.0, rel=0.03)
+
+
+def test_touch_downs_on_the_default_robots_dampers_are_shorter_than_the_logs_ticks() -> None:
+    """Up to 2270 N s/m; with 150 N s/m under the same robot the log sees them."""
+    default = load_robot(DEFAULT_ROBOT)
+    soft = with_feet(default, damping=150.0)
+    assert 0.5 < logged_share_of_the_acceleration(default) < 0.8
+    assert logged_share_of_the_acceleration(soft) == pytest.approx(1.0, rel=0.03)
 
 
 def test_with_backlash_the_link_is_shown_not_its_motor() -> None:

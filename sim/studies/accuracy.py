@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from sim.assembly import PHYSICS_RATE, judge, plan_walk
 from sim.controllers.base import ControlLaw
@@ -151,16 +152,28 @@ def noise_on_links(
 
     Returns:
         By scenario and link.
+
+    Raises:
+        SimulationInputError: The deviation is not above zero, or too large.
     """
     machine = with_shafts(load_robot(robot)) if kind == "angle" else load_robot(robot)
     size = NOISE[kind] if deviation is None else deviation
+    try:
+        noises = [
+            LinkNoise.model_validate({"link": link, "kind": kind, "deviation": size, "seed": seed})
+            for link in (1, 2, 3)
+        ]
+    except ValidationError as error:
+        said = error.errors(include_url=False)[0]["msg"].removeprefix("Value error, ")
+        raise SimulationInputError(
+            said if said.startswith("deviation: ") else f"deviation: {said}"
+        ) from error
     deviations = []
     for scenario in scenarios:
         calm = _walk(scenario, controller, design, machine)
-        for link in (1, 2, 3):
-            noise = LinkNoise(link=link, kind=kind, deviation=size, seed=seed)
+        for noise in noises:
             noisy = _walk(scenario, controller, design, machine, noise=noise)
-            deviations.append(Deviation(f"link {link}", scenario.name, calm, noisy / calm))
+            deviations.append(Deviation(f"link {noise.link}", scenario.name, calm, noisy / calm))
     return tuple(deviations)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from services.runtime import open_store
+from sim.robot import DEFAULT_ROBOT
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.paths import ROOT
 from tests.examples.processes import COMMAND_LINE, python
@@ -74,7 +75,7 @@ def history(job: Finished, gaitswarm: Gaitswarm) -> Any:
     ("change", "said"),
     [
         (other_kernel_code, "other simulation code"),
-        (another_robot_file, "the robot szabadka2 has other contents"),
+        (another_robot_file, f"the robot {DEFAULT_ROBOT} has other contents"),
         (no_compiler, "no C compiler: backend reference instead of native"),
     ],
 )

@@ -87,7 +87,7 @@ def test_a_preset_is_replayed_at_the_asked_rate(client: httpx2.Client) -> None:
     assert header["duration"] == pytest.approx(4.5)
     assert (header["status"], header["explanation"]) == ("ok", "walked to the end")
     assert channels["time"][:, 0] == pytest.approx(np.arange(113) / 25.0)
-    assert channels["link_pose"][-1, 0, 0] > 0.5
+    assert channels["link_pose"][-1, 0, 0] > 0.25
     assert np.linalg.norm(channels["link_pose"][:, :, 3:], axis=2) == pytest.approx(1.0, abs=1e-6)
     # The battery gives way under its load.
     assert 8.0 < channels["supply"].min() < channels["supply"].max() <= 11.6 + 1e-6
@@ -121,10 +121,11 @@ def test_what_is_seen_of_the_robot_is_in_the_header(client: httpx2.Client) -> No
     assert [roles.count(part) for part in parts] == [1, 6, 6, 6, 6, 1]
     assert [name for name, shape in shapes if shape["role"] == "load"] == ["body"]
     assert header["load_kg"] == 2.0
-    # A sole's sphere reaches the ground where the foot is pressed.
-    (radius,) = next(s["size"] for _, s in shapes if s["role"] == "foot")
+    # A sole's sphere, of a size of its own, reaches the ground where the foot is pressed.
+    radii = np.array([s["size"][0] for _, s in shapes if s["role"] == "foot"])
     pressed = channels["foot_force"][:, :, 2] > 1.0
-    assert (channels["foot_position"][:, :, 2][pressed] < radius).all()
+    assert pressed.any(axis=0).all()
+    assert (channels["foot_position"][:, :, 2] < radii)[pressed].all()
 
 
 def test_on_a_slope_gravity_is_tilted_and_the_ground_is_not(client: httpx2.Client) -> None:
@@ -148,7 +149,7 @@ def test_the_scenario_is_shown_as_the_designs_gait_walked_it(client: httpx2.Clie
 
 
 def test_a_walk_that_fell_is_replayed_up_to_its_end(client: httpx2.Client) -> None:
-    header, channels = replayed(client, scenario={**SHORT_WALK, "slope": 45.0})
+    header, channels = replayed(client, scenario={**SHORT_WALK, "load": 50.0})
     assert header["status"] == "fell"
     assert set(header["objectives"].values()) == {None}
     assert header["frames"] == len(channels["time"]) < 50

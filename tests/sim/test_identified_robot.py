@@ -82,15 +82,17 @@ def test_it_has_the_optimum_of_table_2_7() -> None:
     assert has == pytest.approx(optimum, rel=1e-12)
 
 
-def test_all_else_but_the_law_of_friction_is_the_datasheet_robots() -> None:
+def test_all_else_but_friction_and_currents_filter_is_the_datasheet_robots() -> None:
     robot, base = identified(), load_robot("szabadka2")
     assert robot.urdf.text == base.urdf.text
     assert robot.legs == base.legs
     assert robot.mass == pytest.approx(base.mass - 3.25 + 4.43)
-    for field in ("motors", "pwm", "sensors", "contact", "load_height"):
+    for field in ("motors", "pwm", "contact", "load_height"):
         assert getattr(robot.description, field) == getattr(base.description, field)
-    # Table 2.6: v_d and v_lin belong to one law.
+    # Table 2.6: v_d and v_lin belong to one law; 2.3.6.3: currents pass a low-pass.
     assert robot.description.contact_law == "dead_zone"
+    filtered = base.description.sensors.model_copy(update={"current_filter": 0.02})
+    assert robot.description.sensors == filtered
     theirs = dataclasses.asdict(base.actuators())
     for field, values in dataclasses.asdict(robot.actuators()).items():
         if field != "efficiency":

@@ -36,7 +36,9 @@ def walked_at_once(wanted: EvaluationRequest) -> tuple[Outcome, ...]:
     walks = [case for case in wanted.cases if isinstance(case, Walk)]
     assert len(walks) == len(wanted.cases)
     return tuple(
-        simulate(case.scenario, case.controller, case.variables, wanted.designs).outcome
+        simulate(
+            case.scenario, case.controller, case.variables, wanted.designs, robot=case.robot
+        ).outcome
         for case in walks
     )
 

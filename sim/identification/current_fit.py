@@ -14,8 +14,8 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.motor import electrical
+from sim.kernel.observation import sensed_currents
 from sim.kernel.walk import Coding
-from sim.measurement.measured_log import sensed_currents
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
 from sim.robot.description import JOINTS_PER_LEG

@@ -10,11 +10,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
-from sim.kernel.observation import WalkLog
+from sim.kernel.observation import WalkLog, sensed_currents
 from sim.kernel.parameters import GRAVITY
-from sim.kernel.walk import current_smoothing
 from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG
 
@@ -231,29 +229,3 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
         body_acceleration=walk.body_acceleration() / GRAVITY,
         metadata={ORIGIN: "simulated", "robot": robot.description.name},
     )
-
-
-def sensed_currents(robot: Robot, current: Floats, voltage: Floats) -> Floats:
-    """What reaches the converters of the current sensors: absolute currents behind the low-pass.
-
-    The low-pass of `sensors.current_filter` (thesis 2.3.6.3) begins at zero. Between two control
-    ticks the current is taken as a straight line: the duty, and all but exactly the voltage, is
-    constant there, so the line ends where the next tick's jump of the voltage begins.
-
-    Args:
-        robot: That walked.
-        current: Of the motors at every control tick, (T, J) [A].
-        voltage: Of the motors at every control tick, (T, J) [V].
-
-    Returns:
-        (T, J) [A]; the absolute currents themselves for a robot without a low-pass.
-    """
-    begins = np.abs(current)
-    smoothing = current_smoothing(robot.description.sensors.current_filter, CONTROL_PERIOD)
-    if smoothing >= 1.0:
-        return begins
-    ends = np.abs(current[1:] - np.diff(voltage, axis=0) / robot.actuators().resistance)
-    sensed = np.zeros_like(begins)
-    for tick, mean in enumerate(0.5 * (begins[:-1] + ends)):
-        sensed[tick + 1] = sensed[tick] + smoothing * (mean - sensed[tick])
-    return sensed

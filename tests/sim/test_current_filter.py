@@ -12,10 +12,9 @@ from sim.assembly import plan_walk
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw, LookupTable
 from sim.kernel.native import native_kernel
-from sim.kernel.observation import walk_log
+from sim.kernel.observation import sensed_currents, walk_log
 from sim.kernel.reference import reference_kernel
 from sim.kernel.walk import Coding, current_smoothing
-from sim.measurement.measured_log import sensed_currents
 from sim.robot import Robot, load_robot
 from tests.examples.robots import changed
 from tests.examples.walks import PUBLISHED_A, short_walk, walk

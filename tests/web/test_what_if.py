@@ -53,7 +53,7 @@ def test_another_preference_ranks_the_history_anew_without_a_walk(
 ) -> None:
     best = server.job(finished_job)["best"]
     bias = server.job(finished_job)["spec"]["preference"]["bias"]
-    exponents = [0.0, 1.0, 0.0, 0.0, 0.0]
+    exponents = [0.0, 0.0, 0.0, 0.0, 1.0]
     wanted = {"bias": bias, "exponent": exponents}
     ranking = server.client.post(
         f"/v1/jobs/{finished_job}/ranking", json={"preference": wanted}
@@ -67,7 +67,7 @@ def test_another_preference_ranks_the_history_anew_without_a_walk(
     expect(shown).to_have_attribute("data-winner", f"{best['iteration']}/{best['particle']}")
     expect(shown).to_have_attribute("data-evaluations", str(ranking["evaluations"]))
     asked_before = len(visited.requested)
-    # Only smooth walks count.
+    # Only fast walks count.
     for objective, exponent in zip(OBJECTIVES, exponents, strict=True):
         page.get_by_label(f"exponent of {objective}, number").fill(str(exponent))
         page.keyboard.press("Tab")
@@ -82,9 +82,9 @@ def test_another_preference_ranks_the_history_anew_without_a_walk(
     query = parse_qs(urlsplit(page.url).query)
     assert query["clone"] == [finished_job]
     assert json.loads(query["preference"][0])["exponent"] == exponents
-    page.get_by_label("Name", exact=True).fill("smooth")
+    page.get_by_label("Name", exact=True).fill("fast")
     page.get_by_role("button", name="Submit the job").click()
-    expect(page.get_by_role("heading", name="smooth")).to_be_visible()
+    expect(page.get_by_role("heading", name="fast")).to_be_visible()
     job_id = page.url.rpartition("/")[2]
     assert server.job(job_id)["spec"]["preference"]["exponent"] == exponents
     server.client.post(f"/v1/jobs/{job_id}/cancel")

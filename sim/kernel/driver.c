@@ -95,44 +95,88 @@ static int64_t control(const Walker *w, const Coding *c, int64_t error, int64_t 
   return clamp(coarsen(output, c->pwm_step), -c->pwm_counts, c->pwm_counts);
 }
 
-/* What a walker's controllers remember from tick to tick. */
+/* The lanes: whom each of them walks and how far, and their states. A lane whose walk has ended,
+   and to which no other came, computes on; its walker has its results. */
 typedef struct {
-  int64_t integral[NJ][LANES], error[NJ][LANES];
-} Past;
+  Walker *walker[LANES];
+  int walking[LANES];
+  int64_t tick[LANES];
+  vec q[2][NQ], v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
+  vec sensed[NJ], smoothing;
+  vec sums[N_INTEGRANDS], peak;
+  int64_t integral[NJ][LANES], error[NJ][LANES]; /* what the controllers remember */
+  int now;      /* of the two states */
+  int filtered; /* whether any lane's current has been */
+} Lanes;
 
-static void control_tick(Walker *const *lane, const Coding *c, int64_t tick, const vec *encoder,
-                         const vec *current, Past *past, vec *duty, vec *disturbance)
+/* Lane-ticks that were walked for a walker, and all that were computed. */
+typedef struct {
+  int64_t walked, computed;
+} LaneUse;
+
+/* A walker at its start, and nothing left of who was in the lane before. */
+static void enter(Lanes *s, int k, Walker *w)
 {
+  s->walker[k] = w;
+  s->walking[k] = 1;
+  s->tick[k] = 0;
+  for (int i = 0; i < NQ; i++) s->q[s->now][i][k] = w->q0[i];
+  for (int i = 0; i < NV; i++) s->v[s->now][i][k] = 0.0;
+  for (int i = 0; i < NI; i++) s->internal[s->now][i][k] = w->internal_state[i];
+  for (int i = 0; i < NP; i++) s->p[i][k] = w->parameters[i];
+  for (int i = 0; i < N_INTEGRANDS; i++) s->sums[i][k] = 0.0;
+  for (int j = 0; j < NJ; j++) {
+    s->current[j][k] = s->sensed[j][k] = 0.0;
+    s->integral[j][k] = s->error[j][k] = 0;
+  }
+  s->peak[k] = 0.0;
+  s->smoothing[k] = w->current_smoothing;
+  if (w->current_smoothing < 1.0) s->filtered = 1;
+}
+
+static void leave(Lanes *s, int k, int64_t status)
+{
+  Walker *w = s->walker[k];
+  w->status = status;
+  for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = s->sums[i][k];
+  for (int i = 0; i < NQ; i++) w->end[i] = s->q[s->now][i][k];
+  w->peak_current = s->peak[k];
+  s->walking[k] = 0;
+}
+
+static void control_tick(Lanes *s, const Coding *c)
+{
+  const vec *encoder = ENCODER(s->q[s->now], s->internal[s->now]);
+  const vec *current = s->filtered ? s->sensed : s->current;
   for (int j = 0; j < NJ; j++) {
     const ivec angle = vec_round_int(encoder[j] * SPLAT(c->angle_counts));
     const ivec amperes = vec_round_int(vec_abs(current[j]) * SPLAT(c->current_counts));
     for (int k = 0; k < LANES; k++) {
-      const Walker *w = lane[k];
-      const int64_t at = (tick < w->ticks ? tick : w->ticks - 1) * NJ + j;
+      const Walker *w = s->walker[k];
+      const int64_t at = (s->tick[k] < w->ticks ? s->tick[k] : w->ticks - 1) * NJ + j;
       /* A diverged lane reads nonsense; the clamps keep it inside the tables. */
       const int64_t reading =
           coarsen(clamp(angle[k], -4 * CODE_LIMIT, 4 * CODE_LIMIT), c->angle_step);
       const int64_t error = clamp(w->desired[at] - reading, -CODE_LIMIT, CODE_LIMIT);
-      const int64_t change = tick ? error - past->error[j][k] : 0;
+      const int64_t change = s->tick[k] ? error - s->error[j][k] : 0;
       const int64_t load = coarsen(clamp(amperes[k], 0, CODE_LIMIT), c->current_step);
-      const int64_t counts = control(w, c, error, change, load, &past->integral[j][k]);
-      past->error[j][k] = error;
-      duty[j][k] = (double)counts * c->duty_per_count;
-      disturbance[j][k] = w->disturbance ? w->disturbance[at] : 0.0;
+      const int64_t counts = control(w, c, error, change, load, &s->integral[j][k]);
+      s->error[j][k] = error;
+      s->duty[j][k] = (double)counts * c->duty_per_count;
+      s->disturbance[j][k] = w->disturbance ? w->disturbance[at] : 0.0;
     }
   }
 }
 
-static void write_log(Walker *const *lane, const int *walking, int64_t tick, const vec *q,
-                      const vec *v, const vec *internal, const vec *duty)
+static void write_log(const Lanes *s)
 {
   for (int k = 0; k < LANES; k++) {
-    if (!lane[k]->log || !walking[k]) continue;
-    double *row = lane[k]->log + tick * NLOG;
-    for (int i = 0; i < NQ; i++) *row++ = q[i][k];
-    for (int i = 0; i < NV; i++) *row++ = v[i][k];
-    for (int i = 0; i < NI; i++) *row++ = internal[i][k];
-    for (int i = 0; i < NJ; i++) *row++ = duty[i][k];
+    if (!s->walker[k]->log || !s->walking[k]) continue;
+    double *row = s->walker[k]->log + s->tick[k] * NLOG;
+    for (int i = 0; i < NQ; i++) *row++ = s->q[s->now][i][k];
+    for (int i = 0; i < NV; i++) *row++ = s->v[s->now][i][k];
+    for (int i = 0; i < NI; i++) *row++ = s->internal[s->now][i][k];
+    for (int i = 0; i < NJ; i++) *row++ = s->duty[i][k];
   }
 }
 
@@ -161,89 +205,64 @@ static ivec all_finite(const vec *q, const vec *v, const vec *internal)
   return residue == SPLAT(0.0);
 }
 
-/* LANES walkers, all different objects but possibly copies of one another. */
-static void walk(Walker *const *lane, const Coding *c)
+static void physics_steps(Lanes *s, int64_t substeps)
 {
-  vec q[2][NQ], v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
-  vec sensed[NJ], smoothing;
-  vec sums[N_INTEGRANDS], integrands[N_INTEGRANDS], largest, peak = SPLAT(0.0);
-  Past past;
-  int walking[LANES];
-  int64_t last = 0;
-  int filtered = 0;
-
-  memset(&past, 0, sizeof past);
-  memset(v, 0, sizeof v);
-  memset(current, 0, sizeof current);
-  memset(sensed, 0, sizeof sensed);
-  memset(sums, 0, sizeof sums);
-  for (int k = 0; k < LANES; k++) {
-    for (int i = 0; i < NQ; i++) q[0][i][k] = lane[k]->q0[i];
-    for (int i = 0; i < NI; i++) internal[0][i][k] = lane[k]->internal_state[i];
-    for (int i = 0; i < NP; i++) p[i][k] = lane[k]->parameters[i];
-    if (lane[k]->ticks > last) last = lane[k]->ticks;
-    smoothing[k] = lane[k]->current_smoothing;
-    if (smoothing[k] < 1.0) filtered = 1;
-    lane[k]->status = OK;
-    walking[k] = 1;
-  }
-
-  int now = 0;
-  for (int64_t tick = 0; tick < last; tick++) {
-    if (filtered) unfiltered(sensed, current, smoothing);
-    control_tick(lane, c, tick, ENCODER(q[now], internal[now]), filtered ? sensed : current, &past,
-                 duty, disturbance);
-    write_log(lane, walking, tick, q[now], v[now], internal[now], duty);
-    for (int64_t n = 0; n < c->substeps; n++) {
-      step(q[now], v[now], internal[now], duty, disturbance, p, q[1 - now], v[1 - now],
-           internal[1 - now], current, integrands, &largest);
-      now = 1 - now;
-      for (int i = 0; i < N_INTEGRANDS; i++) sums[i] += integrands[i];
-      peak = vec_max(peak, largest);
-      if (filtered) low_pass(sensed, current, smoothing);
-    }
-    const vec qx = q[now][3], qy = q[now][4];
-    const vec upright = SPLAT(1.0) - SPLAT(2.0) * (qx * qx + qy * qy);
-    const ivec sound = all_finite(q[now], v[now], internal[now]);
-    int any = 0;
-    for (int k = 0; k < LANES; k++) {
-      Walker *w = lane[k];
-      /* A lane that has ended goes on computing, but its walker has its results. */
-      if (!walking[k]) continue;
-      if (!sound[k]) w->status = DIVERGED;
-      else if (q[now][2][k] < w->fall_height || upright[k] < w->fall_cosine) w->status = FELL;
-      if (w->status != OK || tick + 1 == w->ticks) {
-        walking[k] = 0;
-        for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = sums[i][k];
-        for (int i = 0; i < NQ; i++) w->end[i] = q[now][i][k];
-        w->peak_current = peak[k];
-      } else {
-        any = 1;
-      }
-    }
-    if (!any) break;
+  vec integrands[N_INTEGRANDS], largest;
+  for (int64_t n = 0; n < substeps; n++) {
+    const int now = s->now, next = 1 - s->now;
+    step(s->q[now], s->v[now], s->internal[now], s->duty, s->disturbance, s->p, s->q[next],
+         s->v[next], s->internal[next], s->current, integrands, &largest);
+    s->now = next;
+    for (int i = 0; i < N_INTEGRANDS; i++) s->sums[i] += integrands[i];
+    s->peak = vec_max(s->peak, largest);
+    if (s->filtered) low_pass(s->sensed, s->current, s->smoothing);
   }
 }
 
-/* Any number of walkers; idle lanes of the last group repeat its first walker. */
-void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding)
+/* Walks that have come to an end by now leave their lanes; returns how many were walked. */
+static int end_tick(Lanes *s)
 {
-  for (int64_t first = 0; first < n; first += LANES) {
-    Walker copies[LANES];
-    double sums[LANES][N_INTEGRANDS], end[LANES][NQ];
-    Walker *lane[LANES];
+  const vec *q = s->q[s->now];
+  const vec upright = SPLAT(1.0) - SPLAT(2.0) * (q[3] * q[3] + q[4] * q[4]);
+  const ivec sound = all_finite(q, s->v[s->now], s->internal[s->now]);
+  int walked = 0;
+  for (int k = 0; k < LANES; k++) {
+    const Walker *w = s->walker[k];
+    if (!s->walking[k]) continue;
+    walked++;
+    s->tick[k]++;
+    if (!sound[k]) leave(s, k, DIVERGED);
+    else if (q[2][k] < w->fall_height || upright[k] < w->fall_cosine) leave(s, k, FELL);
+    else if (s->tick[k] == w->ticks) leave(s, k, OK);
+  }
+  return walked;
+}
+
+/* Any number of walkers, in order; when a walk ends, the next walker enters its lane. */
+void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding, LaneUse *use)
+{
+  Lanes s;
+  int64_t next = n < LANES ? n : LANES;
+  int walking = n > 0;
+  memset(use, 0, sizeof *use);
+  if (!walking) return;
+  memset(&s, 0, sizeof s);
+  for (int k = 0; k < LANES; k++) {
+    enter(&s, k, &walkers[k < n ? k : 0]);
+    s.walking[k] = k < n;
+  }
+  while (walking) {
+    if (s.filtered) unfiltered(s.sensed, s.current, s.smoothing);
+    control_tick(&s, coding);
+    write_log(&s);
+    physics_steps(&s, coding->substeps);
+    use->walked += end_tick(&s);
+    use->computed += LANES;
+    walking = 0;
     for (int k = 0; k < LANES; k++) {
-      if (first + k < n) {
-        lane[k] = &walkers[first + k];
-      } else {
-        copies[k] = walkers[first];
-        copies[k].sums = sums[k];
-        copies[k].end = end[k];
-        copies[k].log = 0;
-        lane[k] = &copies[k];
-      }
+      if (!s.walking[k] && next < n) enter(&s, k, &walkers[next++]);
+      walking |= s.walking[k];
     }
-    walk(lane, coding);
   }
 }
 

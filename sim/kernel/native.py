@@ -16,7 +16,7 @@ from sim.controllers.base import LookupTable, Response
 from sim.errors import SimulationInputError
 from sim.kernel.parameters import Layout
 from sim.kernel.source import kernel_identity, kernel_source
-from sim.kernel.walk import Coding, WalkResult, WalkSetup
+from sim.kernel.walk import Coding, LaneUse, WalkResult, WalkResults, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
 
@@ -75,6 +75,10 @@ class _Walker(ctypes.Structure):
     ]
 
 
+class _LaneUse(ctypes.Structure):
+    _fields_ = [("walked", ctypes.c_int64), ("computed", ctypes.c_int64)]
+
+
 class _Addresses:
     """Addresses of arrays, which stay where they are as long as this object lives."""
 
@@ -126,13 +130,12 @@ class NativeKernel:
             _pointer(_Walker),
             ctypes.c_int64,
             _pointer(_Coding),
+            _pointer(_LaneUse),
         ]
         library.gaitswarm_walk.restype = None
 
-    def walk(
-        self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
-    ) -> tuple[WalkResult, ...]:
-        """All walks, in order, `lanes` at a time.
+    def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
+        """All walks, `lanes` at a time: where one ends, the longest that is left begins.
 
         Args:
             setups: Walks of this kernel's robot.
@@ -140,7 +143,7 @@ class NativeKernel:
             log: Whether to keep the states at every control tick.
 
         Returns:
-            As many results, each with the same bits alone and in any company.
+            As many results, in the setups' order, each with the same bits alone and in any company.
 
         Raises:
             SimulationInputError: An array of a setup has not the shape that this kernel reads, or
@@ -157,8 +160,11 @@ class NativeKernel:
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
         walkers = (_Walker * n)()
         addresses = _Addresses()
-        for k, (walker, setup) in enumerate(zip(walkers, setups, strict=True)):
-            law, record = setup.control_law, logs[k]
+        # Longest first, so that the last walks to end are short ones.
+        order = sorted(range(n), key=lambda k: -setups[k].ticks)
+        for walker, k in zip(walkers, order, strict=True):
+            setup, record = setups[k], logs[k]
+            law = setup.control_law
             walker.q0 = addresses.of(setup.start, np.float64)
             walker.internal_state = addresses.of(setup.internal_state, np.float64)
             walker.parameters = addresses.of(setup.parameters, np.float64)
@@ -178,11 +184,15 @@ class NativeKernel:
             walker.sums = sums[k].ctypes.data
             walker.end = end[k].ctypes.data
             walker.log = None if record is None else record.ctypes.data
-        packed = _Coding(*dataclasses.astuple(coding))
-        self._library.gaitswarm_walk(walkers, n, ctypes.byref(packed))
-        return tuple(
-            WalkResult(Status(int(w.status)), sums[k], end[k], float(w.peak_current), logs[k])
-            for k, w in enumerate(walkers)
+        packed, use = _Coding(*dataclasses.astuple(coding)), _LaneUse()
+        self._library.gaitswarm_walk(walkers, n, ctypes.byref(packed), ctypes.byref(use))
+        ended = sorted(zip(order, walkers, strict=True), key=lambda pair: pair[0])
+        return WalkResults(
+            tuple(
+                WalkResult(Status(int(w.status)), sums[k], end[k], float(w.peak_current), logs[k])
+                for k, w in ended
+            ),
+            LaneUse(walked=int(use.walked), computed=int(use.computed)),
         )
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sim.controllers.base import ControlLaw
 from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
 from sim.kernel.physics_step import INTEGRANDS, PhysicsModel, physics_model
-from sim.kernel.walk import CODE_LIMIT, Coding, WalkResult, WalkSetup
+from sim.kernel.walk import CODE_LIMIT, Coding, LaneUse, WalkResult, WalkResults, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
 
@@ -42,9 +42,7 @@ class ReferenceKernel:
         self.layout = model.layout
         self.internal_state_size = model.step.numel_in(2)
 
-    def walk(
-        self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
-    ) -> tuple[WalkResult, ...]:
+    def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """All walks, one after the other."""
         for setup in setups:
             setup.check(
@@ -52,15 +50,18 @@ class ReferenceKernel:
                 internal_state=self.internal_state_size,
                 parameters=self.layout.size,
             )
-        return tuple(self._walk(setup, coding, log=log) for setup in setups)
+        walks = [self._walk(setup, coding, log=log) for setup in setups]
+        ticks = sum(walked for _, walked in walks)
+        return WalkResults(tuple(result for result, _ in walks), LaneUse(ticks, ticks))
 
-    def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
+    def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> tuple[WalkResult, int]:
+        """What became of the walk, and how many control ticks it had."""
         step = Stepper(self._model.step, setup)
         past = _Past.of(setup.desired.shape[1])
         sensed = np.zeros(setup.desired.shape[1])
         sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
-        status = Status.OK
+        status, tick = Status.OK, 0
         for tick, desired in enumerate(setup.desired):
             encoder = step.internal_state[: len(desired)] if self._has_backlash else step.q[7:]
             error, load = _read_sensors(encoder, sensed, desired, coding)
@@ -79,7 +80,7 @@ class ReferenceKernel:
             if status is not Status.OK:
                 break
         states = _padded(rows, setup.ticks) if log else None
-        return WalkResult(status, sums, step.q.copy(), peak_current, states)
+        return WalkResult(status, sums, step.q.copy(), peak_current, states), tick + 1
 
 
 class Stepper:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,6 +175,50 @@ class WalkResult:
     states: Floats | None = field(default=None, repr=False)
 
 
+@dataclass(frozen=True, slots=True)
+class LaneUse:
+    """How well a kernel's lanes were used.
+
+    Attributes:
+        walked: control ticks, summed over lanes, that belonged to a walk.
+        computed: control ticks, summed over lanes, in all.
+    """
+
+    walked: int = 0
+    computed: int = 0
+
+    @property
+    def share(self) -> float:
+        """Of the lanes' time that was walked [1]; 1 where nothing was computed."""
+        return self.walked / self.computed if self.computed else 1.0
+
+    def __add__(self, other: LaneUse) -> LaneUse:
+        return LaneUse(self.walked + other.walked, self.computed + other.computed)
+
+
+class WalkResults(Sequence[WalkResult]):
+    """What became of all walks of one call, in their order.
+
+    Args:
+        results: Of the walks.
+        lane_use: Of the call.
+    """
+
+    def __init__(self, results: tuple[WalkResult, ...], lane_use: LaneUse) -> None:
+        self._results = results
+        self.lane_use = lane_use
+
+    def __len__(self) -> int:
+        return len(self._results)
+
+    @overload
+    def __getitem__(self, index: int) -> WalkResult: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[WalkResult, ...]: ...
+    def __getitem__(self, index: int | slice) -> WalkResult | tuple[WalkResult, ...]:
+        return self._results[index]
+
+
 class Kernel(Protocol):
     """Computes walks. Thread-safe; a walk's result does not depend on its neighbours."""
 
@@ -186,9 +230,7 @@ class Kernel(Protocol):
     def lanes(self) -> int:
         """Walks that are stepped together."""
 
-    def walk(
-        self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
-    ) -> tuple[WalkResult, ...]:
+    def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute walks.
 
         Args:
@@ -197,7 +239,7 @@ class Kernel(Protocol):
             log: Whether to keep states.
 
         Returns:
-            Results, in order.
+            Results, in order, and how the lanes were used.
 
         Raises:
             SimulationInputError: A setup has arrays of other sizes.

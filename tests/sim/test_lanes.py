@@ -1,0 +1,153 @@
+"""Lanes: a walk's bits do not depend on which one it has, after whom, or beside whom."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final
+
+import numpy as np
+import pytest
+
+from sim.assembly import control_steps, plan_walk
+from sim.controllers import CONTROLLERS
+from sim.kernel.native import NativeKernel, native_kernel
+from sim.kernel.reference import reference_kernel
+from sim.kernel.walk import Coding, LaneUse, WalkResult, WalkSetup
+from sim.outcome import Status
+from sim.robot import RobotVariant, load_robot
+from sim.robot.description import ContactLaw
+from sim.scenario import SCENARIOS
+
+LAWS: Final[tuple[ContactLaw, ...]] = ("linear_zone", "dead_zone", "karnopp", "stick")
+VARIANTS: Final[dict[str, RobotVariant]] = {
+    **{law: RobotVariant(contact_law=law) for law in LAWS},
+    "backlash": RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
+}
+CONTROL_LAWS: Final = [
+    controller.compile(design)
+    for controller in CONTROLLERS.values()
+    for design in controller.published.values()
+]
+
+
+def varied_walks(kernel: NativeKernel, variant: RobotVariant, n: int) -> list[WalkSetup]:
+    """Walks of 1 to 130 control ticks, some over ground that carries nothing or far too much."""
+    robot = load_robot(variant)
+    _, timestep = control_steps(robot)
+    plan = plan_walk(robot, SCENARIOS[0].model_copy(update={"cycles": 1.0}), timestep)
+    assert plan is not None
+    rng = np.random.default_rng(11)
+    setups = []
+    for k in range(n):
+        setup = plan(CONTROL_LAWS[k % len(CONTROL_LAWS)])
+        ticks = [130, 1, 9, 40][k % 4] + int(rng.integers(0, 5)) * (k % 4 > 1)
+        parameters = setup.parameters.copy()
+        if k % 5 in (2, 3):
+            stiffness = 0.0 if k % 5 == 2 else 1e13
+            parameters[kernel.layout.slices["stiffness"]] = stiffness
+            parameters[kernel.layout.slices["damping"]] = 0.0
+        setups.append(
+            dataclasses.replace(
+                setup,
+                desired=setup.desired[:ticks],
+                parameters=parameters,
+                # Close to the start: a fall takes a few ticks.
+                fall_height=setup.start[2] - 0.002 * (k % 5 == 2) - 0.1 * (k % 5 != 2),
+                disturbance=rng.normal(size=(ticks, robot.n_joints)) if k % 3 == 1 else None,
+                current_smoothing=0.01 if k % 2 else 1.0,
+            )
+        )
+    return setups
+
+
+def bits(result: WalkResult) -> tuple[Status, bytes]:
+    states = np.empty(0) if result.states is None else result.states.ravel()
+    values = np.concatenate([result.sums, result.end, [result.peak_current], states])
+    # What sign a NaN has is the compiler's choice.
+    return result.status, np.where(np.isnan(values), np.nan, values).tobytes()
+
+
+def kernel_and_coding(variant: RobotVariant) -> tuple[NativeKernel, Coding]:
+    robot = load_robot(variant)
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    return kernel, Coding.of(robot, control_steps(robot)[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
+def test_a_walk_has_the_same_bits_in_a_lane_that_others_have_left(variant: RobotVariant) -> None:
+    kernel, coding = kernel_and_coding(variant)
+    setups = varied_walks(kernel, variant, 3 * kernel.lanes + 5)
+
+    def walked(order: Sequence[int]) -> dict[int, tuple[Status, bytes]]:
+        results = kernel.walk([setups[k] for k in order], coding, log=True)
+        return {k: bits(result) for k, result in zip(order, results, strict=True)}
+
+    alone = {k: walked([k])[k] for k in range(len(setups))}
+    assert {status for status, _ in alone.values()} == {Status.OK, Status.FELL, Status.DIVERGED}
+    rng = np.random.default_rng(7)
+    everyone = np.arange(len(setups))
+    for size in (len(setups), len(setups), kernel.lanes - 1, kernel.lanes + 1):
+        order = rng.permutation(everyone)[:size].tolist()
+        assert walked(order) == {k: alone[k] for k in order}
+
+
+def lane_use(kernel: NativeKernel, coding: Coding, ticks: Sequence[int]) -> LaneUse:
+    """Of walks of so many control ticks each, none of which ends early."""
+    (setup, *_) = varied_walks(kernel, VARIANTS["dead_zone"], 1)
+    longest = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], max(ticks), axis=0))
+    setups = [dataclasses.replace(longest, desired=longest.desired[:count]) for count in ticks]
+    results = kernel.walk(setups, coding, log=False)
+    assert {result.status for result in results} == {Status.OK}
+    return results.lane_use
+
+
+def test_a_call_tells_how_many_lane_ticks_were_walked_and_how_many_computed() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    n = kernel.lanes
+    assert lane_use(kernel, coding, [7]) == LaneUse(walked=7, computed=7 * n)
+    assert lane_use(kernel, coding, [7] * n) == LaneUse(walked=7 * n, computed=7 * n)
+    assert lane_use(kernel, coding, [7] * (n + 1)) == LaneUse(7 * (n + 1), 14 * n)
+    assert kernel.walk([], coding, log=False).lane_use.share == 1.0
+
+
+def test_a_lane_takes_the_next_walk_when_one_ends_the_longest_first() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    n = kernel.lanes
+    # The long one begins at once although it comes last, and the short ones share other lanes.
+    ticks = [10] * (3 * (n - 1)) + [30]
+    assert lane_use(kernel, coding, ticks) == LaneUse(walked=30 * n, computed=30 * n)
+
+
+def test_a_walk_that_ends_early_frees_its_lane() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    (setup, *_) = varied_walks(kernel, VARIANTS["dead_zone"], 1)
+    falling = dataclasses.replace(setup, fall_height=1.0)
+    results = kernel.walk([falling] * (2 * kernel.lanes), coding, log=False)
+    assert {result.status for result in results} == {Status.FELL}
+    assert results.lane_use == LaneUse(2 * kernel.lanes, 2 * kernel.lanes)
+
+
+def test_the_interpreter_has_one_lane_which_is_never_idle() -> None:
+    robot = load_robot("szabadka2")
+    kernel, coding = reference_kernel(robot), Coding.of(robot, 10)
+    plan = plan_walk(robot, SCENARIOS[0], 2e-4)
+    assert plan is not None
+    setup = plan(CONTROL_LAWS[0])
+    brief = dataclasses.replace(setup, desired=setup.desired[:3])
+    falling = dataclasses.replace(brief, fall_height=1.0)
+    assert kernel.walk([brief, falling], coding, log=False).lane_use == LaneUse(4, 4)
+
+
+@pytest.mark.slow
+def test_walks_of_many_threads_have_the_bits_of_walks_one_after_the_other() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["stick"])
+    setups = varied_walks(kernel, VARIANTS["stick"], kernel.lanes + 3)
+    one_after_the_other = [bits(result) for result in kernel.walk(setups, coding, log=True)]
+    with ThreadPoolExecutor(8) as pool:
+        calls = [pool.submit(kernel.walk, setups, coding, log=True) for _ in range(24)]
+        for call in calls:
+            assert [bits(result) for result in call.result()] == one_after_the_other

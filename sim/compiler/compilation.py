@@ -114,7 +114,7 @@ def vector_header() -> str:
     """The vector type that kernels are written in.
 
     Returns:
-        C text that defines `vec` of LANES doubles and its operations.
+        C text that defines `vec` of as many reals as a register holds, and its operations.
     """
     return (resources.files("sim.compiler") / "vec.h").read_text(encoding="utf-8")
 
@@ -221,7 +221,7 @@ def build_library(
 
         def make(built: Path) -> None:
             code = built.with_name("kernel.c")
-            code.write_text(f"#define LANES {aim.lanes}\n{source()}", encoding="utf-8")
+            code.write_text(f"#define DOUBLES {aim.lanes}\n{source()}", encoding="utf-8")
             arguments = [*flags, str(code), "-o", str(built)]
             _compile(compiler, arguments, built.parent, f"compile {stem}", time_limit)
 

@@ -1,4 +1,5 @@
-/* Walkers in lock-step: a vector of doubles, one lane a walker.
+/* Walkers in lock-step: a vector of reals, one lane a walker. Reals are doubles, or floats where
+   SINGLE is defined, of which twice as many fill a register; DOUBLES is how many doubles do.
    Every operation is IEEE-exact or built from such, so a lane's bits do not depend on compiler,
    machine or neighbours. No libm: its last bits differ between systems. */
 #include <stdint.h>
@@ -7,89 +8,178 @@
 #include <immintrin.h>
 #endif
 
-typedef double vec __attribute__((vector_size(8 * LANES)));
-typedef int64_t ivec __attribute__((vector_size(8 * LANES)));
+#ifdef SINGLE
+#define LANES (2 * DOUBLES)
+typedef float real;
+typedef int32_t integer;
+#else
+#define LANES DOUBLES
+typedef double real;
+typedef int64_t integer;
+#endif
+
+typedef real vec __attribute__((vector_size(sizeof(real) * LANES)));
+typedef integer ivec __attribute__((vector_size(sizeof(real) * LANES)));
+
+/* Doubles whatever a real is: HALVES of these for all lanes. */
+#define HALVES (LANES / DOUBLES)
+typedef double dvec __attribute__((vector_size(8 * DOUBLES)));
+typedef int64_t divec __attribute__((vector_size(8 * DOUBLES)));
+typedef real hvec __attribute__((vector_size(sizeof(real) * DOUBLES)));
+typedef dvec wide[HALVES];
+
+/* Number k of all lanes' doubles. */
+#define OF_LANE(w, k) ((w)[(k) / DOUBLES][(k) % DOUBLES])
 
 /* Not every source uses all of them. */
 #define OPERATION static inline __attribute__((unused))
 
-#define SPLAT(x) ((vec){0} + (x))
-#define ISPLAT(x) ((ivec){0} + (x))
+#define SPLAT(x) ((vec){0} + (real)(x))
+#define ISPLAT(x) ((ivec){0} + (integer)(x))
+#define DSPLAT(x) ((dvec){0} + (double)(x))
 
 OPERATION vec vec_select(ivec mask, vec a, vec b)
 {
   return (vec)((mask & (ivec)a) | (~mask & (ivec)b));
 }
 
+OPERATION dvec dvec_select(divec mask, dvec a, dvec b)
+{
+  return (dvec)((mask & (divec)a) | (~mask & (divec)b));
+}
+
 /* Of a NaN and a number, the second operand: what the instruction does, spelt out elsewhere. */
-#if defined(__AVX512F__) && LANES == 8
-OPERATION vec vec_max(vec a, vec b) { return (vec)_mm512_max_pd((__m512d)a, (__m512d)b); }
-OPERATION vec vec_min(vec a, vec b) { return (vec)_mm512_min_pd((__m512d)a, (__m512d)b); }
-#elif defined(__AVX__) && LANES == 4
-OPERATION vec vec_max(vec a, vec b) { return (vec)_mm256_max_pd((__m256d)a, (__m256d)b); }
-OPERATION vec vec_min(vec a, vec b) { return (vec)_mm256_min_pd((__m256d)a, (__m256d)b); }
+#if defined(__AVX512F__) && DOUBLES == 8
+OPERATION dvec dvec_max(dvec a, dvec b) { return (dvec)_mm512_max_pd((__m512d)a, (__m512d)b); }
+OPERATION dvec dvec_min(dvec a, dvec b) { return (dvec)_mm512_min_pd((__m512d)a, (__m512d)b); }
+#elif defined(__AVX__) && DOUBLES == 4
+OPERATION dvec dvec_max(dvec a, dvec b) { return (dvec)_mm256_max_pd((__m256d)a, (__m256d)b); }
+OPERATION dvec dvec_min(dvec a, dvec b) { return (dvec)_mm256_min_pd((__m256d)a, (__m256d)b); }
+#else
+OPERATION dvec dvec_max(dvec a, dvec b) { return dvec_select(a > b, a, b); }
+OPERATION dvec dvec_min(dvec a, dvec b) { return dvec_select(a < b, a, b); }
+#endif
+
+#ifndef SINGLE
+OPERATION vec vec_max(vec a, vec b) { return dvec_max(a, b); }
+OPERATION vec vec_min(vec a, vec b) { return dvec_min(a, b); }
+#elif defined(__AVX512F__) && LANES == 16
+OPERATION vec vec_max(vec a, vec b) { return (vec)_mm512_max_ps((__m512)a, (__m512)b); }
+OPERATION vec vec_min(vec a, vec b) { return (vec)_mm512_min_ps((__m512)a, (__m512)b); }
+#elif defined(__AVX__) && LANES == 8
+OPERATION vec vec_max(vec a, vec b) { return (vec)_mm256_max_ps((__m256)a, (__m256)b); }
+OPERATION vec vec_min(vec a, vec b) { return (vec)_mm256_min_ps((__m256)a, (__m256)b); }
 #else
 OPERATION vec vec_max(vec a, vec b) { return vec_select(a > b, a, b); }
 OPERATION vec vec_min(vec a, vec b) { return vec_select(a < b, a, b); }
 #endif
+
 OPERATION vec vec_less(vec a, vec b) { return (vec)((a < b) & (ivec)SPLAT(1.0)); }
-OPERATION vec vec_abs(vec a) { return (vec)((ivec)a & ISPLAT(INT64_MAX)); }
+
+#define SIGN_BIT ((integer)((uint64_t)1 << (8 * sizeof(real) - 1)))
+OPERATION vec vec_abs(vec a) { return (vec)((ivec)a & ISPLAT(~SIGN_BIT)); }
 
 OPERATION vec vec_sqrt(vec a)
 {
-#if defined(__AVX512F__) && LANES == 8
+#if defined(__AVX512F__) && DOUBLES == 8 && defined(SINGLE)
+  return (vec)_mm512_sqrt_ps((__m512)a);
+#elif defined(__AVX512F__) && DOUBLES == 8
   return (vec)_mm512_sqrt_pd((__m512d)a);
-#elif defined(__AVX__) && LANES == 4
+#elif defined(__AVX__) && DOUBLES == 4 && defined(SINGLE)
+  return (vec)_mm256_sqrt_ps((__m256)a);
+#elif defined(__AVX__) && DOUBLES == 4
   return (vec)_mm256_sqrt_pd((__m256d)a);
 #else
   vec r;
-  for (int k = 0; k < LANES; k++) r[k] = __builtin_sqrt(a[k]);
+  for (int k = 0; k < LANES; k++) r[k] = (real)__builtin_sqrt(a[k]);
   return r;
 #endif
 }
 
-/* Adding 1.5 * 2^52 rounds to the nearest integer and leaves it in the low bits. */
-#define ROUNDER 6755399441055744.0
+/* Adding 1.5 * 2^52 rounds a double to the nearest integer, halves to the even one, and leaves it
+   in the low bits; 1.5 * 2^23 does so with a float. */
+#define DOUBLE_ROUNDER 6755399441055744.0
+#ifdef SINGLE
+#define ROUNDER 12582912.0
+#else
+#define ROUNDER DOUBLE_ROUNDER
+#endif
 
-OPERATION ivec vec_round_int(vec a)
+/* Both below 2^51 in size. */
+OPERATION dvec dvec_round(dvec a) { return (a + DSPLAT(DOUBLE_ROUNDER)) - DSPLAT(DOUBLE_ROUNDER); }
+
+OPERATION dvec dvec_floor(dvec a)
 {
-  const ivec bits = (ivec)(a + SPLAT(ROUNDER)) - (ivec)SPLAT(ROUNDER);
-  return bits;
+  const dvec nearest = dvec_round(a);
+  return nearest - (dvec)((nearest > a) & (divec)DSPLAT(1.0));
+}
+
+/* Half h of a vector of reals as doubles, and back. */
+OPERATION dvec vec_widened(const vec *x, int h)
+{
+  hvec half;
+  memcpy(&half, (const char *)x + (size_t)h * sizeof half, sizeof half);
+  return __builtin_convertvector(half, dvec);
+}
+
+OPERATION void vec_narrow(vec *x, int h, dvec value)
+{
+  const hvec half = __builtin_convertvector(value, hvec);
+  memcpy((char *)x + (size_t)h * sizeof half, &half, sizeof half);
 }
 
 /* sin and cos: reduction to [-pi/4, pi/4] with pi/2 in three parts (Cody and Waite), then Taylor
-   polynomials to x^17 and x^18, whose remainder is below half an ulp there. Joint angles are a
-   few radians; beyond 1e5 rad accuracy is lost, and such a walk has long diverged. */
+   polynomials whose remainder is below half an ulp there: to x^17 and x^18 in doubles, to x^9 and
+   x^10 in floats. Joint angles are a few radians; beyond 1e5 rad (in floats 1e4 rad) accuracy is
+   lost, and such a walk has long diverged. */
+#ifdef SINGLE
+#define HALF_PI_1 0x1.92p+0
+#define HALF_PI_2 0x1.fb4p-12
+#define HALF_PI_3 0x1.4442d2p-24
+#else
+#define HALF_PI_1 0x1.921fb54400000p+0
+#define HALF_PI_2 0x1.0b4611a600000p-34
+#define HALF_PI_3 0x1.3198a2e037073p-69
+#endif
+
 OPERATION void vec_sincos(vec x, vec *sine, vec *cosine)
 {
   const vec rounded = x * SPLAT(0x1.45f306dc9c883p-1) + SPLAT(ROUNDER);
   const ivec quadrant = (ivec)rounded;
   const vec n = rounded - SPLAT(ROUNDER);
-  vec y = x - n * SPLAT(0x1.921fb54400000p+0);
-  y = y - n * SPLAT(0x1.0b4611a600000p-34);
-  y = y - n * SPLAT(0x1.3198a2e037073p-69);
+  vec y = x - n * SPLAT(HALF_PI_1);
+  y = y - n * SPLAT(HALF_PI_2);
+  y = y - n * SPLAT(HALF_PI_3);
   const vec z = y * y;
+#ifdef SINGLE
+  vec s = SPLAT(1.0 / 362880.0);
+#else
   vec s = SPLAT(1.0 / 355687428096000.0);
   s = s * z + SPLAT(-1.0 / 1307674368000.0);
   s = s * z + SPLAT(1.0 / 6227020800.0);
   s = s * z + SPLAT(-1.0 / 39916800.0);
   s = s * z + SPLAT(1.0 / 362880.0);
+#endif
   s = s * z + SPLAT(-1.0 / 5040.0);
   s = s * z + SPLAT(1.0 / 120.0);
   s = s * z + SPLAT(-1.0 / 6.0);
   s = y + y * (z * s);
+#ifdef SINGLE
+  vec c = SPLAT(-1.0 / 3628800.0);
+#else
   vec c = SPLAT(-1.0 / 6402373705728000.0);
   c = c * z + SPLAT(1.0 / 20922789888000.0);
   c = c * z + SPLAT(-1.0 / 87178291200.0);
   c = c * z + SPLAT(1.0 / 479001600.0);
   c = c * z + SPLAT(-1.0 / 3628800.0);
+#endif
   c = c * z + SPLAT(1.0 / 40320.0);
   c = c * z + SPLAT(-1.0 / 720.0);
   c = c * z + SPLAT(1.0 / 24.0);
   c = SPLAT(1.0) - z * (SPLAT(0.5) - z * c);
   const ivec odd = -(quadrant & 1);
-  const ivec sign_s = (quadrant & 2) << 62;
-  const ivec sign_c = ((quadrant + 1) & 2) << 62;
+  const ivec sign_s = (quadrant & 2) << (8 * sizeof(real) - 2);
+  const ivec sign_c = ((quadrant + 1) & 2) << (8 * sizeof(real) - 2);
   *sine = (vec)((ivec)vec_select(odd, c, s) ^ sign_s);
   *cosine = (vec)((ivec)vec_select(odd, s, c) ^ sign_c);
 }

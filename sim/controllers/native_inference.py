@@ -74,7 +74,7 @@ def inference_source() -> str:
     """The compiled inference's source.
 
     Returns:
-        C text that lacks the definition of LANES only.
+        C text that lacks the definition of DOUBLES only.
     """
     code = (resources.files("sim.controllers") / "inference.c").read_text(encoding="utf-8")
     return vector_header() + code

@@ -1,7 +1,8 @@
 /* The walk: per control tick read the sensors, run the controller, step the physics, measure.
    Included after vec.h, the emitted function `step`, and the sizes NJ (joints), NI (numbers of
-   the internal state), NP (parameters). ENCODER is where the encoders' angles lie: q + 7, or with
-   backlash the internal state. The Python twin is reference.py. */
+   the internal state), NP (parameters, of which TIMESTEP is the physics'). With BACKLASH the
+   internal state begins with the motors' angles, which the encoders see, and their rates.
+   Positions and sums are doubles, whatever a real is. The Python twin is reference.py. */
 
 #define NQ (7 + NJ)
 #define NV (6 + NJ)
@@ -10,7 +11,8 @@
 
 enum { OK = 0, DIVERGED = 1, FELL = 2 };
 
-enum { FRACTION_BITS = 16, INTEGRAL_BITS = 32 };
+#define FRACTION 0x1p16
+#define INTEGRAL 0x1p32
 #define CODE_LIMIT 65535
 
 /* Sensors and PWM in coded integers, and the rates; one for a whole batch. */
@@ -46,54 +48,26 @@ typedef struct {
   int64_t status;
 } Walker;
 
-static int64_t clamp(int64_t x, int64_t low, int64_t high)
-{
-  return x < low ? low : x > high ? high : x;
-}
+/* An input of a table: index of x is x * gain + middle, rounded and held in 0..last. */
+typedef struct {
+  wide gain, middle, last, stride;
+} Axis;
 
-/* Nearest multiple of step, halves away from the lower one. */
-static int64_t coarsen(int64_t x, int64_t step)
-{
-  if (step == 1) return x;
-  const int64_t shifted = x + step / 2;
-  const int64_t floored = shifted >= 0 ? shifted / step : -((-shifted + step - 1) / step);
-  return floored * step;
-}
+typedef struct {
+  const int8_t *values[LANES];
+  Axis error, current, velocity;
+  wide output_gain;
+  int used; /* whether any lane has one */
+} Tables;
 
-/* Fixed point to integer, halves up. */
-static int64_t descale(int64_t x, int bits)
-{
-  return (x + ((int64_t)1 << (bits - 1))) >> bits;
-}
-
-static int64_t centred(int64_t x, int64_t gain, int64_t n)
-{
-  return clamp(descale(x * gain, FRACTION_BITS) + n / 2, 0, n - 1);
-}
-
-static int64_t look_up(const Table *t, int64_t error, int64_t current, int64_t change)
-{
-  const int64_t row = centred(error, t->error_gain, t->n_error);
-  const int64_t column =
-      clamp(descale(current * t->current_gain, FRACTION_BITS), 0, t->n_current - 1);
-  const int64_t layer = centred(change, t->velocity_gain, t->n_velocity);
-  return t->values[(row * t->n_current + column) * t->n_velocity + layer] * t->output_gain;
-}
-
-/* Controller of one joint: coded error, its change and current to PWM counts (thesis 5.3). */
-static int64_t control(const Walker *w, const Coding *c, int64_t error, int64_t change,
-                       int64_t current, int64_t *integral)
-{
-  const int64_t full = c->pwm_counts << INTEGRAL_BITS;
-  int64_t direct = error * w->proportional_gain + change * w->derivative_gain;
-  int64_t grown = *integral + error * w->integral_gain;
-  if (w->direct.values) direct += look_up(&w->direct, error, current, change);
-  if (w->integrated.values) grown += look_up(&w->integrated, error, current, change);
-  *integral = clamp(grown, -full, full);
-  const int64_t output = clamp(descale(direct, FRACTION_BITS) + descale(*integral, INTEGRAL_BITS),
-                               -c->pwm_counts, c->pwm_counts);
-  return clamp(coarsen(output, c->pwm_step), -c->pwm_counts, c->pwm_counts);
-}
+/* The controllers' integers, in doubles: below 2^53, as walk.py sees to, all of them are exact.
+   Those of 16 or 32 fraction bits are divided by 2^16 or 2^32. */
+typedef struct {
+  wide proportional_gain, integral_gain, derivative_gain;
+  Tables direct, integrated;
+  wide integral[NJ], error[NJ];
+  divec begun[HALVES]; /* lanes that have an error to compare with */
+} Control;
 
 /* The lanes: whom each of them walks and how far, and their states. A lane whose walk has ended,
    and to which no other came, computes on; its walker has its results. */
@@ -101,12 +75,15 @@ typedef struct {
   Walker *walker[LANES];
   int walking[LANES];
   int64_t tick[LANES];
-  vec q[2][NQ], v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
+  int now; /* of the two states */
+  wide q[2][NQ];
+  vec v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
+  wide timestep, motor[NJ]; /* motors' angles, where reals do not keep their small increments */
+  Control control;
+  int filtered, disturbed; /* whether any lane's current or links are */
   vec sensed[NJ], smoothing;
-  vec sums[N_INTEGRANDS], peak;
-  int64_t integral[NJ][LANES], error[NJ][LANES]; /* what the controllers remember */
-  int now;      /* of the two states */
-  int filtered; /* whether any lane's current has been */
+  wide sums[N_INTEGRANDS];
+  vec peak;
 } Lanes;
 
 /* Lane-ticks that were walked for a walker, and all that were computed. */
@@ -114,58 +91,157 @@ typedef struct {
   int64_t walked, computed;
 } LaneUse;
 
+static void set_axis(Axis *a, int k, int64_t gain, int64_t middle, int64_t n, int64_t stride)
+{
+  OF_LANE(a->gain, k) = (double)gain / FRACTION;
+  OF_LANE(a->middle, k) = (double)middle;
+  OF_LANE(a->last, k) = (double)(n - 1);
+  OF_LANE(a->stride, k) = (double)stride;
+}
+
+static void set_table(Tables *t, int k, const Table *table, double unit)
+{
+  static const int8_t nothing = 0;
+  static const Table none = {&nothing, 1, 1, 1, 0, 0, 0, 0};
+  if (table->values) t->used = 1;
+  else table = &none;
+  t->values[k] = table->values;
+  set_axis(&t->error, k, table->error_gain, table->n_error / 2, table->n_error,
+           table->n_current * table->n_velocity);
+  set_axis(&t->current, k, table->current_gain, 0, table->n_current, table->n_velocity);
+  set_axis(&t->velocity, k, table->velocity_gain, table->n_velocity / 2, table->n_velocity, 1);
+  OF_LANE(t->output_gain, k) = (double)table->output_gain / unit;
+}
+
+static void set_control(Control *s, int k, const Walker *w)
+{
+  OF_LANE(s->proportional_gain, k) = (double)w->proportional_gain / FRACTION;
+  OF_LANE(s->derivative_gain, k) = (double)w->derivative_gain / FRACTION;
+  OF_LANE(s->integral_gain, k) = (double)w->integral_gain / INTEGRAL;
+  set_table(&s->direct, k, &w->direct, FRACTION);
+  set_table(&s->integrated, k, &w->integrated, INTEGRAL);
+  for (int j = 0; j < NJ; j++) OF_LANE(s->integral[j], k) = OF_LANE(s->error[j], k) = 0.0;
+  OF_LANE(s->begun, k) = 0;
+}
+
 /* A walker at its start, and nothing left of who was in the lane before. */
 static void enter(Lanes *s, int k, Walker *w)
 {
   s->walker[k] = w;
   s->walking[k] = 1;
   s->tick[k] = 0;
-  for (int i = 0; i < NQ; i++) s->q[s->now][i][k] = w->q0[i];
-  for (int i = 0; i < NV; i++) s->v[s->now][i][k] = 0.0;
-  for (int i = 0; i < NI; i++) s->internal[s->now][i][k] = w->internal_state[i];
-  for (int i = 0; i < NP; i++) s->p[i][k] = w->parameters[i];
-  for (int i = 0; i < N_INTEGRANDS; i++) s->sums[i][k] = 0.0;
+  for (int i = 0; i < NQ; i++) OF_LANE(s->q[s->now][i], k) = w->q0[i];
+  for (int i = 0; i < NV; i++) s->v[s->now][i][k] = 0;
+  for (int i = 0; i < NI; i++) s->internal[s->now][i][k] = (real)w->internal_state[i];
+  for (int i = 0; i < NP; i++) s->p[i][k] = (real)w->parameters[i];
+  for (int i = 0; i < N_INTEGRANDS; i++) OF_LANE(s->sums[i], k) = 0.0;
   for (int j = 0; j < NJ; j++) {
-    s->current[j][k] = s->sensed[j][k] = 0.0;
-    s->integral[j][k] = s->error[j][k] = 0;
+    s->current[j][k] = s->sensed[j][k] = s->disturbance[j][k] = 0;
+    OF_LANE(s->motor[j], k) = BACKLASH ? w->internal_state[j] : 0.0;
   }
-  s->peak[k] = 0.0;
-  s->smoothing[k] = w->current_smoothing;
+  s->peak[k] = 0;
+  s->smoothing[k] = (real)w->current_smoothing;
+  OF_LANE(s->timestep, k) = w->parameters[TIMESTEP];
+  set_control(&s->control, k, w);
   if (w->current_smoothing < 1.0) s->filtered = 1;
+  if (w->disturbance) s->disturbed = 1;
 }
 
 static void leave(Lanes *s, int k, int64_t status)
 {
   Walker *w = s->walker[k];
   w->status = status;
-  for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = s->sums[i][k];
-  for (int i = 0; i < NQ; i++) w->end[i] = s->q[s->now][i][k];
+  for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = OF_LANE(s->sums[i], k);
+  for (int i = 0; i < NQ; i++) w->end[i] = OF_LANE(s->q[s->now][i], k);
   w->peak_current = s->peak[k];
   s->walking[k] = 0;
 }
 
+/* Of a NaN the lower bound. */
+static dvec clamp(dvec x, dvec low, dvec high) { return dvec_min(dvec_max(x, low), high); }
+
+static dvec half_up(dvec x) { return dvec_floor(x + DSPLAT(0.5)); }
+
+/* Nearest multiple of step, halves away from the lower one. */
+static dvec coarsen(dvec x, int64_t step)
+{
+  if (step == 1) return x;
+  return dvec_floor((x + DSPLAT(step / 2)) / DSPLAT(step)) * DSPLAT(step);
+}
+
+static dvec place(const Axis *a, int h, dvec x)
+{
+  return clamp(half_up(x * a->gain[h]) + a->middle[h], DSPLAT(0.0), a->last[h]) * a->stride[h];
+}
+
+static dvec look_up(const Tables *t, int h, dvec error, dvec current, dvec change)
+{
+  const dvec at =
+      place(&t->error, h, error) + place(&t->current, h, current) + place(&t->velocity, h, change);
+  dvec value;
+  for (int k = 0; k < DOUBLES; k++) value[k] = t->values[h * DOUBLES + k][(int64_t)at[k]];
+  return value * t->output_gain[h];
+}
+
+/* Controllers of joint j: coded error and current to PWM counts (thesis 5.3). */
+static dvec control(Control *s, const Coding *c, int j, int h, dvec error, dvec current)
+{
+  const dvec full = DSPLAT(c->pwm_counts);
+  const dvec change = (dvec)((divec)(error - s->error[j][h]) & s->begun[h]);
+  dvec direct = error * s->proportional_gain[h] + change * s->derivative_gain[h];
+  dvec grown = s->integral[j][h] + error * s->integral_gain[h];
+  if (s->direct.used) direct += look_up(&s->direct, h, error, current, change);
+  if (s->integrated.used) grown += look_up(&s->integrated, h, error, current, change);
+  s->error[j][h] = error;
+  s->integral[j][h] = clamp(grown, -full, full);
+  const dvec output = clamp(half_up(direct) + half_up(s->integral[j][h]), -full, full);
+  return clamp(coarsen(output, c->pwm_step), -full, full);
+}
+
+/* A diverged lane reads nonsense; the bounds keep it inside the tables. */
+static dvec code_of(dvec reading, double counts, double low, double high, int64_t step)
+{
+  return coarsen(dvec_round(clamp(reading * DSPLAT(counts), DSPLAT(low), DSPLAT(high))), step);
+}
+
+static dvec encoder(const Lanes *s, int j, int h)
+{
+#if !BACKLASH
+  return s->q[s->now][7 + j][h];
+#elif defined(SINGLE)
+  return s->motor[j][h];
+#else
+  return s->internal[s->now][j];
+#endif
+}
+
 static void control_tick(Lanes *s, const Coding *c)
 {
-  const vec *encoder = ENCODER(s->q[s->now], s->internal[s->now]);
   const vec *current = s->filtered ? s->sensed : s->current;
+  const dvec limit = DSPLAT(CODE_LIMIT);
+  const int32_t *desired[LANES];
+  for (int k = 0; k < LANES; k++) {
+    const Walker *w = s->walker[k];
+    const int64_t row = (s->tick[k] < w->ticks ? s->tick[k] : w->ticks - 1) * NJ;
+    desired[k] = w->desired + row;
+    if (s->disturbed && w->disturbance)
+      for (int j = 0; j < NJ; j++) s->disturbance[j][k] = (real)w->disturbance[row + j];
+  }
   for (int j = 0; j < NJ; j++) {
-    const ivec angle = vec_round_int(encoder[j] * SPLAT(c->angle_counts));
-    const ivec amperes = vec_round_int(vec_abs(current[j]) * SPLAT(c->current_counts));
-    for (int k = 0; k < LANES; k++) {
-      const Walker *w = s->walker[k];
-      const int64_t at = (s->tick[k] < w->ticks ? s->tick[k] : w->ticks - 1) * NJ + j;
-      /* A diverged lane reads nonsense; the clamps keep it inside the tables. */
-      const int64_t reading =
-          coarsen(clamp(angle[k], -4 * CODE_LIMIT, 4 * CODE_LIMIT), c->angle_step);
-      const int64_t error = clamp(w->desired[at] - reading, -CODE_LIMIT, CODE_LIMIT);
-      const int64_t change = s->tick[k] ? error - s->error[j][k] : 0;
-      const int64_t load = coarsen(clamp(amperes[k], 0, CODE_LIMIT), c->current_step);
-      const int64_t counts = control(w, c, error, change, load, &s->integral[j][k]);
-      s->error[j][k] = error;
-      s->duty[j][k] = (double)counts * c->duty_per_count;
-      s->disturbance[j][k] = w->disturbance ? w->disturbance[at] : 0.0;
+    const vec load = vec_abs(current[j]);
+    for (int h = 0; h < HALVES; h++) {
+      dvec wanted;
+      for (int k = 0; k < DOUBLES; k++) wanted[k] = desired[h * DOUBLES + k][j];
+      const dvec angle = code_of(encoder(s, j, h), c->angle_counts, -4 * CODE_LIMIT,
+                                 4 * CODE_LIMIT, c->angle_step);
+      const dvec amperes = code_of(vec_widened(&load, h), c->current_counts, 0, CODE_LIMIT,
+                                   c->current_step);
+      const dvec error = clamp(wanted - angle, -limit, limit);
+      const dvec counts = control(&s->control, c, j, h, error, amperes);
+      vec_narrow(&s->duty[j], h, counts * DSPLAT(c->duty_per_count));
     }
   }
+  memset(s->control.begun, -1, sizeof s->control.begun);
 }
 
 static void write_log(const Lanes *s)
@@ -173,7 +249,7 @@ static void write_log(const Lanes *s)
   for (int k = 0; k < LANES; k++) {
     if (!s->walker[k]->log || !s->walking[k]) continue;
     double *row = s->walker[k]->log + s->tick[k] * NLOG;
-    for (int i = 0; i < NQ; i++) *row++ = s->q[s->now][i][k];
+    for (int i = 0; i < NQ; i++) *row++ = OF_LANE(s->q[s->now][i], k);
     for (int i = 0; i < NV; i++) *row++ = s->v[s->now][i][k];
     for (int i = 0; i < NI; i++) *row++ = s->internal[s->now][i][k];
     for (int i = 0; i < NJ; i++) *row++ = s->duty[i][k];
@@ -191,29 +267,87 @@ static void low_pass(vec *sensed, const vec *current, vec smoothing)
 static void unfiltered(vec *sensed, const vec *current, vec smoothing)
 {
   for (int k = 0; k < LANES; k++)
-    if (smoothing[k] >= 1.0)
+    if (smoothing[k] >= 1)
       for (int j = 0; j < NJ; j++) sensed[j][k] = current[j][k];
 }
 
 /* Lanes whose state is finite; x - x is zero for a finite x only. */
-static ivec all_finite(const vec *q, const vec *v, const vec *internal)
+static divec all_finite(const Lanes *s, int h)
 {
+  const wide *q = s->q[s->now];
+  const vec *v = s->v[s->now], *internal = s->internal[s->now];
+  dvec precise = DSPLAT(0.0);
   vec residue = SPLAT(0.0);
-  for (int i = 0; i < NQ; i++) residue += q[i] - q[i];
+  for (int i = 0; i < NQ; i++) precise += q[i][h] - q[i][h];
   for (int i = 0; i < NV; i++) residue += v[i] - v[i];
   for (int i = 0; i < NI; i++) residue += internal[i] - internal[i];
-  return residue == SPLAT(0.0);
+  return precise + vec_widened(&residue, h) == DSPLAT(0.0);
+}
+
+#ifdef SINGLE
+/* Positions with the velocities after the step, as integration.py has it. Their increments are too
+   small for floats, so they are kept, and grow, in doubles. */
+static void drift(Lanes *s, int h)
+{
+  const wide *q = s->q[s->now];
+  wide *after = s->q[1 - s->now];
+  const vec *v = s->v[1 - s->now];
+  const dvec dt = s->timestep[h], half = DSPLAT(0.5) * dt, one = DSPLAT(1.0);
+  const dvec x = q[3][h], y = q[4][h], z = q[5][h], w = q[6][h];
+  const dvec vx = vec_widened(&v[0], h), vy = vec_widened(&v[1], h), vz = vec_widened(&v[2], h);
+  const dvec tx = DSPLAT(2.0) * (y * vz - z * vy), ty = DSPLAT(2.0) * (z * vx - x * vz),
+             tz = DSPLAT(2.0) * (x * vy - y * vx);
+  after[0][h] = q[0][h] + dt * (vx + w * tx + (y * tz - z * ty));
+  after[1][h] = q[1][h] + dt * (vy + w * ty + (z * tx - x * tz));
+  after[2][h] = q[2][h] + dt * (vz + w * tz + (x * ty - y * tx));
+  dvec a = half * vec_widened(&v[3], h), b = half * vec_widened(&v[4], h),
+       c = half * vec_widened(&v[5], h);
+  const dvec square = a * a + b * b + c * c;
+  const dvec e = one - square * (DSPLAT(0.5) - square * DSPLAT(1.0 / 24.0));
+  const dvec shorter = one - square * DSPLAT(1.0 / 6.0);
+  a *= shorter, b *= shorter, c *= shorter;
+  const dvec turned[4] = {w * a + x * e + y * c - z * b, w * b - x * c + y * e + z * a,
+                          w * c + x * b - y * a + z * e, w * e - x * a - y * b - z * c};
+  const dvec length = turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] +
+                      turned[3] * turned[3];
+  const dvec correction = DSPLAT(1.5) - DSPLAT(0.5) * length;
+  for (int i = 0; i < 4; i++) after[3 + i][h] = turned[i] * correction;
+  for (int j = 0; j < NJ; j++) after[7 + j][h] = q[7 + j][h] + dt * vec_widened(&v[6 + j], h);
+#if BACKLASH
+  vec *internal = s->internal[1 - s->now];
+  for (int j = 0; j < NJ; j++) {
+    s->motor[j][h] += dt * vec_widened(&internal[NJ + j], h);
+    vec_narrow(&internal[j], h, s->motor[j][h]);
+  }
+#endif
+}
+#endif
+
+/* One physics step: the emitted one. */
+static void advance(Lanes *s, vec *integrands, vec *largest)
+{
+  const int now = s->now, next = 1 - s->now;
+#ifdef SINGLE
+  vec q[NQ], unused[NQ];
+  for (int i = 0; i < NQ; i++)
+    for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[now][i][h]);
+  step(q, s->v[now], s->internal[now], s->duty, s->disturbance, s->p, unused, s->v[next],
+       s->internal[next], s->current, integrands, largest);
+  for (int h = 0; h < HALVES; h++) drift(s, h);
+#else
+  step(s->q[now][0], s->v[now], s->internal[now], s->duty, s->disturbance, s->p, s->q[next][0],
+       s->v[next], s->internal[next], s->current, integrands, largest);
+#endif
+  s->now = next;
 }
 
 static void physics_steps(Lanes *s, int64_t substeps)
 {
   vec integrands[N_INTEGRANDS], largest;
   for (int64_t n = 0; n < substeps; n++) {
-    const int now = s->now, next = 1 - s->now;
-    step(s->q[now], s->v[now], s->internal[now], s->duty, s->disturbance, s->p, s->q[next],
-         s->v[next], s->internal[next], s->current, integrands, &largest);
-    s->now = next;
-    for (int i = 0; i < N_INTEGRANDS; i++) s->sums[i] += integrands[i];
+    advance(s, integrands, &largest);
+    for (int i = 0; i < N_INTEGRANDS; i++)
+      for (int h = 0; h < HALVES; h++) s->sums[i][h] += vec_widened(&integrands[i], h);
     s->peak = vec_max(s->peak, largest);
     if (s->filtered) low_pass(s->sensed, s->current, s->smoothing);
   }
@@ -222,18 +356,22 @@ static void physics_steps(Lanes *s, int64_t substeps)
 /* Walks that have come to an end by now leave their lanes; returns how many were walked. */
 static int end_tick(Lanes *s)
 {
-  const vec *q = s->q[s->now];
-  const vec upright = SPLAT(1.0) - SPLAT(2.0) * (q[3] * q[3] + q[4] * q[4]);
-  const ivec sound = all_finite(q, s->v[s->now], s->internal[s->now]);
   int walked = 0;
-  for (int k = 0; k < LANES; k++) {
-    const Walker *w = s->walker[k];
-    if (!s->walking[k]) continue;
-    walked++;
-    s->tick[k]++;
-    if (!sound[k]) leave(s, k, DIVERGED);
-    else if (q[2][k] < w->fall_height || upright[k] < w->fall_cosine) leave(s, k, FELL);
-    else if (s->tick[k] == w->ticks) leave(s, k, OK);
+  for (int h = 0; h < HALVES; h++) {
+    const wide *q = s->q[s->now];
+    const dvec qx = q[3][h], qy = q[4][h], height = q[2][h];
+    const dvec upright = DSPLAT(1.0) - DSPLAT(2.0) * (qx * qx + qy * qy);
+    const divec sound = all_finite(s, h);
+    for (int n = 0; n < DOUBLES; n++) {
+      const int k = h * DOUBLES + n;
+      const Walker *w = s->walker[k];
+      if (!s->walking[k]) continue;
+      walked++;
+      s->tick[k]++;
+      if (!sound[n]) leave(s, k, DIVERGED);
+      else if (height[n] < w->fall_height || upright[n] < w->fall_cosine) leave(s, k, FELL);
+      else if (s->tick[k] == w->ticks) leave(s, k, OK);
+    }
   }
   return walked;
 }
@@ -267,6 +405,7 @@ void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding, LaneUse *u
 }
 
 int64_t gaitswarm_lanes(void) { return LANES; }
+int64_t gaitswarm_single(void) { return sizeof(real) == sizeof(float); }
 int64_t gaitswarm_joints(void) { return NJ; }
 int64_t gaitswarm_internal_state_size(void) { return NI; }
 int64_t gaitswarm_parameters(void) { return NP; }

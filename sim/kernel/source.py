@@ -49,7 +49,7 @@ def kernel_source(robot: Robot) -> str:
         robot: As for `native_kernel`.
 
     Returns:
-        C text that lacks the definition of LANES only.
+        C text that lacks the definition of DOUBLES only.
     """
     # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
     from sim.kernel.emit_c import emit_c  # noqa: PLC0415
@@ -63,7 +63,8 @@ def kernel_source(robot: Robot) -> str:
             f"#define NJ {robot.n_joints}",
             f"#define NP {model.layout.size}",
             f"#define NI {internal_state_size(robot)}",
-            f"#define ENCODER(q, internal) ({'internal' if robot.has_backlash else '(q) + 7'})",
+            f"#define BACKLASH {int(robot.has_backlash)}",
+            f"#define TIMESTEP {model.layout.slices['timestep'].start}",
             vector_header(),
             step,
             (resources.files("sim.kernel") / "driver.c").read_text(encoding="utf-8"),

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, overload
+from typing import Any, Literal, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import ControlLaw
+from sim.controllers.base import ControlLaw, LookupTable
 from sim.errors import SimulationInputError
 from sim.outcome import Status
 from sim.robot import Robot
@@ -18,8 +18,17 @@ from sim.robot.description import EnergyConvention
 
 Floats = NDArray[np.float64]
 
+Precision = Literal["single", "double"]
+"""Of the compiled physics. Positions, sums and control are computed in double precision in both."""
+
 CODE_LIMIT = 65535
 """Largest coded error or current; the robot's integers have 16 bits."""
+
+LARGEST_PWM = 32767
+"""Largest full scale of the PWM [counts]."""
+
+_LARGEST_TERM = 2**51
+"""Of a control law's sums; the compiled kernel adds up three of them, exactly, in 53 bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +59,8 @@ class Coding:
         for name in ("angle_step", "current_step", "pwm_step", "pwm_counts", "substeps"):
             if getattr(self, name) < 1:
                 raise SimulationInputError(f"{name}: {getattr(self, name)} is less than 1")
+        if self.pwm_counts > LARGEST_PWM:
+            raise SimulationInputError(f"pwm_counts: {self.pwm_counts} is over {LARGEST_PWM}")
 
     @classmethod
     def of(cls, robot: Robot, substeps: int) -> Coding:
@@ -128,7 +139,7 @@ class WalkSetup:
         return len(self.desired)
 
     def check(self, *, joints: int, internal_state: int, parameters: int) -> None:
-        """Refuse arrays that a kernel of these sizes would read beyond their ends.
+        """Refuse arrays that a kernel of these sizes would read beyond their ends, and large gains.
 
         Args:
             joints: J, the robot's driven joints.
@@ -136,8 +147,10 @@ class WalkSetup:
             parameters: P, length of the parameter vector.
 
         Raises:
-            SimulationInputError: An array has another shape; the message names it.
+            SimulationInputError: An array has another shape, or a gain leads beyond the integers
+                of the controllers; the message names it.
         """
+        _check_gains(self.control_law)
         ticks = max(self.ticks, 1)
         wanted: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
             "start": (self.start, (7 + joints,)),
@@ -152,6 +165,26 @@ class WalkSetup:
                 raise SimulationInputError(
                     f"{name}: an array of shape {array.shape}; this kernel and walk need {shape}"
                 )
+
+
+def _check_gains(law: ControlLaw) -> None:
+    """With these the compiled kernel's arithmetic is exact, and never leaves a table."""
+    largest = {
+        "proportional_gain": law.proportional_gain * CODE_LIMIT,
+        "integral_gain": law.integral_gain * CODE_LIMIT,
+        "derivative_gain": law.derivative_gain * 2 * CODE_LIMIT,
+    }
+    for part, table in (("direct", law.direct), ("integrated", law.integrated)):
+        if isinstance(table, LookupTable):
+            largest |= {
+                f"{part}.output_gain": table.output_gain * 128,
+                f"{part}.error_gain": table.error_gain * CODE_LIMIT,
+                f"{part}.current_gain": table.current_gain * CODE_LIMIT,
+                f"{part}.velocity_gain": table.velocity_gain * 2 * CODE_LIMIT,
+            }
+    for name, term in largest.items():
+        if abs(term) > _LARGEST_TERM:
+            raise SimulationInputError(f"{name}: too large for the controllers' integers")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

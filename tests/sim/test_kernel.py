@@ -12,7 +12,7 @@ import pytest
 from sim.assembly import PHYSICS_RATE, plan_walk
 from sim.compiler.compilation import Target, target
 from sim.controllers import CONTROLLERS
-from sim.controllers.base import LookupTable
+from sim.controllers.base import ControlLaw, LookupTable
 from sim.kernel.native import NativeKernel, load_kernel, native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import ReferenceKernel, reference_kernel
@@ -201,6 +201,63 @@ def test_a_resolution_that_the_kernel_would_divide_by_is_one_at_least(
 ) -> None:
     with pytest.raises(ValueError, match=f"^{name}: 0 "):
         dataclasses.replace(Coding.of(robot, 10), **{name: 0})
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["proportional_gain", "integral_gain", "derivative_gain", "output_gain", "error_gain"],
+)
+def test_a_gain_beyond_the_controllers_integers_is_refused_by_name(robot: Robot, name: str) -> None:
+    kernel = native_kernel(robot)
+    assert kernel is not None
+    setup = _setup(robot, kernel, SHORT)
+    law = setup.control_law
+    beyond: dict[str, Any] = {name: 2**45}
+    if not hasattr(law, name):
+        assert isinstance(law.direct, LookupTable)
+        beyond = {"direct": dataclasses.replace(law.direct, **beyond)}
+    bad = dataclasses.replace(setup, control_law=dataclasses.replace(law, **beyond))
+    with pytest.raises(ValueError, match=rf"^(direct\.)?{name}: too large"):
+        kernel.walk([bad], Coding.of(robot, 10), log=False)
+
+
+def _random_law(rng: np.random.Generator) -> ControlLaw:
+    """Gains of any size that is allowed, tables of any shape."""
+
+    def gain(bits: int) -> int:
+        return int(rng.choice([-1, 1]) * 2.0 ** rng.uniform(0, bits))
+
+    def table() -> LookupTable:
+        shape = 2 ** rng.integers(0, 7, size=3)
+        values = rng.integers(-128, 128, size=shape).astype(np.int8)
+        return LookupTable(values, gain(44), gain(35), gain(35), gain(34))
+
+    return ControlLaw(
+        gain(35), gain(35), gain(34), *(table() if rng.random() < 0.7 else None for _ in range(2))
+    )
+
+
+def test_any_control_law_has_the_same_outputs_in_both_kernels(robot: Robot) -> None:
+    kernel, reference = native_kernel(robot), reference_kernel(robot)
+    assert kernel is not None
+    setup, rng = _setup(robot, kernel, SHORT), np.random.default_rng(3)
+    setups = [
+        dataclasses.replace(
+            setup,
+            desired=setup.desired[:6] + rng.integers(-40, 40, size=(6, robot.n_joints), dtype="i4"),
+            control_law=_random_law(rng),
+        )
+        for _ in range(60)
+    ]
+    coding = dataclasses.replace(Coding.of(robot, 1), angle_step=5, current_step=3, pwm_step=7)
+    ours, theirs = (k.walk(setups, coding, log=True) for k in (kernel, reference))
+    compiled, readable = (
+        np.array([np.asarray(result.states)[:, -robot.n_joints :] for result in results])
+        for results in (ours, theirs)
+    )
+    np.testing.assert_array_equal(compiled, readable)
+    below_full_scale = np.abs(compiled) < coding.duty_per_count * coding.pwm_counts
+    assert 0.1 < below_full_scale.mean() < 0.9
 
 
 def test_walks_of_different_length_share_a_group(robot: Robot) -> None:

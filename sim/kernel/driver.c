@@ -211,7 +211,7 @@ static dvec encoder(const Lanes *s, int j, int h)
 #elif defined(SINGLE)
   return s->motor[j][h];
 #else
-  return s->internal[s->now][j];
+  return vec_widened(&s->internal[s->now][j], h);
 #endif
 }
 

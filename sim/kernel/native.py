@@ -16,7 +16,7 @@ from sim.controllers.base import LookupTable, Response
 from sim.errors import SimulationInputError
 from sim.kernel.parameters import Layout
 from sim.kernel.source import kernel_identity, kernel_source
-from sim.kernel.walk import Coding, LaneUse, WalkResult, WalkResults, WalkSetup
+from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkResults, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
 
@@ -121,6 +121,7 @@ class NativeKernel:
         self._library = library
         self.layout = Layout(robot)
         self.lanes = int(library.gaitswarm_lanes())
+        self.precision: Precision = "single" if library.gaitswarm_single() else "double"
         self.internal_state_size = int(library.gaitswarm_internal_state_size())
         self._joints = int(library.gaitswarm_joints())
         self._parameters = int(library.gaitswarm_parameters())
@@ -201,7 +202,7 @@ _loading: Final[dict[bytes, threading.Lock]] = {}
 _registering: Final = threading.Lock()
 
 
-def native_kernel(robot: Robot) -> NativeKernel | None:
+def native_kernel(robot: Robot, precision: Precision = "double") -> NativeKernel | None:
     """The robot's kernel, compiled at first use and loaded once a process.
 
     Robots that differ in run-time parameters only share one. While one kernel is compiled, others
@@ -209,6 +210,7 @@ def native_kernel(robot: Robot) -> NativeKernel | None:
 
     Args:
         robot: Its URDF, actuators, legs and law of friction choose the kernel.
+        precision: Of the physics. In single twice as many walks are stepped together.
 
     Returns:
         The kernel; None on a machine without a C compiler whose cache has none.
@@ -216,22 +218,27 @@ def native_kernel(robot: Robot) -> NativeKernel | None:
     Raises:
         KernelBuildError: It cannot be compiled, stored or loaded.
     """
-    identity = kernel_identity(robot)
+    identity = kernel_identity(robot, precision)
     with _registering:
         loading = _loading.setdefault(identity, threading.Lock())
     with loading:
         if identity not in _loaded:
-            _loaded[identity] = load_kernel(robot)
+            _loaded[identity] = load_kernel(robot, precision)
         return _loaded[identity]
 
 
 def load_kernel(
-    robot: Robot, *, wanted: Target | None = None, extra_flags: Sequence[str] = ()
+    robot: Robot,
+    precision: Precision = "double",
+    *,
+    wanted: Target | None = None,
+    extra_flags: Sequence[str] = (),
 ) -> NativeKernel | None:
     """A kernel that `native_kernel` does not keep, to compare ways of compiling.
 
     Args:
         robot: As for `native_kernel`.
+        precision: As for `native_kernel`.
         wanted: What it is compiled for; this machine's target if left out.
         extra_flags: For the compiler, after its usual ones.
 
@@ -241,10 +248,11 @@ def load_kernel(
     Raises:
         KernelBuildError: It cannot be compiled, stored or loaded.
     """
+    double = precision == "double"
     library = load_library(
-        f"kernel-{robot.description.name}",
-        kernel_identity(robot),
-        lambda: kernel_source(robot),
+        f"kernel-{robot.description.name}" if double else f"kernel-single-{robot.description.name}",
+        kernel_identity(robot, precision),
+        lambda: kernel_source(robot, precision),
         wanted=wanted,
         extra_flags=extra_flags,
     )

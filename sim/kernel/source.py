@@ -6,11 +6,14 @@ import hashlib
 import threading
 from functools import lru_cache
 from importlib import metadata, resources
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from sim.compiler.compilation import vector_header
 from sim.kernel.parameters import internal_state_size
 from sim.robot import Robot
+
+if TYPE_CHECKING:
+    from sim.kernel.walk import Precision
 
 _NOT_IN_THE_SOURCE: Final = ("native.py", "observation.py", "reference.py", "walk.py")
 """Files of this package that the source does not depend on; a new one counts until it is here."""
@@ -19,17 +22,19 @@ _deriving: Final = threading.Lock()
 """CasADi's symbols are made by one thread at a time."""
 
 
-def kernel_identity(robot: Robot) -> bytes:
+def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
     """All that a kernel's source depends on, without deriving it.
 
     Args:
         robot: As for `native_kernel`; its run-time parameters are left out, so that robots share
             a kernel.
+        precision: Of the physics.
 
     Returns:
         A digest of 32 bytes.
     """
     digest = hashlib.sha256(_generator())
+    digest.update(precision.encode())
     digest.update(robot.urdf.text.encode())
     actuators = robot.actuators()
     for array in (actuators.torque, actuators.resistance, actuators.armature):
@@ -42,11 +47,12 @@ def kernel_identity(robot: Robot) -> bytes:
     return digest.digest()
 
 
-def kernel_source(robot: Robot) -> str:
+def kernel_source(robot: Robot, precision: Precision = "double") -> str:
     """Derive a robot's physics and write it as C, some seconds of work.
 
     Args:
         robot: As for `native_kernel`.
+        precision: Of the physics.
 
     Returns:
         C text that lacks the definition of DOUBLES only.
@@ -65,6 +71,7 @@ def kernel_source(robot: Robot) -> str:
             f"#define NI {internal_state_size(robot)}",
             f"#define BACKLASH {int(robot.has_backlash)}",
             f"#define TIMESTEP {model.layout.slices['timestep'].start}",
+            *(["#define SINGLE"] if precision == "single" else []),
             vector_header(),
             step,
             (resources.files("sim.kernel") / "driver.c").read_text(encoding="utf-8"),

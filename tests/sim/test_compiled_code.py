@@ -12,6 +12,7 @@ from sim.compiler.compilation import Target, build_library, find_compiler, targe
 from sim.controllers.native_inference import inference_source
 from sim.kernel.native import load_kernel, native_kernel
 from sim.kernel.source import kernel_identity, kernel_source
+from sim.kernel.walk import Precision
 from sim.robot import RobotFiles, RobotVariant, load_robot
 from tests.sim.processes import ROOT, run_python
 from tests.sim.sanitized_walks import ROBOTS, digest_of_tables, digest_of_walks
@@ -44,18 +45,23 @@ def quadruped() -> RobotFiles:
     ],
     ids=["linear zone", "karnopp", "dead zone", "stick", "stick and backlash", "quadruped"],
 )
+@pytest.mark.parametrize("precision", ["double", "single"])
 def test_every_robots_kernel_compiles_without_a_warning(
-    robot: str | RobotVariant | RobotFiles,
+    robot: str | RobotVariant | RobotFiles, precision: Precision
 ) -> None:
-    assert load_kernel(load_robot(robot), extra_flags=STRICT) is not None
+    assert load_kernel(load_robot(robot), precision, extra_flags=STRICT) is not None
 
 
 @pytest.mark.parametrize("wanted", [Target(4, "x86-64-v3"), Target(2, "")], ids=str)
 def test_narrower_kernels_compile_without_a_warning(wanted: Target) -> None:
     aim = wanted if wanted.lanes <= target().lanes else target()
     robot = load_robot("szabadka2")
-    source = kernel_source(robot)
-    for name, text in (("kernel-narrow", source), ("inference", inference_source())):
+    sources = {
+        "kernel-narrow": kernel_source(robot),
+        "kernel-narrow-single": kernel_source(robot, "single"),
+        "inference": inference_source(),
+    }
+    for name, text in sources.items():
         library = build_library(
             name, text.encode(), partial(str, text), wanted=aim, extra_flags=STRICT
         )

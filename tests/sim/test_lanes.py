@@ -14,7 +14,7 @@ from sim.assembly import control_steps, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import NativeKernel, native_kernel
 from sim.kernel.reference import reference_kernel
-from sim.kernel.walk import Coding, LaneUse, WalkResult, WalkSetup
+from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
 from sim.robot.description import ContactLaw
@@ -69,17 +69,22 @@ def bits(result: WalkResult) -> tuple[Status, bytes]:
     return result.status, np.where(np.isnan(values), np.nan, values).tobytes()
 
 
-def kernel_and_coding(variant: RobotVariant) -> tuple[NativeKernel, Coding]:
+def kernel_and_coding(
+    variant: RobotVariant, precision: Precision = "double"
+) -> tuple[NativeKernel, Coding]:
     robot = load_robot(variant)
-    kernel = native_kernel(robot)
+    kernel = native_kernel(robot, precision)
     assert kernel is not None
     return kernel, Coding.of(robot, control_steps(robot)[0])
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
-def test_a_walk_has_the_same_bits_in_a_lane_that_others_have_left(variant: RobotVariant) -> None:
-    kernel, coding = kernel_and_coding(variant)
+def test_a_walk_has_the_same_bits_in_a_lane_that_others_have_left(
+    variant: RobotVariant, precision: Precision
+) -> None:
+    kernel, coding = kernel_and_coding(variant, precision)
     setups = varied_walks(kernel, variant, 3 * kernel.lanes + 5)
 
     def walked(order: Sequence[int]) -> dict[int, tuple[Status, bytes]]:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from sim.compiler.compilation import Target, load_library
 from sim.controllers.base import LookupTable, Response
-from sim.errors import SimulationInputError
-from sim.kernel.parameters import Layout
+from sim.errors import KernelBuildError, SimulationInputError
+from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.source import kernel_identity, kernel_source
 from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkResults, WalkSetup
 from sim.outcome import Status
@@ -51,6 +51,16 @@ class _Table(ctypes.Structure):
     ]
 
 
+class _Law(ctypes.Structure):
+    _fields_ = [
+        ("proportional_gain", ctypes.c_int64),
+        ("integral_gain", ctypes.c_int64),
+        ("derivative_gain", ctypes.c_int64),
+        ("direct", _Table),
+        ("integrated", _Table),
+    ]
+
+
 class _Walker(ctypes.Structure):
     _fields_ = [
         ("q0", ctypes.c_void_p),
@@ -58,11 +68,7 @@ class _Walker(ctypes.Structure):
         ("parameters", ctypes.c_void_p),
         ("desired", ctypes.c_void_p),
         ("disturbance", ctypes.c_void_p),
-        ("proportional_gain", ctypes.c_int64),
-        ("integral_gain", ctypes.c_int64),
-        ("derivative_gain", ctypes.c_int64),
-        ("direct", _Table),
-        ("integrated", _Table),
+        ("law", _Law),
         ("ticks", ctypes.c_int64),
         ("fall_height", ctypes.c_double),
         ("fall_cosine", ctypes.c_double),
@@ -77,6 +83,15 @@ class _Walker(ctypes.Structure):
 
 class _LaneUse(ctypes.Structure):
     _fields_ = [("walked", ctypes.c_int64), ("computed", ctypes.c_int64)]
+
+
+_STRUCTURES: Final = {
+    "coding": _Coding,
+    "table": _Table,
+    "walker": _Walker,
+    "lane_use": _LaneUse,
+}
+"""By their names in the library's functions that tell their sizes."""
 
 
 class _Addresses:
@@ -113,6 +128,9 @@ class NativeKernel:
     Args:
         robot: The robot that the library was compiled for.
         library: What `load_library` gave.
+
+    Raises:
+        KernelBuildError: It was not made from this program's source, or for another robot.
     """
 
     backend: Final = "native"
@@ -122,11 +140,11 @@ class NativeKernel:
         self.layout = Layout(robot)
         self.lanes = int(library.gaitswarm_lanes())
         self.precision: Precision = "single" if library.gaitswarm_single() else "double"
-        self.internal_state_size = int(library.gaitswarm_internal_state_size())
-        self._joints = int(library.gaitswarm_joints())
-        self._parameters = int(library.gaitswarm_parameters())
+        self.internal_state_size = internal_state_size(robot)
+        self._joints = robot.n_joints
         self._integrands = int(library.gaitswarm_integrands())
-        self._log_width = int(library.gaitswarm_log_width())
+        self._log_width = 13 + 3 * self._joints + self.internal_state_size
+        self._check(robot.description.name)
         library.gaitswarm_walk.argtypes = [
             _pointer(_Walker),
             ctypes.c_int64,
@@ -134,6 +152,26 @@ class NativeKernel:
             _pointer(_LaneUse),
         ]
         library.gaitswarm_walk.restype = None
+
+    def _check(self, robot: str) -> None:
+        """What is passed across the border must mean the same on both sides."""
+        sizes = {
+            f"size_of_{name}": ctypes.sizeof(structure) for name, structure in _STRUCTURES.items()
+        }
+        sizes |= {
+            "joints": self._joints,
+            "parameters": self.layout.size,
+            "internal_state_size": self.internal_state_size,
+            "log_width": self._log_width,
+        }
+        for name, size in sizes.items():
+            found = int(getattr(self._library, f"gaitswarm_{name}")())
+            if found != size:
+                raise KernelBuildError(
+                    f"the library loaded for {robot} is not this program's kernel of it: its"
+                    f" {name} is {found}, not {size}; remove kernel-* from the directory of"
+                    " compiled kernels, and it will be built again"
+                )
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """All walks, `lanes` at a time: where one ends, the longest that is left begins.
@@ -154,7 +192,7 @@ class NativeKernel:
             setup.check(
                 joints=self._joints,
                 internal_state=self.internal_state_size,
-                parameters=self._parameters,
+                parameters=self.layout.size,
             )
         n = len(setups)
         sums, end = np.empty((n, self._integrands)), np.empty((n, 7 + self._joints))
@@ -173,11 +211,13 @@ class NativeKernel:
             walker.disturbance = (
                 None if setup.disturbance is None else addresses.of(setup.disturbance, np.float64)
             )
-            walker.proportional_gain = law.proportional_gain
-            walker.integral_gain = law.integral_gain
-            walker.derivative_gain = law.derivative_gain
-            walker.direct = addresses.table(law.direct)
-            walker.integrated = addresses.table(law.integrated)
+            walker.law = _Law(
+                law.proportional_gain,
+                law.integral_gain,
+                law.derivative_gain,
+                addresses.table(law.direct),
+                addresses.table(law.integrated),
+            )
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height
             walker.fall_cosine = setup.fall_cosine

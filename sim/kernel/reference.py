@@ -1,7 +1,7 @@
 """The readable driver: the same walk over CasADi's interpreter.
 
-The oracle of driver.c, and the fallback where there is no C compiler. Function by function the
-twin of driver.c; the physics agrees to rounding, the integer arithmetic exactly.
+The oracle of control.c and driver.c, and the fallback where there is no C compiler. Function by
+function their twin; the physics agrees to rounding, the integer arithmetic exactly.
 """
 
 from __future__ import annotations

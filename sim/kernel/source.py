@@ -74,7 +74,10 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             *(["#define SINGLE"] if precision == "single" else []),
             vector_header(),
             step,
-            (resources.files("sim.kernel") / "driver.c").read_text(encoding="utf-8"),
+            *(
+                (resources.files("sim.kernel") / name).read_text(encoding="utf-8")
+                for name in ("control.c", "driver.c")
+            ),
         ]
     )
 

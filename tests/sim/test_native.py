@@ -14,8 +14,9 @@ import pytest
 
 from sim.compiler.compilation import load_library, vector_header
 from sim.errors import KernelBuildError
-from sim.kernel.native import native_kernel
-from sim.robot import RobotFiles, load_robot
+from sim.kernel.native import NativeKernel, native_kernel
+from sim.kernel.parameters import Layout
+from sim.robot import Robot, RobotFiles, load_robot
 from sim.simulate import prepare
 from tests.sim.processes import ROOT, run_python
 
@@ -225,7 +226,7 @@ def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_p
 
     kernel = tmp_path / "sim" / "kernel"
     found = [identity()]
-    for changed in (kernel / "driver.c", kernel / "spatial.py", kernel / "a_new_law.py"):
+    for changed in (kernel / "control.c", kernel / "spatial.py", kernel / "a_new_law.py"):
         with changed.open("a") as file:
             file.write("\n")
         found.append(identity())
@@ -266,7 +267,11 @@ def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_
         "import sys, sim.kernel.emit_c, sim.kernel.physics_step, sim.kernel.source\n"
         "print(*(name for name in sys.modules if name.startswith('sim.kernel.')))"
     )
-    files = ["driver.c", *(f"{name.split('.')[-1]}.py" for name in used.stdout.split())]
+    files = [
+        "control.c",
+        "driver.c",
+        *(f"{name.split('.')[-1]}.py" for name in used.stdout.split()),
+    ]
     assert {"physics_step.py", "contact.py", "inertia.py"} < set(files)
     shutil.copytree(ROOT / "sim", tmp_path / "sim", ignore=shutil.ignore_patterns("__pycache__"))
     done = subprocess.run(
@@ -279,3 +284,30 @@ def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_
     )
     identities = [line.split()[1] for line in done.stdout.splitlines()]
     assert len(identities) == len(set(identities)) == 1 + len(files)
+
+
+def test_a_library_whose_structures_differ_is_refused_with_its_name(robot: Robot) -> None:
+    right = {
+        **dict.fromkeys(("lanes", "single", "integrands"), 1),
+        "joints": 18,
+        "parameters": Layout(robot).size,
+        "internal_state_size": 0,
+        "log_width": 67,
+        "size_of_coding": 64,
+        "size_of_table": 64,
+        "size_of_walker": 264,
+        "size_of_lane_use": 16,
+    }
+
+    def made_of(sizes: dict[str, int]) -> NativeKernel:
+        source = "void gaitswarm_walk(void) {}\n" + "\n".join(
+            f"int gaitswarm_{name}(void) {{ return {size}; }}" for name, size in sizes.items()
+        )
+        library = load_library("border-check", source.encode(), lambda: source)
+        assert library is not None
+        return NativeKernel(robot, library)
+
+    assert made_of(right).lanes == 1
+    for name in right.keys() - {"lanes", "single", "integrands"}:
+        with pytest.raises(KernelBuildError, match=rf"szabadka2 .* its {name} is 7, not"):
+            made_of(right | {name: 7})

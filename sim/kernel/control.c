@@ -1,0 +1,126 @@
+/* Sensors, controllers and PWM of all lanes in whole numbers, which are doubles (thesis 5.3).
+   Included after vec.h and NJ (joints). The Python twin is reference.py. */
+
+#define FRACTION 0x1p16
+#define INTEGRAL 0x1p32
+#define CODE_LIMIT 65535
+
+/* Sensors and PWM in coded integers, and the rates; one for a whole batch. */
+typedef struct {
+  double angle_counts, current_counts, duty_per_count;
+  int64_t angle_step, current_step, pwm_step, pwm_counts, substeps;
+} Coding;
+
+/* sim.controllers.base.LookupTable; values is NULL where there is none. */
+typedef struct {
+  const int8_t *values;
+  int64_t n_error, n_current, n_velocity;
+  int64_t error_gain, current_gain, velocity_gain, output_gain;
+} Table;
+
+/* sim.controllers.base.ControlLaw. */
+typedef struct {
+  int64_t proportional_gain, integral_gain, derivative_gain;
+  Table direct, integrated;
+} Law;
+
+/* An input of a table: index of x is x * gain + middle, rounded and held in 0..last. */
+typedef struct {
+  wide gain, middle, last, stride;
+} Axis;
+
+typedef struct {
+  const int8_t *values[LANES];
+  Axis error, current, velocity;
+  wide output_gain;
+  int used; /* whether any lane has one */
+} Tables;
+
+/* The controllers' integers, in doubles: below 2^53, as walk.py sees to, all of them are exact.
+   Those of 16 or 32 fraction bits are divided by 2^16 or 2^32. */
+typedef struct {
+  wide proportional_gain, integral_gain, derivative_gain;
+  Tables direct, integrated;
+  wide integral[NJ], error[NJ];
+  divec begun[HALVES]; /* lanes that have an error to compare with */
+} Control;
+
+static void set_axis(Axis *a, int k, int64_t gain, int64_t middle, int64_t n, int64_t stride)
+{
+  OF_LANE(a->gain, k) = (double)gain / FRACTION;
+  OF_LANE(a->middle, k) = (double)middle;
+  OF_LANE(a->last, k) = (double)(n - 1);
+  OF_LANE(a->stride, k) = (double)stride;
+}
+
+static void set_table(Tables *t, int k, const Table *table, double unit)
+{
+  static const int8_t nothing = 0;
+  static const Table none = {&nothing, 1, 1, 1, 0, 0, 0, 0};
+  if (table->values) t->used = 1;
+  else table = &none;
+  t->values[k] = table->values;
+  set_axis(&t->error, k, table->error_gain, table->n_error / 2, table->n_error,
+           table->n_current * table->n_velocity);
+  set_axis(&t->current, k, table->current_gain, 0, table->n_current, table->n_velocity);
+  set_axis(&t->velocity, k, table->velocity_gain, table->n_velocity / 2, table->n_velocity, 1);
+  OF_LANE(t->output_gain, k) = (double)table->output_gain / unit;
+}
+
+static void set_control(Control *s, int k, const Law *law)
+{
+  OF_LANE(s->proportional_gain, k) = (double)law->proportional_gain / FRACTION;
+  OF_LANE(s->derivative_gain, k) = (double)law->derivative_gain / FRACTION;
+  OF_LANE(s->integral_gain, k) = (double)law->integral_gain / INTEGRAL;
+  set_table(&s->direct, k, &law->direct, FRACTION);
+  set_table(&s->integrated, k, &law->integrated, INTEGRAL);
+  for (int j = 0; j < NJ; j++) OF_LANE(s->integral[j], k) = OF_LANE(s->error[j], k) = 0.0;
+  OF_LANE(s->begun, k) = 0;
+}
+
+/* Of a NaN the lower bound. */
+static dvec clamp(dvec x, dvec low, dvec high) { return dvec_min(dvec_max(x, low), high); }
+
+static dvec half_up(dvec x) { return dvec_floor(x + DSPLAT(0.5)); }
+
+/* Nearest multiple of step, halves away from the lower one. */
+static dvec coarsen(dvec x, int64_t step)
+{
+  if (step == 1) return x;
+  return dvec_floor((x + DSPLAT(step / 2)) / DSPLAT(step)) * DSPLAT(step);
+}
+
+static dvec place(const Axis *a, int h, dvec x)
+{
+  return clamp(half_up(x * a->gain[h]) + a->middle[h], DSPLAT(0.0), a->last[h]) * a->stride[h];
+}
+
+static dvec look_up(const Tables *t, int h, dvec error, dvec current, dvec change)
+{
+  const dvec at =
+      place(&t->error, h, error) + place(&t->current, h, current) + place(&t->velocity, h, change);
+  dvec value;
+  for (int k = 0; k < DOUBLES; k++) value[k] = t->values[h * DOUBLES + k][(int64_t)at[k]];
+  return value * t->output_gain[h];
+}
+
+/* Controllers of joint j: coded error and current to PWM counts (thesis 5.3). */
+static dvec control(Control *s, const Coding *c, int j, int h, dvec error, dvec current)
+{
+  const dvec full = DSPLAT(c->pwm_counts);
+  const dvec change = (dvec)((divec)(error - s->error[j][h]) & s->begun[h]);
+  dvec direct = error * s->proportional_gain[h] + change * s->derivative_gain[h];
+  dvec grown = s->integral[j][h] + error * s->integral_gain[h];
+  if (s->direct.used) direct += look_up(&s->direct, h, error, current, change);
+  if (s->integrated.used) grown += look_up(&s->integrated, h, error, current, change);
+  s->error[j][h] = error;
+  s->integral[j][h] = clamp(grown, -full, full);
+  const dvec output = clamp(half_up(direct) + half_up(s->integral[j][h]), -full, full);
+  return clamp(coarsen(output, c->pwm_step), -full, full);
+}
+
+/* A diverged lane reads nonsense; the bounds keep it inside the tables. */
+static dvec code_of(dvec reading, double counts, double low, double high, int64_t step)
+{
+  return coarsen(dvec_round(clamp(reading * DSPLAT(counts), DSPLAT(low), DSPLAT(high))), step);
+}

@@ -10,13 +10,14 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.compiler.compilation import find_compiler
 from sim.controllers import ControlLaw
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import Trajectory, desired_angles
 from sim.kernel.native import native_kernel
 from sim.kernel.parameters import gravity_on, internal_state_size, pack_parameters
-from sim.kernel.walk import Kernel, WalkResult, WalkSetup, current_smoothing
+from sim.kernel.walk import Kernel, Precision, WalkResult, WalkSetup, current_smoothing
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
 from sim.robot import Robot
@@ -38,26 +39,35 @@ SHORTEST_WALK: Final = 1e-3
 """Distance [m] under which a robot counts as not walking: energy per metre has no value."""
 
 
-def kernel_of(robot: Robot, backend: Backend = "auto") -> Kernel:
+def kernel_of(
+    robot: Robot, backend: Backend = "auto", *, precision: Precision = "double"
+) -> Kernel:
     """The robot's kernel, built if there is none yet.
 
     Args:
         robot: The robot.
         backend: Which kernel; with `auto` a warning says if it is the slow one.
+        precision: Of the physics' numbers; the interpreter has double alone.
 
     Returns:
         The kernel.
 
     Raises:
-        SimulationInputError: The native kernel is asked for on a machine without a C compiler.
+        SimulationInputError: The native kernel, or single precision, which it alone has, is asked
+            for on a machine without a C compiler; or single precision of the interpreter.
         KernelBuildError: The compiler refused the source.
     """
-    if backend != "reference":
-        native = native_kernel(robot)
-        if native is not None:
-            return native
-        if backend == "native":
-            raise SimulationInputError("backend: no C compiler found for the native kernel")
+    if backend == "reference" and precision != "double":
+        raise SimulationInputError(
+            f"precision: the reference kernel has double precision alone, not {precision}"
+        )
+    native = None if backend == "reference" else native_kernel(robot, precision)
+    if native is not None:
+        return native
+    if backend == "native":
+        raise SimulationInputError("backend: no C compiler found for the native kernel")
+    if backend == "auto":
+        check_precision(robot, precision)
         warnings.warn(
             "no C compiler found: simulating with the interpreter, some hundred times slower;"
             " install gcc or clang, or `pip install gaitswarm[compiler]`",
@@ -68,6 +78,36 @@ def kernel_of(robot: Robot, backend: Backend = "auto") -> Kernel:
     from sim.kernel.reference import reference_kernel  # noqa: PLC0415
 
     return reference_kernel(robot)
+
+
+def has_native_kernel(robot: Robot, precision: Precision = "double") -> bool:
+    """Whether a robot walks with a compiled kernel here; nothing is compiled for the answer.
+
+    Args:
+        robot: The robot.
+        precision: Of the physics' numbers.
+
+    Returns:
+        True with a C compiler, whatever it may say to the source, and for a kernel in the cache.
+    """
+    return find_compiler() is not None or native_kernel(robot, precision) is not None
+
+
+def check_precision(robot: Robot, precision: Precision) -> None:
+    """Check that a robot can walk in a precision on this machine.
+
+    Args:
+        robot: The robot.
+        precision: Of the physics' numbers.
+
+    Raises:
+        SimulationInputError: Single precision is asked for, and there is no compiled kernel.
+    """
+    if precision != "double" and not has_native_kernel(robot, precision):
+        raise SimulationInputError(
+            f"precision: {precision} needs the compiled kernel, and no C compiler was found;"
+            " install gcc or clang, or `pip install gaitswarm[compiler]`, or choose double"
+        )
 
 
 def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[int, float]:

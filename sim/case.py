@@ -8,10 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.kernel.walk import Precision
 from sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
 from sim.robot import RobotSource
 from sim.scenario import Scenario
-from sim.simulate import simulate
+from sim.simulate import Simulation, simulate
 
 
 class Case(Protocol):
@@ -31,6 +32,10 @@ class Case(Protocol):
     @property
     def robots(self) -> tuple[RobotSource, ...]:
         """The robots, whose kernels should be ready before many processes need them."""
+
+    @property
+    def precision(self) -> Precision:
+        """Of the physics' numbers."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -59,12 +64,14 @@ class Walk:
         controller: name of its motor controller.
         scenario: that it walks through.
         variables: columns of the designs.
+        precision: of the physics' numbers.
     """
 
     robot: RobotSource
     controller: str
     scenario: Scenario
     variables: tuple[str, ...]
+    precision: Precision = "double"
 
     @property
     def name(self) -> str:
@@ -88,8 +95,17 @@ class Walk:
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
         """Let every design walk."""
-        walked = simulate(self.scenario, self.controller, self.variables, designs, robot=self.robot)
-        return walked.outcome
+        return self._walk(designs).outcome
+
+    def _walk(self, designs: NDArray[np.float64]) -> Simulation:
+        return simulate(
+            self.scenario,
+            self.controller,
+            self.variables,
+            designs,
+            robot=self.robot,
+            precision=self.precision,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +120,6 @@ class MeasuredWalk(Walk):
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
         """Let every design walk."""
-        walked = simulate(self.scenario, self.controller, self.variables, designs, robot=self.robot)
+        walked = self._walk(designs)
         columns = [walked.outcome.objectives, walked.measurements.array()]
         return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)

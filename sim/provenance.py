@@ -15,8 +15,8 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from sim.compiler.compilation import find_compiler
-from sim.kernel.native import native_kernel
+from sim.assembly import has_native_kernel
+from sim.kernel.walk import Precision
 from sim.robot import RobotSource, load_robot
 
 _ROOT: Final = Path(__file__).parent
@@ -65,8 +65,10 @@ class Provenance(BaseModel):
         description="The compiled kernel (native), or the interpreter without a C compiler.",
         examples=["native"],
     )
-    precision: str = Field(
-        default="double", description="Of the physics' numbers.", examples=["double"]
+    precision: Precision = Field(
+        default="double",
+        description="Of the physics' numbers. Numbers of one are never mixed with the other's.",
+        examples=["double"],
     )
 
     def changes(self, now: Provenance) -> tuple[str, ...]:
@@ -98,12 +100,13 @@ class Provenance(BaseModel):
 
 
 @lru_cache(maxsize=32)
-def provenance_of(*robots: RobotSource) -> Provenance:
+def provenance_of(*robots: RobotSource, precision: Precision = "double") -> Provenance:
     """The provenance of what this process computes of robots; nothing is compiled for it.
 
     Args:
         robots: the robots as cases name them, one at least. They are looked at once: later calls
             give the same answer.
+        precision: of the physics' numbers.
 
     Returns:
         The provenance of its cases in this process.
@@ -114,13 +117,14 @@ def provenance_of(*robots: RobotSource) -> Provenance:
     machines = [load_robot(robot) for robot in robots]
     content = "".join(m.description.model_dump_json() + m.urdf.text for m in machines)
     # With a compiler, a kernel is compiled or an error is raised: never replaced by the reference.
-    native = find_compiler() is not None or all(native_kernel(m) for m in machines)
+    native = all(has_native_kernel(machine, precision) for machine in machines)
     return Provenance(
         robot=", ".join(machine.description.name for machine in machines),
         robot_digest=hashlib.sha256(content.encode()).hexdigest()[:_DIGITS],
         code_digest=simulator_digest(),
         libraries={name: metadata.version(name) for name in _LIBRARIES},
         backend="native" if native else "reference",
+        precision=precision,
     )
 
 

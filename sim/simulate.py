@@ -24,7 +24,7 @@ from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.walk import Coding, WalkSetup
+from sim.kernel.walk import Coding, Precision, WalkSetup
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
@@ -60,6 +60,7 @@ def simulate(
     log: bool = False,
     backend: Backend = "auto",
     physics_rate: int = PHYSICS_RATE,
+    precision: Precision = "double",
 ) -> Simulation:
     """Let every design walk through a scenario.
 
@@ -77,18 +78,20 @@ def simulate(
         log: Whether to keep every walk's log.
         backend: Which kernel; with `auto` a warning says if it is the slow one.
         physics_rate: Physics steps a second [Hz], a multiple of the control rate.
+        precision: Of the physics' numbers.
 
     Returns:
         Outcomes, measurements and logs. A design's bits do not depend on the designs beside it.
 
     Raises:
-        SimulationInputError: A design cannot be simulated; names the variable.
+        SimulationInputError: A design cannot be simulated, and the variable is named; or single
+            precision is asked for without a compiled kernel.
     """
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
     if noise is not None and noise.kind == "angle":
         machine = with_shafts(machine)
-    kernel = kernel_of(machine, backend)
+    kernel = kernel_of(machine, backend, precision=precision)
     substeps, timestep = control_steps(machine, physics_rate)
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
@@ -153,17 +156,26 @@ def check_reach(
     require_reachable(machine, with_gait(scenario, gait))
 
 
-def prepare(robot: RobotChoice = DEFAULT_ROBOT, *, backend: Backend = "auto") -> str:
+def prepare(
+    robot: RobotChoice = DEFAULT_ROBOT,
+    *,
+    backend: Backend = "auto",
+    precision: Precision = "double",
+) -> str:
     """Build a robot's kernel, or find it in the cache.
 
     Args:
         robot: The robot that is going to walk.
         backend: Which kernel.
+        precision: Of the physics' numbers.
 
     Returns:
         The backend in use, `native` or `reference`.
+
+    Raises:
+        SimulationInputError: Single precision is asked for without a compiled kernel.
     """
-    return kernel_of(load_robot(robot), backend).backend
+    return kernel_of(load_robot(robot), backend, precision=precision).backend
 
 
 def lanes() -> int:

@@ -50,7 +50,7 @@ class InProcessEvaluator:
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
         """Have the walks run by the pool, as soon as their robots' kernels are built."""
-        self._kernels.build((robot for case in request.cases for robot in case.robots), should_stop)
+        self._kernels.build(request.cases, should_stop)
         return self._dispatcher.evaluate(request, should_stop)
 
     def close(self) -> None:

@@ -9,6 +9,8 @@ from typing import Final, TypeVar
 
 from services.optimizer.run.evaluator import EvaluationStopped
 from sim import simulate
+from sim.case import Case
+from sim.kernel.walk import Precision
 from sim.robot import RobotSource
 
 T = TypeVar("T")
@@ -44,13 +46,13 @@ class KernelBuilder:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._under_way: dict[RobotSource, Future[None]] = {}
+        self._under_way: dict[tuple[RobotSource, Precision], Future[None]] = {}
 
-    def build(self, robots: Iterable[RobotSource], should_stop: Callable[[], bool]) -> None:
+    def build(self, cases: Iterable[Case], should_stop: Callable[[], bool]) -> None:
         """Return when all kernels are in the cache.
 
         Args:
-            robots: Those that are going to walk.
+            cases: Those that are going to be run.
             should_stop: Polled several times a second; what is being built is built to its end
                 even so, and found by whoever needs it next.
 
@@ -58,27 +60,28 @@ class KernelBuilder:
             EvaluationStopped: `should_stop` said so.
             KernelBuildError: The compiler refuses a kernel.
         """
-        for work in [self._building(robot) for robot in set(robots)]:
+        wanted = {(robot, case.precision) for case in cases for robot in case.robots}
+        for work in [self._building(robot, precision) for robot, precision in wanted]:
             awaited(work, should_stop)
 
-    def _building(self, robot: RobotSource) -> Future[None]:
+    def _building(self, robot: RobotSource, precision: Precision) -> Future[None]:
         with self._lock:
-            work = self._under_way.get(robot)
+            work = self._under_way.get((robot, precision))
             if work is None:
-                work = self._under_way[robot] = Future()
+                work = self._under_way[robot, precision] = Future()
                 threading.Thread(
-                    target=self._build, args=(robot, work), name="kernel", daemon=True
+                    target=self._build, args=(robot, precision, work), name="kernel", daemon=True
                 ).start()
             return work
 
-    def _build(self, robot: RobotSource, work: Future[None]) -> None:
+    def _build(self, robot: RobotSource, precision: Precision, work: Future[None]) -> None:
         failure: BaseException | None = None
         try:
-            simulate.prepare(robot)
+            simulate.prepare(robot, precision=precision)
         except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
             failure = error
         with self._lock:
-            del self._under_way[robot]
+            del self._under_way[robot, precision]
         if failure is None:
             work.set_result(None)
         else:

@@ -78,7 +78,7 @@ class RayEvaluator:
     ) -> tuple[Outcome, ...]:
         """Have the walks run by Ray's workers, on a new connection if the last was lost."""
         # Built here, the kernel lies in the cache when this machine's workers look for it.
-        self._kernels.build((robot for case in request.cases for robot in case.robots), should_stop)
+        self._kernels.build(request.cases, should_stop)
         dispatcher = awaited(self._living_link().opened, should_stop)
         return dispatcher.evaluate(request, should_stop)
 

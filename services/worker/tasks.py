@@ -96,7 +96,7 @@ class Task:
         Returns:
             The outcome, or None in its place, with the provenance of this process.
         """
-        here = provenance_of(*self.case.robots)
+        here = provenance_of(*self.case.robots, precision=self.case.precision)
         outcome = self.case.run(self.designs) if here == self.provenance else None
         return Answer(here, outcome, platform.node())
 

@@ -15,7 +15,7 @@ from sim.calibration.catalogue import robot_variables, varied_robot
 from sim.catalogue import design_catalogue
 from sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from sim.gait.trajectory import Trajectory, desired_angles
-from sim.kernel.walk import Coding, Kernel, WalkSetup
+from sim.kernel.walk import Coding, Kernel, Precision, WalkSetup
 from sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
 from sim.robot import Robot, RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
@@ -46,6 +46,7 @@ class CalibrationWalk:
         design: names and numbers of the drive, in the order of names.
         scenario: that is walked through.
         variables: columns of the designs, of `robot_variables` and `walk_variables`.
+        precision: of the physics' numbers.
     """
 
     name: str
@@ -54,6 +55,7 @@ class CalibrationWalk:
     design: tuple[tuple[str, float], ...]
     scenario: Scenario
     variables: tuple[str, ...]
+    precision: Precision = "double"
 
     @property
     def duration(self) -> float:
@@ -80,7 +82,8 @@ class CalibrationWalk:
             substeps, timestep = control_steps(robot)
             setup = self._setup(described, robot, self.drive(values), timestep)
             if setup is not None:
-                key = kernel_of(robot), Coding.of(robot, substeps), timestep
+                kernel = kernel_of(robot, precision=self.precision)
+                key = kernel, Coding.of(robot, substeps), timestep
                 together.setdefault(key, {})[index] = setup
         for (kernel, coding, timestep), setups in together.items():
             results = kernel.walk(list(setups.values()), coding, log=False)

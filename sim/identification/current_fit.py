@@ -15,7 +15,7 @@ from sim.gait.trajectory import desired_angles
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.motor import electrical
 from sim.kernel.observation import sensed_currents
-from sim.kernel.walk import Coding
+from sim.kernel.walk import Coding, Precision
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
 from sim.robot.description import JOINTS_PER_LEG
@@ -46,12 +46,14 @@ class CurrentFit:
         robot: as described.
         walk: that was recorded.
         variables: columns of the designs, names of `identifiable_variables`.
+        precision: of the physics' numbers.
     """
 
     name: str
     robot: RobotSource
     walk: RecordedWalk
     variables: tuple[str, ...]
+    precision: Precision = "double"
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
@@ -77,7 +79,7 @@ class CurrentFit:
             )
         scenario = with_gait(self.walk.scenario, self.walk.gait)
         control_law = CONTROLLERS[self.walk.controller].compile(self.walk.gains)
-        kernel = kernel_of(described)
+        kernel = kernel_of(described, precision=self.precision)
         substeps, timestep = control_steps(described)
         robots = [
             with_parameters(described, dict(zip(self.variables, row, strict=True)))

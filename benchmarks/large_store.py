@@ -16,7 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.job import Ask, Claim, Command, CompletedIteration, Job
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
+from services.optimizer.jobs.job import Claim, Command, Job
 from services.optimizer.jobs.spec import create_optimizer, judge_outcomes
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.optimizer import Optimizer

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from gaitswarm.settings import Settings
     from gaitswarm.views import JobView
     from services.optimizer.jobs.documents import AnySpec
-    from services.optimizer.jobs.job import Claim, CompletedIteration, Iteration, Job
+    from services.optimizer.jobs.iteration import CompletedIteration, Iteration
+    from services.optimizer.jobs.job import Claim, Job
     from services.optimizer.jobs.spec import Spec
     from services.optimizer.run.evaluator import Evaluator
     from services.optimizer.store.base import Store

@@ -22,7 +22,8 @@ from api.dependencies import (
 from api.documentation import problems
 from gaitswarm.views import PREFIX, IterationView, StateView
 from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.job import Iteration, Job, JobState
+from services.optimizer.jobs.iteration import Iteration
+from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.service import JobService
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])

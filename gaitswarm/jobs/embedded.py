@@ -11,7 +11,8 @@ from typing import Any, Final, get_args
 
 from gaitswarm.errors import Conflict, Interrupted, InvalidRequest, ProvenanceChanged
 from gaitswarm.views import JobView
-from services.optimizer.jobs.job import Claim, Command, CompletedIteration, Job, JobState
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService

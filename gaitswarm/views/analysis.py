@@ -9,7 +9,7 @@ from gaitswarm.views.evaluation import ScenarioResultView, evaluation_views
 from services.optimizer.analysis.distribution import QUANTILES, Distribution
 from services.optimizer.analysis.ranking import RankedDesign, RankedJob
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Evaluation
+from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from services.optimizer.jobs.tuning import JobSpec
 

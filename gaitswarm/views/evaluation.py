@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.views.base import View, finite
-from services.optimizer.jobs.job import Evaluation
+from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.spec import Spec, exponential
 from sim.outcome import OBJECTIVES, Objective, Status
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import EvaluationView, evaluation_views
-from services.optimizer.jobs.job import Evaluation, Iteration
+from services.optimizer.jobs.iteration import Evaluation, Iteration
 from services.optimizer.jobs.spec import Spec
 
 

@@ -12,10 +12,10 @@ from gaitswarm.views.evaluation import BestView, ObjectiveView
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.estimate import Estimate
+from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import (
     LARGEST_BUDGET,
     TRANSITIONS,
-    Evaluation,
     Job,
     JobState,
     UnreadableSpec,

@@ -17,16 +17,8 @@ from services.optimizer.analysis.ranking import RankedJob, rank
 from services.optimizer.errors import InvalidRequest, ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
-from services.optimizer.jobs.job import (
-    Claim,
-    Command,
-    Evaluation,
-    Iteration,
-    Job,
-    JobOrder,
-    JobState,
-    refusal,
-)
+from services.optimizer.jobs.iteration import Evaluation, Iteration
+from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec

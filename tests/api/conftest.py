@@ -10,7 +10,8 @@ import httpx2
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, Job
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
+from services.optimizer.jobs.job import Claim, Job
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from services.optimizer.service import JobService

@@ -17,7 +17,8 @@ from gaitswarm.views import (
     evaluation_views,
 )
 from gaitswarm.views.evaluation import StatusName
-from services.optimizer.jobs.job import Evaluation, Job
+from services.optimizer.jobs.iteration import Evaluation
+from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
 from sim.kernel.observation import WalkLog

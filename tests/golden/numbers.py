@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from services.optimizer.jobs.job import Evaluation
+from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.spec import judge_outcomes
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, JobState
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
+from services.optimizer.jobs.job import Claim, JobState
 from services.optimizer.jobs.spec import judge_outcomes
 from services.optimizer.run.coordinator import Backoff, Coordination, Phase, handle
 from services.optimizer.run.events import (

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.jobs.job import Claim, Command, CompletedIteration, JobState
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
 from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
 from services.optimizer.run.runner import Surroundings, run_claim

@@ -7,15 +7,8 @@ import threading
 import pytest
 
 from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.job import (
-    LARGEST_BUDGET,
-    Claim,
-    Command,
-    CompletedIteration,
-    Job,
-    JobState,
-    extended,
-)
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import LARGEST_BUDGET, Claim, Command, Job, JobState, extended
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim

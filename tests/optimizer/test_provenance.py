@@ -15,7 +15,8 @@ from services.optimizer.errors import ProvenanceChanged
 from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.identification import IdentificationSpec
-from services.optimizer.jobs.job import Claim, Command, CompletedIteration, Job, JobState
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.jobs.misfit import root_mean_square
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance, optimizer_files

@@ -14,7 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
-from services.optimizer.jobs.job import Command, CompletedIteration, Job, JobState
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import Command, Job, JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.coordinator import Backoff
 from services.optimizer.run.evaluator import EvaluationRequest

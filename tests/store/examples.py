@@ -7,7 +7,8 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from services.optimizer.jobs.job import Ask, Claim, CompletedIteration
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
+from services.optimizer.jobs.job import Claim
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome, Status

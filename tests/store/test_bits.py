@@ -10,7 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.job import Ask, CompletedIteration, JobState
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
+from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome

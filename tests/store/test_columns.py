@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from services.optimizer.analysis.history import HistoryCache
 from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Claim, CompletedIteration
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import Claim
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome, Status
 from tests.store.examples import LEASE, ask, begun, completed, spec

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from services.optimizer.errors import Conflict
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Evaluation, Iteration, Job
+from services.optimizer.jobs.iteration import Evaluation, Iteration
+from services.optimizer.jobs.job import Job
 from services.optimizer.store.base import Store
 
 Scalar = TypeVar("Scalar", bound=np.generic)

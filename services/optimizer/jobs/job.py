@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Final
 
 from services.optimizer.errors import Conflict, InvalidRequest, Unreadable
 from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.iteration import Answered, Ask
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, changes_since
 from sim.identification.recorded_walk import Recordings
-from sim.outcome import Outcome
 
 
 class JobState(StrEnum):
@@ -117,28 +114,6 @@ def extended(state: JobState, committed: int, iterations: int) -> JobState:
             field="iterations",
         )
     return JobState.QUEUED if state is JobState.SUCCEEDED else state
-
-
-@dataclass(frozen=True, slots=True)
-class Evaluation:
-    """One design, judged in every case of its job.
-
-    Attributes:
-        iteration: index of the iteration, from 0.
-        particle: of the swarm, from 0.
-        design: (v,) values of `Job.spec.design_space().names`, in the variables' units.
-        objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, in their
-            units, NaN where there is none.
-        statuses: (K,) values of `sim.outcome.Status`.
-        fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
-    """
-
-    iteration: int
-    particle: int
-    design: NDArray[np.float64]
-    objectives: NDArray[np.float64]
-    statuses: NDArray[np.uint8]
-    fitness: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,80 +224,6 @@ def refusal(job: Job, now: JobProvenance) -> str | None:
         ' in Python, or {"accept_changes": true} over HTTP'
         f" goes on and records it from iteration {iterations} on"
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Iteration:
-    """One committed iteration, as it is listed: no particles.
-
-    Attributes:
-        index: from 0.
-        best: least fitness of the swarm, None if every design failed; `mean`, `median` and `worst`
-            likewise, over the finite values.
-        best_so_far: least fitness of this and all earlier iterations.
-        failed: designs that failed in at least one case.
-        evaluate_seconds: time that its evaluation took [s].
-        committed_at: when it was committed, UTC.
-    """
-
-    index: int
-    best: float | None
-    mean: float | None
-    median: float | None
-    worst: float | None
-    best_so_far: float | None
-    failed: int
-    evaluate_seconds: float
-    committed_at: datetime
-
-
-@dataclass(frozen=True, slots=True)
-class Ask:
-    """An iteration that is to be evaluated: stored before it is sent out.
-
-    Positions and state are stored as standard JSON, so every number in them is finite.
-
-    Attributes:
-        iteration: index of the iteration, from 0.
-        positions: (particles, d) as the optimizer gave them, in the variables' units.
-        state: the optimizer's dump after the ask.
-    """
-
-    iteration: int
-    positions: NDArray[np.float64]
-    state: dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Answered:
-    """A committed ask, from which the next one follows.
-
-    Attributes:
-        ask: what was asked.
-        fitness: (particles,) of its designs, +inf for one that failed.
-    """
-
-    ask: Ask
-    fitness: NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class CompletedIteration:
-    """All that one transaction commits of an iteration.
-
-    Attributes:
-        iteration: index of the iteration, from 0.
-        designs: (n, v) values of `Job.spec.design_space().names`, in the variables' units.
-        outcomes: K, one per case, of the n designs each.
-        fitness: (n,) of the designs, +inf for one that failed.
-        evaluate_seconds: time that the evaluation took [s].
-    """
-
-    iteration: int
-    designs: NDArray[np.float64]
-    outcomes: tuple[Outcome, ...]
-    fitness: NDArray[np.float64]
-    evaluate_seconds: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,14 +35,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.job import (
-    Answered,
-    Ask,
-    CompletedIteration,
-    Job,
-    JobState,
-    refusal,
-)
+from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
+from services.optimizer.jobs.job import Job, JobState, refusal
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
 from services.optimizer.run.evaluator import EvaluationRequest

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from services.optimizer.errors import GaitswarmError, LeaseLost
-from services.optimizer.jobs.job import Claim, CompletedIteration, Iteration, Job, JobState
+from services.optimizer.jobs.iteration import CompletedIteration, Iteration
+from services.optimizer.jobs.job import Claim, Job, JobState
 from services.optimizer.run.coordinator import Backoff
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.heartbeat import Heartbeat

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.optimizer.jobs.job import Ask, Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
+from services.optimizer.jobs.job import Claim, Job, JobState
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.run.evaluator import EvaluationRequest
 from sim.outcome import Outcome

@@ -25,7 +25,8 @@ from services.optimizer.errors import (
     ProvenanceChanged,
     StoreUnavailable,
 )
-from services.optimizer.jobs.job import Claim, CompletedIteration, Job, JobState
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import Claim, Job, JobState
 from services.optimizer.jobs.provenance import (
     JobProvenance,
     job_provenance,

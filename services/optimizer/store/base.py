@@ -7,17 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import (
-    Ask,
-    Claim,
-    Command,
-    CompletedIteration,
-    Evaluation,
-    Iteration,
-    Job,
-    JobOrder,
-    JobState,
-)
+from services.optimizer.jobs.iteration import Ask, CompletedIteration, Evaluation, Iteration
+from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
 from sim.identification.recorded_walk import RecordedWalk, Recordings

@@ -9,7 +9,8 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, Select, and_, or_, select
 
 from services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
-from services.optimizer.jobs.job import Answered, Ask, Claim, JobState, UnreadableSpec
+from services.optimizer.jobs.iteration import Answered, Ask
+from services.optimizer.jobs.job import Claim, JobState, UnreadableSpec
 from services.optimizer.store.job_rows import (
     budget,
     kept,

@@ -8,7 +8,7 @@ from sqlalchemy import select
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Evaluation, Iteration
+from services.optimizer.jobs.iteration import Evaluation, Iteration
 from services.optimizer.store.base import Page
 from services.optimizer.store.columns import select_columns
 from services.optimizer.store.engine import Database

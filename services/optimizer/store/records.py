@@ -18,13 +18,8 @@ from services.optimizer.errors import (
     IdempotencyConflict,
     NotFound,
 )
-from services.optimizer.jobs.job import (
-    Answered,
-    Ask,
-    CompletedIteration,
-    Job,
-    JobState,
-)
+from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
+from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, with_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.job_rows import (

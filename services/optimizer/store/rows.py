@@ -13,12 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.job import (
-    Ask,
-    CompletedIteration,
-    Evaluation,
-    Iteration,
-)
+from services.optimizer.jobs.iteration import Ask, CompletedIteration, Evaluation, Iteration
 from services.optimizer.store.tables import iterations
 from sim.outcome import Status
 

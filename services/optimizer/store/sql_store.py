@@ -11,17 +11,8 @@ from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import InvalidRequest, Unreadable
-from services.optimizer.jobs.job import (
-    Ask,
-    Claim,
-    Command,
-    CompletedIteration,
-    Job,
-    JobOrder,
-    JobState,
-    commanded,
-    extended,
-)
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
+from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, commanded, extended
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.base import Page

@@ -46,12 +46,14 @@ class Budget:
         particles: size of the swarm.
         iterations: of the swarm.
         optimizer: name of the search's preset.
+        precision: of the searches; their best designs are judged in double.
     """
 
     seeds: int
     particles: int | None
     iterations: int | None
     optimizer: str
+    precision: str = "double"
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +151,7 @@ def _runs(chapter: int, controller: str, name: str, robot: object, budget: Budge
         "preference": study["preference"],
         "optimizer": with_particles(budget.optimizer, particles),
         "iterations": iterations,
+        "precision": budget.precision,
     }
     specs = []
     for seed in range(1, budget.seeds + 1):

@@ -85,7 +85,9 @@ class Embedded:
 
             def committed(done: CompletedIteration, _state: JobState) -> None:
                 nonlocal best
-                best = min(f for f in (best, *done.fitness.tolist()) if f is not None)
+                if done.best is not None:
+                    _, found = done.best
+                    best = found if best is None else min(best, found)
                 progress.iteration(done.iteration, best, done.evaluate_seconds)
 
             def followed(iteration: Iteration) -> None:
@@ -228,7 +230,7 @@ def _how_to_go_on(job_id: str, place: str) -> str:
 
 def _report(job: JobView, place: str, *, compare: bool) -> None:
     from cli.comparison import published_beside
-    from cli.tables import design_table, results_table, worth
+    from cli.tables import design_table, results_table, search_line, worth
 
     console = stdout_console()
     if job.best is None:
@@ -240,6 +242,9 @@ def _report(job: JobView, place: str, *, compare: bool) -> None:
         console.print(results_table(results, job.objectives))
         for name, evaluation in evaluations.items():
             console.print(f"fitness of {name}: {worth(evaluation)}", markup=False)
+        searched = search_line(job.best)
+        if searched is not None:
+            console.print(searched, markup=False)
     speed = f" at {job.simulations_per_second:.0f} walks/s" if job.simulations_per_second else ""
     note(f"{job.evaluations} designs in {len(job.spec.case_names)} walks each{speed}")
     note(f"its history: gaitswarm history {job.id}{place}")

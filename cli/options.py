@@ -51,6 +51,16 @@ RobotOption = Annotated[
 ]
 
 
+Precision = Annotated[
+    str | None,
+    typer.Option(
+        metavar="single|double",
+        help="Of the physics' numbers: double (the default), or single, which is about twice as"
+        " fast. What a job reports as best is judged in double.",
+    ),
+]
+
+
 @dataclass(frozen=True, slots=True)
 class SpecOptions:
     """Options of a command that submits a job; None leaves the value of the spec in the file.
@@ -92,6 +102,7 @@ class SpecOptions:
         ),
     ] = None
     robot: RobotOption = None
+    precision: Precision = None
     name: JobName = None
 
     @property

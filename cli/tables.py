@@ -10,6 +10,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from gaitswarm.views import (
+        BestView,
         EvaluationView,
         IterationView,
         JobSummaryView,
@@ -166,6 +167,17 @@ def worth(view: EvaluationView | SimulationView, *, digits: int = 4) -> str:
     return f"{fitness} (F of eq. 3.1, maximized: {number(view.figure_of_merit)})"
 
 
+def search_line(best: BestView) -> str | None:
+    """What a search in single precision made of its best; None if it is in double, too."""
+    if best.search is None:
+        return None
+    found = number(best.search.fitness, 6)
+    return (
+        f"judged in double precision; in {best.search.precision}, in which it was found, its"
+        f" fitness is {found} ({100.0 * best.search.difference:+.2g} %)"
+    )
+
+
 def ranking_table(ranking: RankingView) -> Table:
     """The best designs by another preference, best first, beside their places before."""
     table = Table(box=None)
@@ -202,6 +214,7 @@ def print_job(job: JobView) -> None:
         if job.evaluations_per_second is None
         else f"{job.evaluations_per_second:.1f} designs/s",
         "time left": None if job.eta_seconds is None else duration(job.eta_seconds),
+        "precision": job.precision,
         "best fitness": number(job.best_fitness),
     }
     for record in job.provenance:
@@ -213,17 +226,29 @@ def print_job(job: JobView) -> None:
             table.add_row(name, Text(value))
     console.print(table)
     if job.best is not None:
-        console.print(design_table(job.spec, {"best": job.best.design}))
-        console.print(results_table({"best": job.best.scenarios}, job.objectives))
+        print_best(job.best, job)
+
+
+def print_best(best: BestView, job: JobView) -> None:
+    """The best design of a job, its results by case, and what a search in single made of it."""
+    from cli.output import stdout_console
+
+    console = stdout_console()
+    console.print(design_table(job.spec, {"best": best.design}))
+    console.print(results_table({"best": best.scenarios}, job.objectives))
+    searched = search_line(best)
+    if searched is not None:
+        console.print(searched, markup=False)
 
 
 def provenance_line(provenance: JobProvenance) -> str:
     """What numbers depend on, digests shortened to what tells them apart."""
     simulation = provenance.simulation
     return (
-        f"gaitswarm {provenance.gaitswarm}, {simulation.backend} backend, code"
-        f" {simulation.code_digest[:8]} and {provenance.optimizer_digest[:8]}, robot"
-        f" {simulation.robot} {simulation.robot_digest[:8]}"
+        f"gaitswarm {provenance.gaitswarm}, {simulation.backend} backend in"
+        f" {simulation.precision} precision, code {simulation.code_digest[:8]} and"
+        f" {provenance.optimizer_digest[:8]}, robot {simulation.robot}"
+        f" {simulation.robot_digest[:8]}"
     )
 
 

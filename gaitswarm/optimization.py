@@ -40,7 +40,7 @@ class OptimizationResult:
 
     @property
     def best(self) -> BestView:
-        """The design of least fitness, with its result in every scenario.
+        """The design of least fitness in double precision, with its result in every scenario.
 
         Raises NotFound if no design has walked in every scenario.
         """
@@ -119,7 +119,8 @@ def optimize(
         ray_address: A Ray cluster that runs already; without, one is started and ended.
         on_iteration: Called after each iteration is committed, for progress.
         **options: Fields laid over the spec, see `SpecOptions`: name, robot, controller,
-            scenarios, variables, fixed, preference, optimizer, particles, iterations, seed.
+            scenarios, variables, fixed, preference, optimizer, particles, iterations, seed,
+            precision.
 
     Returns:
         The finished job with its best design and history.

@@ -14,6 +14,7 @@ from gaitswarm.views import SimulationView
 from services.optimizer.jobs.preference import Preference, figure_of_merit
 from sim.catalogue import design_numbers
 from sim.kernel.observation import WalkLog
+from sim.kernel.walk import Precision
 from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
 from sim.robot import RobotSource
 
@@ -53,6 +54,7 @@ class SimulationResult:
         robot: Robot that walked.
         controller: Controller that drove it.
         preference: By which utilities and fitness were computed.
+        precision: Of the physics' numbers.
         variables: Names of the v variables of the designs.
         designs: (n, v) their values, in the variables' units.
         scenarios: Names of the K scenarios.
@@ -71,6 +73,7 @@ class SimulationResult:
     robot: RobotSource
     controller: str
     preference: Preference
+    precision: Precision
     variables: tuple[str, ...]
     designs: Floats
     scenarios: tuple[str, ...]
@@ -100,6 +103,7 @@ class SimulationResult:
             robot=view.robot,
             controller=view.controller,
             preference=view.preference,
+            precision=view.precision,
             variables=tuple(view.design),
             designs=np.array([list(design_numbers(view.controller, view.design).values())]),
             scenarios=tuple(view.scenarios),

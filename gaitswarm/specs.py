@@ -16,6 +16,7 @@ from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.search.pso import OptimizerName, PsoSettings, optimizer_settings
 from sim.controllers import ControllerName
+from sim.kernel.walk import Precision
 from sim.robot import RobotFiles, RobotVariant
 from sim.robot.shipped import SHIPPED
 from sim.scenario import Scenario
@@ -56,6 +57,8 @@ class SpecOptions(TypedDict, total=False):
         particles: Size of the swarm, in place of `optimizer`'s.
         iterations: Budget: iterations of the swarm.
         seed: Source of all randomness; the same seed gives the same bits.
+        precision: Of the numbers of the search's physics; what is reported as best is judged in
+            double.
     """
 
     name: str
@@ -69,6 +72,7 @@ class SpecOptions(TypedDict, total=False):
     particles: int
     iterations: int
     seed: int
+    precision: Precision
 
 
 def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:

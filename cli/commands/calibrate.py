@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from cli.options import Db, JobName, Json, Server, WorkerOptions, with_groups
+from cli.options import Db, JobName, Json, Precision, Server, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -64,6 +64,7 @@ def calibrate(
     iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 60,
     particles: Annotated[int, typer.Option(help="Size of each swarm.")] = 48,
     seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
+    precision: Precision = None,
     name: JobName = None,
     leave_one_out: LeaveOneOut = None,
     workers: WorkerOptions,
@@ -85,6 +86,7 @@ def calibrate(
         # Wide at first and narrow at last, as for identification.
         "optimizer": {"particles": particles, "inertia_start": 0.9, "inertia_end": 0.4},
         "iterations": iterations,
+        "precision": precision or "double",
     }
     if variables is not None:
         document["variables"] = _variables(document, variables)

@@ -39,7 +39,7 @@ def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json =
 def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show the best design that a job has found so far, scenario by scenario."""
     from cli.output import print_json, stdout_console
-    from cli.tables import design_table, results_table, worth
+    from cli.tables import print_best, worth
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -48,14 +48,12 @@ def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = Fa
             print_json(found)
             return
         job = jobs.job(job_id)
-        console = stdout_console()
-        console.print(
+        stdout_console().print(
             f"job {job_id}: fitness {worth(found, digits=6)} in iteration {found.iteration},"
             f" particle {found.particle}",
             markup=False,
         )
-        console.print(design_table(job.spec, {"best": found.design}))
-        console.print(results_table({"best": found.scenarios}, job.objectives))
+        print_best(found, job)
 
 
 def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> None:

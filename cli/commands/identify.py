@@ -14,7 +14,16 @@ from cli.measured_walk import (
     TrajectoryOption,
     WalkController,
 )
-from cli.options import Db, JobName, Json, RobotOption, Server, WorkerOptions, with_groups
+from cli.options import (
+    Db,
+    JobName,
+    Json,
+    Precision,
+    RobotOption,
+    Server,
+    WorkerOptions,
+    with_groups,
+)
 
 Truth = Annotated[
     Path | None,
@@ -92,6 +101,7 @@ def identify(
     iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 120,
     particles: Annotated[int, typer.Option(help="Size of each swarm.")] = 48,
     seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
+    precision: Precision = None,
     name: JobName = None,
     truth: Truth = None,
     workers: WorkerOptions,
@@ -114,6 +124,7 @@ def identify(
         # Wide at first and narrow at last: there are many parameters, and one valley.
         "optimizer": {"particles": particles, "inertia_start": 0.9, "inertia_end": 0.4},
         "iterations": iterations,
+        "precision": precision or "double",
     }
     specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
     run_seeds(

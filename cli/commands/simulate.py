@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Json, RobotOption
+from cli.options import Json, Precision, RobotOption
 
 if TYPE_CHECKING:
     from gaitswarm.views import SimulationView
@@ -45,6 +45,7 @@ def simulate(
         typer.Option(metavar="FILE.npz", help="Write the walks' 500 Hz logs as NumPy arrays."),
     ] = None,
     robot: RobotOption = None,
+    precision: Precision = None,
     as_json: Json = False,
 ) -> None:
     """Let one design walk and say what it is worth; a fall is a result, not an error."""
@@ -62,6 +63,7 @@ def simulate(
         "design": read_design(design, controller, trajectory),
         "scenarios": scenario_data(scenario),
         "preference": preference,
+        "precision": precision or "double",
         "log": log is not None,
     }
     try:
@@ -88,7 +90,7 @@ def _show(view: SimulationView, *, as_json: bool) -> None:
     console = stdout_console()
     console.print(results_table({"": view.scenarios}, OBJECTIVES))
     console.print(measurements_table(view.scenarios))
-    console.print(f"fitness {worth(view)}", markup=False)
+    console.print(f"fitness {worth(view)}, in {view.precision} precision", markup=False)
     for name, result in view.scenarios.items():
         if result.status != "ok":
             console.print(f"{name}: {result.explanation}", markup=False)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Json, WorkerOptions, with_groups
+from cli.options import Json, Precision, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
     from cli.controllers_study import Comparison, Runs
@@ -30,6 +30,7 @@ def controllers(
         int | None, typer.Option(help="Iterations of each run. Default: 70 in chapter 3, 25 in 4.")
     ] = None,
     optimizer: Annotated[str, typer.Option(help="pso-thesis or pso.")] = "pso-thesis",
+    precision: Precision = None,
     workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
@@ -53,7 +54,7 @@ def controllers(
     planned = comparisons(
         sorted({int(chapter) for chapter in chosen}),
         {name: chosen_robot(name) for name in names},
-        Budget(seeds, particles, iterations, optimizer),
+        Budget(seeds, particles, iterations, optimizer, precision or "double"),
     )
     found = _run(planned, workers)
     if as_json:

@@ -42,6 +42,7 @@ from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
@@ -267,6 +268,7 @@ class AsyncDatabaseJobs(AsyncJobs):
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
+        precision: Precision = "double",
         log: bool = False,
     ) -> SimulationResult:
         """Let a design walk in a thread of this process."""
@@ -278,6 +280,7 @@ class AsyncDatabaseJobs(AsyncJobs):
             controller=controller,
             robot=robot,
             preference=preference,
+            precision=precision,
             log=log,
         )
         return await to_thread.run_sync(call)

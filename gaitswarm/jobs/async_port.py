@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self, Unpack
 from gaitswarm.jobs.port import JobEvent
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from sim.controllers import ControllerName
+from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
@@ -178,6 +179,7 @@ class AsyncJobs(ABC):
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
+        precision: Precision = "double",
         log: bool = False,
     ) -> SimulationResult:
         """Let one design walk where the jobs are."""

@@ -57,6 +57,7 @@ from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
@@ -237,6 +238,7 @@ class AsyncServerJobs(AsyncJobs):
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
+        precision: Precision = "double",
         log: bool = False,
     ) -> SimulationResult:
         """Let a design walk on the server, which bounds how long."""
@@ -246,6 +248,7 @@ class AsyncServerJobs(AsyncJobs):
             controller=controller,
             robot=robot,
             preference=preference,
+            precision=precision,
             log=log,
         )
         return await self._send(calls.simulate(request))

@@ -49,6 +49,7 @@ from services.optimizer.service import JobService
 from services.runtime import EvaluatorKind
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 POLL_SECONDS: Final = 0.5
@@ -207,8 +208,7 @@ class DatabaseJobs(Jobs):
 
     def best(self, job_id: str) -> BestView:
         """Read the best design of a job."""
-        job = self._service.job(job_id)
-        best = self._service.best(job_id)
+        job, best = self._service.job(job_id), self._service.best(job_id)
         if best is None:
             raise NotFound(
                 f"job {job_id} has no design yet that walks in every scenario; ask again after its"
@@ -297,6 +297,7 @@ class DatabaseJobs(Jobs):
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
+        precision: Precision = "double",
         log: bool = False,
     ) -> SimulationResult:
         """Let a design walk in this process."""
@@ -307,6 +308,7 @@ class DatabaseJobs(Jobs):
                 controller=controller,
                 robot=robot,
                 preference=preference,
+                precision=precision,
                 log=log,
             )
         )

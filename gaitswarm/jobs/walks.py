@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from sim.controllers import ControllerName
+from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ class Walks(ABC):
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
+        precision: Precision = "double",
         log: bool = False,
     ) -> SimulationResult:
         """Let one design walk where the jobs are; see `gaitswarm.simulate` for many.
@@ -41,6 +43,8 @@ class Walks(ABC):
             robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
             preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
                 `Preference`.
+            precision: Of the physics' numbers: "double", or "single", which is about twice as fast
+                and needs a C compiler where the walk runs.
             log: Whether to record every walk at 500 Hz.
 
         Returns:

@@ -28,6 +28,7 @@ from gaitswarm.views import RankingRequest
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from sim.controllers import CONTROLLERS, ControllerName
+from sim.kernel.walk import Precision
 
 E = TypeVar("E", bound=StrEnum)
 M = TypeVar("M", bound=BaseModel)
@@ -172,6 +173,7 @@ def simulation(
     controller: ControllerName,
     robot: RobotInput,
     preference: PreferenceInput,
+    precision: Precision,
     log: bool,
 ) -> SimulationRequest:
     """One design and the walks in which to try it.
@@ -183,6 +185,7 @@ def simulation(
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
         preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
             `Preference`.
+        precision: Of the physics' numbers.
         log: Whether to record every walk at 500 Hz.
 
     Returns:
@@ -196,6 +199,7 @@ def simulation(
         "controller": controller,
         "design": _design(design),
         "preference": preference,
+        "precision": precision,
         "log": log,
     }
     if scenarios is not None:

@@ -11,11 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
-from sim.assembly import Backend
+from sim.assembly import Backend, check_precision
 from sim.catalogue import design_numbers
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
-from sim.robot import DEFAULT_ROBOT, RobotSource
+from sim.kernel.walk import Precision
+from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
 from sim.simulate import check_reach, simulate
 from sim.variables import VariableName, VariableValue
@@ -149,6 +150,11 @@ class SimulationRequest(WalkRequest):
         description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
         " your own.",
     )
+    precision: Precision = Field(
+        default="double",
+        description="Of the physics' numbers: `double`, or `single`, which is about twice as fast"
+        " and needs a C compiler.",
+    )
     log: bool = Field(
         default=False, description="Whether to return the 500 Hz log of every walk; it is large."
     )
@@ -173,10 +179,15 @@ class SimulationRequest(WalkRequest):
         """Check every walk before the first is run.
 
         Raises:
-            InvalidRequest: The design cannot be compiled, or a gait leaves the legs' reach; names
-                the field.
+            InvalidRequest: The design cannot be compiled, a gait leaves the legs' reach, or this
+                machine has not the precision; names the field.
         """
         self.check_design()
+        try:
+            check_precision(load_robot(self.robot), self.precision)
+        except SimulationInputError as error:
+            text = str(error).removeprefix("precision: ")
+            raise InvalidRequest(text, field="precision") from error
         for index, scenario in enumerate(self.resolved_scenarios()):
             self.check_reach(scenario, field=f"scenarios.{index}")
 
@@ -207,6 +218,7 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
             robot=request.robot,
             log=request.log,
             backend=backend,
+            precision=request.precision,
         )
         for scenario in scenarios
     ]
@@ -215,6 +227,7 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
         controller=request.controller,
         design=request.numbers,
         preference=request.resolved_preference(),
+        precision=request.precision,
         names=[scenario.name for scenario in scenarios],
         statuses=np.concatenate([walk.outcome.statuses for walk in walks]),
         objectives=np.concatenate([walk.outcome.objectives for walk in walks]),

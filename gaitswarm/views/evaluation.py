@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydantic import Field
 from gaitswarm.views.base import View, finite
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.spec import Spec, exponential
+from sim.kernel.walk import Precision
 from sim.outcome import OBJECTIVES, Objective, Status
 
 StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled"]
@@ -117,12 +119,30 @@ class EvaluationView(View):
     )
 
 
+class SearchView(View):
+    """What a search in single precision made of a design that is judged in double."""
+
+    precision: Precision = Field(description="Of the search.", examples=["single"])
+    fitness: float = Field(
+        description="Of the design in that precision; units as of `fitness`.", examples=[20.8712]
+    )
+    difference: float = Field(
+        description="By how much that is more than in double precision, relative [1].",
+        examples=[0.00006],
+    )
+
+
 class BestView(EvaluationView):
-    """The best design that a job has found so far."""
+    """The best design that a job has found so far, always judged in double precision."""
 
     fitness: float = Field(
         description="As of any evaluation; never null.",
         examples=[20.87],
+    )
+    search: SearchView | None = Field(
+        default=None,
+        description="What the search made of the same design; null if it is in double precision,"
+        " too.",
     )
 
     @classmethod
@@ -130,11 +150,26 @@ class BestView(EvaluationView):
         """Make a view of the best design.
 
         Args:
-            evaluation: of a design that did not fail.
+            evaluation: of a design that did not fail, with its reevaluation if the job searches in
+                single precision.
             spec: of its job.
         """
+        search, anew = None, evaluation.reevaluation
+        if anew is not None:
+            found = evaluation.fitness
+            search = SearchView(
+                precision=spec.precision,
+                fitness=found,
+                difference=found / anew.fitness - 1.0 if anew.fitness else 0.0,
+            )
+            evaluation = replace(
+                evaluation,
+                objectives=anew.objectives,
+                statuses=anew.statuses,
+                fitness=anew.fitness,
+            )
         (view,) = evaluation_views([evaluation], spec)
-        return cls.model_validate(dict(view))
+        return cls.model_validate({**dict(view), "search": search})
 
 
 def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:

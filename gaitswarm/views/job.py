@@ -23,6 +23,7 @@ from services.optimizer.jobs.job import (
 )
 from services.optimizer.jobs.provenance import ProvenanceRecord
 from services.optimizer.jobs.tuning import JobSpec
+from sim.kernel.walk import Precision
 
 PREFIX: Final = "/v1"
 """Version of the HTTP API, in every path."""
@@ -93,6 +94,11 @@ class JobSummaryView(View):
         " empty if the spec cannot be read.",
         examples=[["normal-fast", "turn-right-fast"]],
     )
+    precision: Precision | None = Field(
+        description="Of the search's numbers; what is reported as best is judged in double. Null if"
+        " the spec cannot be read.",
+        examples=["double"],
+    )
     particles: int = Field(
         description="Size of the swarm [1]; 0 if the spec cannot be read.", examples=[25]
     )
@@ -107,7 +113,8 @@ class JobSummaryView(View):
         description="Designs that the whole budget will judge [1].", examples=[625]
     )
     best_fitness: float | None = Field(
-        description="Least fitness so far [1]; null while every design has failed.",
+        description="Least fitness so far, in double precision [1]; null while every design has"
+        " failed.",
         examples=[21.3],
     )
     best_iteration: int | None = Field(
@@ -161,7 +168,8 @@ class JobView(JobSummaryView):
     model_config = ConfigDict(serialize_by_alias=True)
 
     best: BestView | None = Field(
-        description="Best design so far; null while there is none that walks in every scenario."
+        description="Best design so far, judged in double precision; null while there is none that"
+        " walks in every scenario."
     )
     objectives: list[ObjectiveView] = Field(
         description="What every case of this job yields; columns of its results."
@@ -174,9 +182,9 @@ class JobView(JobSummaryView):
     )
     provenance: list[ProvenanceRecord] = Field(
         description="What its numbers depend on beside the spec: code, libraries, content of the"
-        " robot, backend. One entry since submission, and one for every change that was accepted,"
-        " the last of an iteration counting; empty for a job that was stored before this was"
-        " recorded."
+        " robot, backend, precision. One entry since submission, and one for every change that was"
+        " accepted, the last of an iteration counting; empty for a job that was stored before this"
+        " was recorded."
     )
 
     @property
@@ -321,6 +329,7 @@ def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
         "kind": kind,
         "controller": spec.controller if isinstance(spec, JobSpec) else None,
         "scenarios": scenarios,
+        "precision": None if isinstance(spec, UnreadableSpec) else spec.precision,
         "particles": particles,
         "iterations_planned": spec.iterations,
         "evaluations_planned": spec.iterations * particles,

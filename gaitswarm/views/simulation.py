@@ -14,6 +14,7 @@ from gaitswarm.views.evaluation import ScenarioResultView, case_results
 from services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from sim.catalogue import design_shown
 from sim.kernel.observation import WalkLog
+from sim.kernel.walk import Precision
 from sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
 from sim.robot import RobotSource
 
@@ -143,6 +144,7 @@ class SimulationView(View):
         description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]
     )
     preference: Preference = Field(description="By which utilities and fitness were computed.")
+    precision: Precision = Field(description="Of the physics' numbers.", examples=["double"])
     fitness: float | None = Field(
         description="Geometric mean of the scenarios' utilities (eq. 4.2), to be minimized [1];"
         " null if any walk failed.",
@@ -166,6 +168,7 @@ class SimulationView(View):
         controller: str,
         design: Mapping[str, float],
         preference: Preference,
+        precision: Precision,
         names: Sequence[str],
         statuses: NDArray[np.uint8],
         objectives: NDArray[np.float64],
@@ -179,6 +182,7 @@ class SimulationView(View):
             controller: that drove it.
             design: value of every variable by name.
             preference: by which to judge.
+            precision: of the physics' numbers.
             names: K names of the scenarios.
             statuses: (K,) values of `sim.outcome.Status`.
             objectives: (K, 6) raw objectives f1..f6, in their units, NaN where there is none.
@@ -193,6 +197,7 @@ class SimulationView(View):
             controller=controller,
             design=design_shown(controller, design),
             preference=preference,
+            precision=precision,
             fitness=finite(float(judged.fitness[0])),
             figure_of_merit=figure_of_merit(float(judged.fitness[0]), preference),
             scenarios={

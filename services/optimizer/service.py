@@ -272,7 +272,7 @@ class JobService:
             job_id: id of the job.
 
         Returns:
-            The earliest of least fitness, None while every design has failed.
+            The earliest of least fitness in double precision, None while every design has failed.
 
         Raises:
             NotFound: no job of that id.

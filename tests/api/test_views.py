@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from gaitswarm.views import (
+    BestView,
     HistoryIterationView,
     JobView,
     SimulationView,
@@ -17,7 +18,7 @@ from gaitswarm.views import (
     evaluation_views,
 )
 from gaitswarm.views.evaluation import StatusName
-from services.optimizer.jobs.iteration import Evaluation
+from services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.store.sql_store import SqlStore
@@ -74,6 +75,7 @@ def test_a_design_that_was_never_walked_has_no_log() -> None:
         controller="fuzzy-pi",
         design={},
         preference=PREFERENCES["A"],
+        precision="double",
         names=["only"],
         statuses=np.array([Status.UNREACHABLE], dtype=np.uint8),
         objectives=np.full((1, N_OBJECTIVES), np.nan),
@@ -120,6 +122,29 @@ def test_a_job_view_is_read_from_json_with_every_bit_of_the_best_design(
     walks = [list(walk.objectives.values()) for walk in read.best.scenarios.values()]
     assert walks == best.objectives.tolist()
     assert read.model_dump_json() == sent
+
+
+def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
+    store: SqlStore, job: Job, commit: Commit
+) -> None:
+    commit(job, 1)
+    found = store.best(job.id)
+    assert found is not None
+    doubled = Reevaluation(
+        found.particle, 2.0 * found.objectives, found.statuses, 2.0 * found.fitness
+    )
+    spec = job.spec.model_copy(update={"precision": "single"})
+
+    view = BestView.from_evaluation(replace(found, reevaluation=doubled), spec)
+
+    assert view.fitness == doubled.fitness
+    walks = [list(walk.objectives.values()) for walk in view.scenarios.values()]
+    assert walks == doubled.objectives.tolist()
+    assert view.search is not None
+    assert (view.search.precision, view.search.fitness) == ("single", found.fitness)
+    assert view.search.difference == -0.5
+    assert strict(view.model_dump_json())["search"]["difference"] == -0.5
+    assert BestView.from_evaluation(found, job.spec).search is None
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,13 @@ def test_what_a_walks_own_design_gives_is_not_varied() -> None:
     assert open_.objectives[0].tolist() != open_.objectives[1].tolist()
     with_own = walk(short_walk(stride=0.14), PI, "pi", robot="szabadka2").outcome
     np.testing.assert_array_equal(own.objectives[0, :6], with_own.objectives[0])
+
+
+def test_a_walk_in_single_precision_is_nearly_that_in_double() -> None:
+    double, masses = case("body_mass"), np.array([[4.0], [2.5]])
+    single = replace(double, precision="single").run(masses).objectives
+    assert not np.array_equal(single, double.run(masses).objectives)
+    np.testing.assert_allclose(single[:, :5], double.run(masses).objectives[:, :5], rtol=1e-3)
 
 
 def test_a_gait_out_of_reach_fails_alone() -> None:

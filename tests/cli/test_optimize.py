@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,43 @@ def test_options_go_before_the_spec(gaitswarm: Gaitswarm, small_spec: Path, db: 
     assert (spec["controller"], spec["optimizer"]["particles"]) == ("pi", 2)
     assert spec["preference"]["exponent"] == [1.0] * 5
     assert set(result.json["best"]["design"]) == {"P", "I"}
+
+
+def test_a_search_in_single_precision_reports_its_best_in_double_with_the_difference(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path
+) -> None:
+    run = ("optimize", "--spec", small_spec, "--db", db, "--evaluator", "in-process")
+    shown = gaitswarm(*run, "--precision", "single")
+    assert shown.code == 0, shown.err
+    (job,) = gaitswarm("list", "--db", db, "--json").json
+    best = gaitswarm("best", job["id"], "--db", db, "--json").json
+    assert (job["precision"], job["best_fitness"]) == ("single", best["fitness"])
+    design = db.with_name("best.json")
+    design.write_text(json.dumps(best), encoding="utf-8")
+    scenario = db.with_name("scenario.json")
+    scenario.write_text(json.dumps(SMALL_SPEC["scenarios"][0]), encoding="utf-8")
+    walk = ("simulate", "--design", design, "--scenario", scenario, "--json")
+    assert gaitswarm(*walk).json["fitness"] == best["fitness"]
+    assert gaitswarm(*walk, "--precision", "single").json["fitness"] == best["search"]["fitness"]
+    line = "judged in double precision; in single, in which it was found, its fitness is"
+    status, text = (
+        gaitswarm("status", job["id"], "--db", db),
+        gaitswarm("best", job["id"], "--db", db),
+    )
+    for printed in (shown.out, status.out, text.out):
+        assert line in " ".join(printed.split())
+    assert "single precision" in status.out
+
+
+@pytest.mark.parametrize("command", ["optimize", "simulate"])
+def test_a_precision_that_there_is_not_is_refused_by_name(
+    gaitswarm: Gaitswarm, command: str, db: Path
+) -> None:
+    given = ("--db", db) if command == "optimize" else ("--design", "published:A")
+    refused = gaitswarm(command, *given, "--precision", "half")
+    assert refused.code == 2
+    assert "precision" in refused.err and "'single' or 'double'" in refused.err
+    assert not db.exists()
 
 
 @pytest.mark.parametrize(("controller", "searched"), [("fuzzy-pi-3", 17), ("pi", 7)])

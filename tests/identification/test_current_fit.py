@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -53,6 +55,14 @@ def test_the_truth_leaves_nothing_but_the_instruments_errors(twin: Twin) -> None
     # Noise of 0.02 A has a mean size of 0.016 A; absolute values near zero take some of it away.
     assert (outcome.objectives[0] < 0.017).all()
     assert outcome.objectives[1].mean() > 1.5 * outcome.objectives[0].mean()
+
+
+def test_a_fit_in_single_precision_is_nearly_that_in_double(twin: Twin) -> None:
+    fit = CurrentFit("a walk", "szabadka2", twin.recording, ("body_mass",))
+    single = replace(fit, precision="single").run(np.array([[3.2]])).objectives
+    double = fit.run(np.array([[3.2]])).objectives
+    assert not np.array_equal(single, double)
+    np.testing.assert_allclose(single, double, rtol=1e-2)
 
 
 def test_every_link_has_its_own_error(twin: Twin) -> None:

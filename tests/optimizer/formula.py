@@ -29,6 +29,10 @@ SPEC = JobSpec.model_validate(
 ).resolved()
 
 
+SINGLE = SPEC.model_copy(update={"precision": "single"})
+"""The same job, searched in single precision."""
+
+
 HERE = JobProvenance(
     gaitswarm="1.0",
     optimizer_digest="search",
@@ -59,6 +63,8 @@ def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:
         fallen = np.floor(request.designs[:, 0] * 1e6) % 7 == 0
         statuses[fallen] = Status.FELL
         objectives[fallen] = np.nan
+        if case.precision == "single":
+            objectives = objectives.astype(np.float32).astype(np.float64)
         outcomes.append(Outcome(objectives, statuses))
     return tuple(outcomes)
 

@@ -57,6 +57,12 @@ def test_walks_and_their_length_are_counted() -> None:
     assert (found.seconds, found.basis) == (None, "nothing")
 
 
+def test_walks_of_another_precision_are_of_another_speed() -> None:
+    single = SPEC.model_copy(update={"precision": "single"})
+    assert estimated(SPEC, done(SPEC, 50, 2.0))[0] == pytest.approx(2.0)
+    assert estimated(single, done(SPEC, 50, 2.0)) == (None, "nothing")
+
+
 def test_a_cycle_time_of_the_design_replaces_that_of_the_scenarios() -> None:
     bounds = Variable(name="cycle_time", low=1.0, high=3.0)
     fixed = SPEC.model_copy(update={"fixed": {"cycle_time": 2.0}})

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sim.compiler.compilation import load_library, vector_header
-from sim.errors import KernelBuildError
+from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.native import NativeKernel, native_kernel
 from sim.kernel.parameters import Layout
 from sim.robot import Robot, RobotFiles, load_robot
@@ -89,6 +89,35 @@ def test_without_a_compiler_the_interpreter_serves_and_says_so(tmp_path: Path) -
     assert "no C compiler found" in done.stderr
 
 
+def test_without_a_compiler_single_precision_is_refused_rather_than_computed_in_double(
+    tmp_path: Path,
+) -> None:
+    done = run_python(
+        "from services.optimizer.jobs.tuning import JobSpec\n"
+        "from sim.errors import SimulationInputError\n"
+        "from sim.simulate import prepare\n"
+        "for asked in (lambda: prepare(precision='single'),\n"
+        "              JobSpec(precision='single').check_can_be_simulated):\n"
+        "    try:\n"
+        "        print(asked())\n"
+        "    except (SimulationInputError, ValueError) as error:\n"
+        "        print(error)\n",
+        PATH="",
+        CC="",
+        XDG_CACHE_HOME=str(tmp_path),
+        TMPDIR=str(tmp_path),
+    )
+    said = "precision: single needs the compiled kernel, and no C compiler was found"
+    lines = done.stdout.splitlines()
+    assert len(lines) == 2 and all(line.startswith(said) for line in lines), done
+    assert all("install gcc or clang" in line and "choose double" in line for line in lines)
+
+
+def test_the_interpreter_has_double_precision_alone() -> None:
+    with pytest.raises(SimulationInputError, match="precision: the reference kernel has double"):
+        prepare("szabadka2", backend="reference", precision="single")
+
+
 def test_sine_and_cosine_are_accurate_to_the_last_bits(tmp_path: Path) -> None:
     source = vector_header() + (
         "void both(const double *x, double *s, double *c, int64_t n)\n"
@@ -151,7 +180,7 @@ print(native_kernel(load_robot(RobotFiles(toml=toml, urdf=urdf))).backend)
 COMPILE_ANOTHER = """
 import os, threading
 from pathlib import Path
-from sim.errors import KernelBuildError
+from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.native import native_kernel
 from sim.robot import load_robot
 def compile_another():

@@ -52,7 +52,9 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     url: str = request.getfixturevalue("migrated_postgresql")
     database = connect(parse_url(url))
     with database.transaction(write=True) as connection:
-        connection.execute(text("TRUNCATE jobs, iterations, evaluations, recordings"))
+        connection.execute(
+            text("TRUNCATE jobs, iterations, evaluations, reevaluations, recordings")
+        )
     database.close()
     return url
 

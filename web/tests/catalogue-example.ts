@@ -13,6 +13,7 @@ export const DOCUMENT: OpenApiDocument = {
           preference: { default: 'A' },
           iterations: { type: 'integer', minimum: 1, maximum: 1_000_000, default: 25 },
           seed: { type: 'integer', minimum: 0, exclusiveMaximum: 2 ** 63, default: 1 },
+          precision: { type: 'string', enum: ['single', 'double'], default: 'double' },
         },
       },
       Scenario: {

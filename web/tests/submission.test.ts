@@ -30,6 +30,7 @@ describe('a draft', () => {
       optimizer: { particles: 25 },
       iterations: 25,
       seed: 1,
+      precision: 'double',
     })
   })
 
@@ -144,6 +145,7 @@ describe('a clone', () => {
     optimizer: { particles: 7 },
     iterations: 3,
     seed: 9,
+    precision: 'single',
   } as unknown as JobSpec
   const draft = draftOf(resolved, CATALOGUE)
 

@@ -203,6 +203,7 @@ class CalibrationSpec(Spec):
             InvalidRequest: bounds or values that nothing can run with, or a walk out of reach;
                 names the field.
         """
+        self.check_precision()
         space, cases = self.design_space(), self._cases()
         of_robot = {variable.name for variable in robot_variables(self.described)}
         for values in space.corners():
@@ -256,7 +257,15 @@ class CalibrationSpec(Spec):
     def _cases(self) -> tuple[CalibrationWalk, ...]:
         names = self.design_space().names
         return tuple(
-            CalibrationWalk(name, self.described, walk.controller, walk.numbers, scenario, names)
+            CalibrationWalk(
+                name,
+                self.described,
+                walk.controller,
+                walk.numbers,
+                scenario,
+                names,
+                self.precision,
+            )
             for name, walk, scenario in self.layout().cases
         )
 

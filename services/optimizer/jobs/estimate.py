@@ -125,7 +125,7 @@ class MeasuredRates:
             Simulated seconds per second on all cores, None without a compiled kernel or a design
             that can begin to walk; and what that is based on, for people.
         """
-        if prepare(spec.robot) != "native":
+        if prepare(spec.robot, precision=spec.precision) != "native":
             return None, "nothing: without a C compiler walks take some hundred times as long"
         cores = len(os.sched_getaffinity(0))
         with self._lock:
@@ -179,9 +179,9 @@ def _alike(job: Job, spec: Spec) -> bool:
 
 
 def _kind_of_walk(spec: Spec) -> str:
-    """What a walk's speed depends on: the robot and the controller."""
+    """What a walk's speed depends on: robot, controller and precision."""
     controller = spec.controller if isinstance(spec, JobSpec) else _fitted_walks(spec)
-    return f"{controller} {spec.model_dump_json(include={'robot'})}"
+    return f"{controller} {spec.model_dump_json(include={'robot', 'precision'})}"
 
 
 def _fitted_walks(spec: Spec) -> str:

@@ -88,6 +88,7 @@ class IdentificationSpec(Spec):
         Raises:
             InvalidRequest: bounds or values that no robot can have; names the field.
         """
+        self.check_precision()
         robot, space = load_robot(self.robot), self.design_space()
         for values in space.corners():
             try:
@@ -121,7 +122,7 @@ class IdentificationSpec(Spec):
         """
         names = self.design_space().names
         return tuple(
-            CurrentFit(name, self.robot, recordings[recording], names)
+            CurrentFit(name, self.robot, recordings[recording], names, self.precision)
             for name, recording in zip(self.case_names, self.recordings, strict=True)
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -9,7 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.kernel.walk import Precision
 from sim.outcome import Outcome
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reevaluation:
+    """A design of a search in single precision, evaluated anew in double.
+
+    Attributes:
+        particle: of the swarm of its iteration, from 0.
+        objectives: (K, m) raw objectives by case, as in `Evaluation`.
+        statuses: (K,) values of `sim.outcome.Status`.
+        fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
+    """
+
+    particle: int
+    objectives: NDArray[np.float64]
+    statuses: NDArray[np.uint8]
+    fitness: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +43,8 @@ class Evaluation:
             units, NaN where there is none.
         statuses: (K,) values of `sim.outcome.Status`.
         fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
+        reevaluation: of the same design, with a job's best where the search is in single
+            precision; None otherwise.
     """
 
     iteration: int
@@ -32,6 +53,7 @@ class Evaluation:
     objectives: NDArray[np.float64]
     statuses: NDArray[np.uint8]
     fitness: float
+    reevaluation: Reevaluation | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +121,9 @@ class CompletedIteration:
         outcomes: K, one per case, of the n designs each.
         fitness: (n,) of the designs, +inf for one that failed.
         evaluate_seconds: time that the evaluation took [s].
+        precision: of the search.
+        reevaluation: of its best design, where the search is in single precision and no earlier
+            design is as good.
     """
 
     iteration: int
@@ -106,3 +131,27 @@ class CompletedIteration:
     outcomes: tuple[Outcome, ...]
     fitness: NDArray[np.float64]
     evaluate_seconds: float
+    precision: Precision = "double"
+    reevaluation: Reevaluation | None = None
+
+    @property
+    def best(self) -> tuple[int, float] | None:
+        """Particle and fitness of its best design, in double precision; None if there is none."""
+        if self.precision == "double":
+            particle = best_particle(self.fitness)
+            return None if particle is None else (particle, float(self.fitness[particle]))
+        anew = self.reevaluation
+        return (anew.particle, anew.fitness) if anew and math.isfinite(anew.fitness) else None
+
+
+def best_particle(fitness: NDArray[np.float64]) -> int | None:
+    """Find the best of a swarm.
+
+    Args:
+        fitness: (n,), +inf where a design failed.
+
+    Returns:
+        Index of the least finite fitness, the earliest of equals; None if there is none.
+    """
+    finite = np.isfinite(fitness)
+    return int(np.argmin(np.where(finite, fitness, np.inf))) if finite.any() else None

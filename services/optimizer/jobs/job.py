@@ -123,7 +123,7 @@ class Progress:
     Attributes:
         iterations: how many there are.
         evaluations: designs judged in them.
-        best_fitness: least fitness so far, None while every design has failed.
+        best_fitness: least fitness so far, in double precision; None while every design has failed.
         best_iteration: iteration that found it.
         best_particle: particle that found it.
         compute_seconds: time that evaluating them took [s].

@@ -92,7 +92,7 @@ def job_provenance(spec: Spec) -> JobProvenance:
     return JobProvenance(
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
-        simulation=provenance_of(*spec.described),
+        simulation=provenance_of(*spec.described, precision=spec.precision),
     )
 
 

@@ -22,9 +22,11 @@ from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.search.pso import OptimizerChoice, ParticleSwarm, PsoSettings
+from sim.assembly import check_precision
 from sim.case import Case
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
+from sim.kernel.walk import Precision
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from sim.variables import VariableChoice, VariableName, VariableValue
@@ -107,6 +109,11 @@ class Spec(BaseModel):
     seed: int = Field(
         default=1, ge=0, lt=2**63, description="Source of all randomness; same seed, same bits."
     )
+    precision: Precision = Field(
+        default="double",
+        description="Of the numbers of the search's physics: `double`, or `single`, which is about"
+        " twice as fast and needs a C compiler. What is reported as best is judged in double.",
+    )
 
     @abstractmethod
     def design_space(self) -> DesignSpace:
@@ -122,8 +129,22 @@ class Spec(BaseModel):
         """Check what only the simulator can tell: whether designs can be run at all.
 
         Raises:
-            InvalidRequest: bounds or values that nothing can run with; names the field.
+            InvalidRequest: bounds or values that nothing can run with, or a precision that this
+                machine has not; names the field.
         """
+
+    def check_precision(self) -> None:
+        """Check that this machine has the precision.
+
+        Raises:
+            InvalidRequest: It has no compiled kernel; its field is `precision`.
+        """
+        try:
+            for robot in self.described:
+                check_precision(load_robot(robot), self.precision)
+        except SimulationInputError as error:
+            text = str(error).removeprefix("precision: ")
+            raise InvalidRequest(text, field="precision") from error
 
     def check_recordings(self, find: Callable[[str], RecordedWalk]) -> None:
         """Check that each recording is of the robot's joints and of a gait that its legs reach.
@@ -209,6 +230,10 @@ class Spec(BaseModel):
             The greatest fitness of a design that counts as good as the best.
         """
         return fitness * (1.0 + DECISIVE)
+
+    def in_double(self) -> Self:
+        """The same job in double precision, in which its best design is judged."""
+        return self.model_copy(update={"precision": "double"})
 
     @abstractmethod
     def resolved(self) -> Self:

@@ -124,6 +124,7 @@ class JobSpec(Spec):
             InvalidRequest: bounds or values that nothing can run with, or a scenario out of reach;
                 names the field.
         """
+        self.check_precision()
         space, scenarios = self.design_space(), self.resolved_scenarios()
         for design in space.corners():
             try:
@@ -159,7 +160,7 @@ class JobSpec(Spec):
         """
         names = self.design_space().names
         return tuple(
-            Walk(self.robot, self.controller, scenario, names)
+            Walk(self.robot, self.controller, scenario, names, self.precision)
             for scenario in self.resolved_scenarios()
         )
 

@@ -3,20 +3,25 @@
 No I/O, clock or thread is in here; `services.optimizer.run.runner` executes the actions, in order,
 and answers the last of them with an event. An action that raises voids those after it.
 
-event                  in phase     actions                        phase after
-Claimed                start        [Record, Begin,] Evaluate      evaluating
-Claimed(changed)       start        Release(failed)                ended
-Extended               evaluating   Begin, Evaluate                evaluating
-Evaluated              evaluating   Commit                         committing
-Committed(running)     committing   Evaluate                       evaluating
-Committed(any other)   committing   -                              ended
-Extended               committing   Commit                         committing
-EvaluatorLost          evaluating   Wait, or Release(failed)       waiting, or ended
-Waited                 waiting      Evaluate                       evaluating
-EvaluationFailed       evaluating   Release(failed)                ended
-PauseSeen              waiting      Release(queued)                ended
-StopRequested          any          Release(queued)                ended
-LeaseWasLost           any          -                              ended
+event                  in phase         actions                      phase after
+Claimed                start            [Record, Begin,] Evaluate    evaluating
+Claimed(changed)       start            Release(failed)              ended
+Extended               evaluating       Begin, Evaluate              evaluating
+Evaluated              evaluating       Commit                       committing
+Evaluated(new best)    evaluating       Evaluate                     reevaluating
+Evaluated              reevaluating     Commit                       committing
+Committed(running)     committing       Evaluate                     evaluating
+Committed(any other)   committing       -                            ended
+Extended               committing       Commit                       committing
+EvaluatorLost          [re]evaluating   Wait, or Release(failed)     waiting, or ended
+Waited                 waiting          Evaluate                     [re]evaluating, as before
+EvaluationFailed       [re]evaluating   Release(failed)              ended
+PauseSeen              waiting          Release(queued)              ended
+StopRequested          any              Release(queued)              ended
+LeaseWasLost           any              -                            ended
+
+A new best is reevaluated where the search is in single precision: what is reported as best is
+judged in double. It is committed with its iteration; what is asked next does not depend on it.
 
 A pause that comes while walks are run is the store's to see: the commit then answers `paused`.
 The store likewise pauses a pausing job that is released as queued.
@@ -28,6 +33,7 @@ nobody has accepted that.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
@@ -35,7 +41,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
+from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration, Reevaluation
 from services.optimizer.jobs.job import Job, JobState, refusal
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
@@ -98,6 +104,7 @@ class Phase(StrEnum):
 
     START = "start"
     EVALUATING = "evaluating"
+    REEVALUATING = "reevaluating"
     WAITING = "waiting"
     COMMITTING = "committing"
     ENDED = "ended"
@@ -117,8 +124,9 @@ class Coordination:
         recordings: Recorded walks that its cases need.
         provenance: What its numbers depend on.
         answered: The last answered ask, where the claim brought no other to go on with.
+        best_fitness: Of the best committed design, in double precision; +inf if there is none.
         ask: What is being evaluated.
-        done: Of a commit under way: the iteration.
+        done: The iteration, once its ask is evaluated and until it is committed.
         following: Of a commit under way: the ask after it.
         failures: Of the workers, in a row.
     """
@@ -129,6 +137,7 @@ class Coordination:
     recordings: Recordings = field(default_factory=dict)
     provenance: JobProvenance | None = None
     answered: Answered | None = None
+    best_fitness: float = math.inf
     ask: Ask | None = None
     done: CompletedIteration | None = None
     following: Ask | None = None
@@ -165,20 +174,32 @@ def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Act
             return _start(state, event)
         case Phase.EVALUATING, Extended(job=job):
             return _begin(state, job)
-        case Phase.EVALUATING, Evaluated():
-            return _complete(state, event)
-        case Phase.EVALUATING, EvaluatorLost(reason=reason):
-            return _try_again(state, reason)
-        case Phase.EVALUATING, EvaluationFailed(reason=reason):
-            return _release(state, JobState.FAILED, reason)
+        case Phase.EVALUATING | Phase.REEVALUATING, (
+            Evaluated() | EvaluatorLost() | EvaluationFailed()
+        ):
+            return _answer(state, event)
         case Phase.WAITING, Waited():
-            return replace(state, phase=Phase.EVALUATING), (_evaluate(state),)
+            return _walk(state)
         case Phase.COMMITTING, Committed(state=stored):
             return _go_on(state, stored)
         case Phase.COMMITTING, Extended(job=job):
             return _ask_anew(state, job)
         case phase, _:
             raise ValueError(f"{type(event).__name__} makes no sense while {phase}")
+
+
+def _answer(
+    state: Coordination, event: Evaluated | EvaluatorLost | EvaluationFailed
+) -> tuple[Coordination, tuple[Action, ...]]:
+    match event:
+        case EvaluatorLost(reason=reason):
+            return _try_again(state, reason)
+        case EvaluationFailed(reason=reason):
+            return _release(state, JobState.FAILED, reason)
+        case Evaluated() if state.phase is Phase.REEVALUATING:
+            return _reevaluated(state, event)
+        case Evaluated():
+            return _complete(state, event)
 
 
 def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Action, ...]]:
@@ -193,6 +214,7 @@ def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Act
         recordings=claim.recordings,
         provenance=event.provenance,
         answered=claim.answered,
+        best_fitness=math.inf if job.progress.best_fitness is None else job.progress.best_fitness,
         ask=claim.ask,
     )
     is_known = job.provenance and refused is None and not job.accepts_changes
@@ -218,31 +240,67 @@ def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, .
 def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
     job, ask = _current(state)
     fitness = judge_outcomes(job.spec, event.outcomes).fitness
-    following = _following(job.spec, ask, fitness)
     done = CompletedIteration(
         iteration=ask.iteration,
         designs=job.spec.design_space().designs(ask.positions),
         outcomes=event.outcomes,
         fitness=fitness,
         evaluate_seconds=event.seconds,
+        precision=job.spec.precision,
     )
-    state = replace(state, phase=Phase.COMMITTING, done=done, following=following, failures=0)
+    state = replace(state, done=done, failures=0)
+    if done.precision != "double" and fitness.min() < state.best_fitness:
+        return _walk(state)
+    return _commit(state, done)
+
+
+def _reevaluated(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
+    job, _ = _current(state)
+    done = _done(state)
+    anew = Reevaluation(
+        particle=int(np.argmin(done.fitness)),
+        objectives=np.concatenate([outcome.objectives for outcome in event.outcomes]),
+        statuses=np.concatenate([outcome.statuses for outcome in event.outcomes]),
+        fitness=float(judge_outcomes(job.spec, event.outcomes).fitness[0]),
+    )
+    seconds = done.evaluate_seconds + event.seconds
+    return _commit(
+        replace(state, failures=0), replace(done, reevaluation=anew, evaluate_seconds=seconds)
+    )
+
+
+def _commit(
+    state: Coordination, done: CompletedIteration
+) -> tuple[Coordination, tuple[Action, ...]]:
+    job, ask = _current(state)
+    following = _following(job.spec, ask, done.fitness)
+    state = replace(state, phase=Phase.COMMITTING, done=done, following=following)
     return state, (Commit(done, following),)
 
 
 def _ask_anew(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
-    _, ask = _current(state)
-    if state.done is None:
-        raise ValueError(f"nothing was evaluated, while {state.phase}")
-    following = _following(job.spec, ask, state.done.fitness)
-    return replace(state, job=job, following=following), (Commit(state.done, following),)
+    return _commit(replace(state, job=job), _done(state))
 
 
 def _go_on(state: Coordination, stored: JobState) -> tuple[Coordination, tuple[Action, ...]]:
     if stored is not JobState.RUNNING or state.following is None:
         return replace(state, phase=Phase.ENDED), ()
-    state = replace(state, phase=Phase.EVALUATING, ask=state.following, following=None, done=None)
-    return state, (_evaluate(state),)
+    found = _done(state).best
+    state = replace(
+        state,
+        best_fitness=min(state.best_fitness, math.inf if found is None else found[1]),
+        ask=state.following,
+        following=None,
+        done=None,
+    )
+    return _walk(state)
+
+
+def _walk(state: Coordination) -> tuple[Coordination, tuple[Action, ...]]:
+    """Have the ask evaluated, or what is done of it reevaluated."""
+    if state.done is None:
+        return replace(state, phase=Phase.EVALUATING), (_evaluate(state),)
+    return replace(state, phase=Phase.REEVALUATING), (_reevaluate(state, state.done),)
 
 
 def _try_again(state: Coordination, reason: str) -> tuple[Coordination, tuple[Action, ...]]:
@@ -266,15 +324,26 @@ def _release(
 
 def _evaluate(state: Coordination) -> Evaluate:
     job, ask = _current(state)
+    return _walks_of(state, job.spec, job.spec.design_space().designs(ask.positions))
+
+
+def _reevaluate(state: Coordination, done: CompletedIteration) -> Evaluate:
+    """The best design of the iteration, in double precision."""
+    job, _ = _current(state)
+    best = int(np.argmin(done.fitness))
+    return _walks_of(state, job.spec.in_double(), done.designs[best : best + 1])
+
+
+def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> Evaluate:
+    job, _ = _current(state)
     if state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
-    space = job.spec.design_space()
     return Evaluate(
         EvaluationRequest(
             job_id=job.id,
-            cases=job.spec.cases(state.recordings),
-            designs=space.simulated(space.designs(ask.positions)),
-            provenance=state.provenance.simulation,
+            cases=spec.cases(state.recordings),
+            designs=spec.design_space().simulated(designs),
+            provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
         )
     )
 
@@ -296,6 +365,12 @@ def _as_stored(state: dict[str, Any]) -> dict[str, Any]:
     """What the store will give back: a state that JSON would change is found out at once."""
     stored: dict[str, Any] = json.loads(json.dumps(state, allow_nan=False))
     return stored
+
+
+def _done(state: Coordination) -> CompletedIteration:
+    if state.done is None:
+        raise ValueError(f"nothing was evaluated, while {state.phase}")
+    return state.done
 
 
 def _current(state: Coordination) -> tuple[Job, Ask]:

@@ -343,7 +343,8 @@ class Store(Protocol):
             job_id: Of the job.
 
         Returns:
-            The evaluation of least fitness, the earliest of equals; None if none is finite.
+            The evaluation of least fitness in double precision, the earliest of equals; None if
+            none is finite. Its `reevaluation` is there if the job searches in single.
         """
 
     def ping(self) -> None:

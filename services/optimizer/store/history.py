@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
-from sqlalchemy import select
+from sqlalchemy import Select, Table, select
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
@@ -13,8 +13,8 @@ from services.optimizer.store.base import Page
 from services.optimizer.store.columns import select_columns
 from services.optimizer.store.engine import Database
 from services.optimizer.store.records import job_row
-from services.optimizer.store.rows import LISTED, to_evaluation, to_iteration
-from services.optimizer.store.tables import evaluations, iterations
+from services.optimizer.store.rows import LISTED, Row, to_evaluation, to_iteration, to_reevaluation
+from services.optimizer.store.tables import evaluations, iterations, reevaluations
 
 _LARGEST_INDEX: Final = 2**31 - 1
 _LARGEST_PAGE: Final = 10_000
@@ -84,12 +84,18 @@ class SqlHistory:
             job = job_row(connection, job_id)
             if job["best_iteration"] is None:
                 return None
-            query = select(evaluations).where(
-                evaluations.c.job_id == job_id,
-                evaluations.c.iteration == job["best_iteration"],
-                evaluations.c.particle == job["best_particle"],
-            )
-            return to_evaluation(connection.execute(query).mappings().one())
+            row = connection.execute(_particle(evaluations, job)).mappings().one()
+            anew = connection.execute(_particle(reevaluations, job)).mappings().first()
+            return to_evaluation(row, None if anew is None else to_reevaluation(anew))
+
+
+def _particle(table: Table, job: Row) -> Select[Any]:
+    """The row of a job's best particle in a table of them."""
+    return select(table).where(
+        table.c.job_id == job["id"],
+        table.c.iteration == job["best_iteration"],
+        table.c.particle == job["best_particle"],
+    )
 
 
 def checked_limit(limit: int) -> int:

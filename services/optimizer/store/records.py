@@ -32,12 +32,12 @@ from services.optimizer.store.job_rows import (
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
-    best_particle,
     evaluation_rows,
     iteration_summary,
+    reevaluation_row,
     to_ask,
 )
-from services.optimizer.store.tables import evaluations, iterations, jobs
+from services.optimizer.store.tables import evaluations, iterations, jobs, reevaluations
 
 # No vowels, no look-alikes: an id is read aloud, and it spells no word.
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
@@ -259,7 +259,7 @@ def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now
 def complete_iteration(
     connection: Connection, job: Row, done: CompletedIteration, now: datetime
 ) -> None:
-    """Fill in the iteration that was asked, and add its evaluations.
+    """Fill in the iteration that was asked, and add its evaluations and reevaluation.
 
     Args:
         connection: The transaction in which the job was locked.
@@ -280,7 +280,7 @@ def complete_iteration(
         .values(
             committed_at=now,
             evaluate_seconds=done.evaluate_seconds,
-            **iteration_summary(done.fitness, job["best_fitness"]),
+            **iteration_summary(done, job["best_fitness"]),
         )
     )
     if filled.rowcount != 1:
@@ -289,6 +289,9 @@ def complete_iteration(
             f" {job['iterations']}"
         )
     connection.execute(insert(evaluations), evaluation_rows(job["id"], done))
+    if done.reevaluation is not None:
+        row = reevaluation_row(job["id"], done.iteration, done.reevaluation)
+        connection.execute(insert(reevaluations).values(row))
 
 
 def entering(state: JobState, now: datetime) -> dict[str, Any]:
@@ -359,9 +362,8 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
         "evaluations": job["evaluations"] + len(done.fitness),
         "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
     }
-    particle = best_particle(done.fitness)
-    if particle is not None:
-        fitness = float(done.fitness[particle])
+    if done.best is not None:
+        particle, fitness = done.best
         if job["best_fitness"] is None or fitness < job["best_fitness"]:
             columns |= {
                 "best_fitness": fitness,

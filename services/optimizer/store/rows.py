@@ -11,9 +11,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration, Evaluation, Iteration
+from services.optimizer.jobs.iteration import (
+    Ask,
+    CompletedIteration,
+    Evaluation,
+    Iteration,
+    Reevaluation,
+)
 from services.optimizer.store.tables import iterations
 from sim.outcome import Status
 
@@ -49,16 +54,18 @@ def to_iteration(row: Row) -> Iteration:
     )
 
 
-def iteration_summary(fitness: NDArray[np.float64], best_before: float | None) -> dict[str, Any]:
+def iteration_summary(done: CompletedIteration, best_before: float | None) -> dict[str, Any]:
     """Columns of a committed iteration: statistics over the finite values of its fitness.
 
     Args:
-        fitness: (n,) of the swarm, +inf where a design failed.
-        best_before: The least fitness of all earlier iterations; None if there is none.
+        done: What the iteration came to.
+        best_before: Fitness of the best design of all earlier iterations, in double precision;
+            None if there is none.
 
     Returns:
         Values by name of their columns, None where there is none.
     """
+    fitness = done.fitness
     finite = fitness[np.isfinite(fitness)]
     summary: dict[str, Any] = {
         "failed": len(fitness) - len(finite),
@@ -68,53 +75,59 @@ def iteration_summary(fitness: NDArray[np.float64], best_before: float | None) -
         "worst": None,
         "best_so_far": best_before,
     }
+    if done.best is not None:
+        _, best = done.best
+        summary["best_so_far"] = best if best_before is None else min(best, best_before)
     if len(finite):
         # Huge values may overflow in the sum; such a mean is as good as none.
         with np.errstate(over="ignore"):
             mean, median = _number(np.mean(finite)), _number(np.median(finite))
-        best = float(np.min(finite))
-        so_far = best if best_before is None else min(best, best_before)
         summary |= {
-            "best": best,
+            "best": float(np.min(finite)),
             "mean": mean,
             "median": median,
             "worst": float(np.max(finite)),
-            "best_so_far": so_far,
         }
     return summary
 
 
-def best_particle(fitness: NDArray[np.float64]) -> int | None:
-    """Find the best of a swarm.
-
-    Args:
-        fitness: (n,), +inf where a design failed.
-
-    Returns:
-        Index of the least finite fitness, the earliest of equals; None if there is none.
-    """
-    finite = np.isfinite(fitness)
-    return int(np.argmin(np.where(finite, fitness, np.inf))) if finite.any() else None
-
-
-def to_evaluation(row: Row) -> Evaluation:
+def to_evaluation(row: Row, reevaluation: Reevaluation | None = None) -> Evaluation:
     """One particle of a committed iteration from its row.
 
     Args:
         row: All columns of `evaluations`.
+        reevaluation: Of the same particle in double precision, if there is one.
 
     Returns:
         The evaluation; floats have every bit that was stored.
     """
-    objectives = np.array(row["objectives"], dtype=np.float64)
     return Evaluation(
         iteration=row["iteration"],
         particle=row["particle"],
         design=np.array(row["design"], dtype=np.float64),
-        objectives=objectives,
-        statuses=np.array([Status.from_label(s) for s in row["statuses"]], dtype=np.uint8),
-        fitness=math.inf if row["fitness"] is None else row["fitness"],
+        **_results(row),
+        reevaluation=reevaluation,
     )
+
+
+def to_reevaluation(row: Row) -> Reevaluation:
+    """What a particle came to in double precision, from its row.
+
+    Args:
+        row: All columns of `reevaluations`.
+
+    Returns:
+        The reevaluation; floats have every bit that was stored.
+    """
+    return Reevaluation(particle=row["particle"], **_results(row))
+
+
+def _results(row: Row) -> dict[str, Any]:
+    return {
+        "objectives": np.array(row["objectives"], dtype=np.float64),
+        "statuses": np.array([Status.from_label(s) for s in row["statuses"]], dtype=np.uint8),
+        "fitness": math.inf if row["fitness"] is None else row["fitness"],
+    }
 
 
 def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any]]:
@@ -136,9 +149,7 @@ def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any
             "iteration": done.iteration,
             "particle": particle,
             "design": design,
-            "objectives": [_numbers(case) for case in by_case],
-            "statuses": [Status(status).label for status in labels],
-            "fitness": _number(fitness),
+            **_result_columns(by_case, labels, fitness),
         }
         for particle, (design, by_case, labels, fitness) in enumerate(
             zip(
@@ -150,6 +161,35 @@ def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any
             )
         )
     ]
+
+
+def reevaluation_row(job_id: str, iteration: int, anew: Reevaluation) -> dict[str, Any]:
+    """Row of `reevaluations`.
+
+    Args:
+        job_id: Of the job.
+        iteration: Whose particle was evaluated anew.
+        anew: What it came to.
+
+    Returns:
+        Values by name of their columns.
+    """
+    return {
+        "job_id": job_id,
+        "iteration": iteration,
+        "particle": anew.particle,
+        **_result_columns(anew.objectives.tolist(), anew.statuses.tolist(), anew.fitness),
+    }
+
+
+def _result_columns(
+    objectives: Sequence[Sequence[float]], statuses: Sequence[int], fitness: float
+) -> dict[str, Any]:
+    return {
+        "objectives": [_numbers(case) for case in objectives],
+        "statuses": [Status(status).label for status in statuses],
+        "fitness": _number(fitness),
+    }
 
 
 def to_ask(row: Row) -> Ask:

@@ -208,6 +208,23 @@ evaluations: Final = Table(
     ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
 )
 
+# Designs of a search in single precision, evaluated anew in double; columns as in `evaluations`.
+reevaluations: Final = Table(
+    "reevaluations",
+    metadata,
+    Column("job_id", Text, nullable=False),
+    Column("iteration", Integer, nullable=False),
+    Column("particle", Integer, nullable=False),
+    Column("objectives", JSON, nullable=False),
+    Column("statuses", JSON, nullable=False),
+    Column("fitness", Double),
+    PrimaryKeyConstraint("job_id", "iteration", "particle"),
+    ForeignKeyConstraint(
+        ["job_id", "iteration", "particle"],
+        ["evaluations.job_id", "evaluations.iteration", "evaluations.particle"],
+    ),
+)
+
 recordings: Final = Table(
     "recordings",
     metadata,

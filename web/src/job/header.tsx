@@ -5,7 +5,7 @@ import { useNow } from '../api/resource'
 import type { StoredJob } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
-import { formatCount, formatNumber, quantity } from '../format/number'
+import { change, formatCount, formatNumber, quantity } from '../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../format/time'
 import { JobActions } from './actions'
 import { fitnessUnit } from './fitness'
@@ -57,13 +57,23 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
   const now = useNow(1000)
   const unit = fitnessUnit(job)
   const merit = job.best?.figure_of_merit ?? null
+  const search = job.best?.search ?? null
   return (
     <dl class="figures">
       <Figure
         label="Iterations"
         value={`${formatCount(committed)} of ${formatCount(job.iterations_planned)}`}
       />
-      <Figure label="Best fitness" value={quantity(job.best_fitness, unit, 5)} />
+      <Figure
+        label={search ? 'Best fitness, in double' : 'Best fitness'}
+        value={quantity(job.best_fitness, unit, search ? 7 : 5)}
+      />
+      {search && (
+        <Figure
+          label={`Its fitness in the search, in ${search.precision}`}
+          value={`${quantity(search.fitness, unit, 7)} (${change(100 * search.difference, '%', 2)})`}
+        />
+      )}
       {merit !== null && <Figure label="F of eq. 3.1, maximized" value={formatNumber(merit, 5)} />}
       <Figure
         label="Found in iteration"
@@ -114,6 +124,7 @@ function subtitle(job: StoredJob): string {
         job.controller ?? job.kind,
         `${formatCount(job.particles)} particles`,
         `seed ${job.spec.seed}`,
+        `${job.precision} precision`,
       ]
     : []
   return [job.id, ...asked, `submitted ${formatMoment(job.created_at)}`].join(' · ')

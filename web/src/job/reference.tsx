@@ -50,7 +50,8 @@ function walkOf(
   controller: JobSpec['controller'],
   design: Design,
 ): Promise<Simulation> {
-  const body = { robot, controller, design: { ...design }, scenarios, preference, log: false }
+  const walks = { scenarios, preference, precision: 'double' as const, log: false }
+  const body = { robot, controller, design: { ...design }, ...walks }
   const key = JSON.stringify(body)
   const known = simulated.get(key)
   if (known) return known

@@ -33,6 +33,7 @@ export function specOf(draft: Draft): JobSpec {
     optimizer: numbers(draft.optimizer),
     iterations: number(draft.iterations),
     seed: number(draft.seed),
+    precision: draft.precision,
   } as unknown as JobSpec
 }
 

@@ -50,6 +50,7 @@ export interface Draft {
   readonly optimizer: Readonly<Record<string, string>>
   readonly iterations: string
   readonly seed: string
+  readonly precision: string
 }
 
 /** What the API does if nothing is said. */
@@ -76,6 +77,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     optimizer: defaults(optimizer),
     iterations: text(job.get('iterations')?.default),
     seed: text(job.get('seed')?.default),
+    precision: text(job.get('precision')?.default),
   }
 }
 
@@ -123,6 +125,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     optimizer: { ...empty.optimizer, ...optimizerOf(spec.optimizer, catalogue) },
     iterations: text(spec.iterations),
     seed: text(spec.seed),
+    precision: spec.precision ?? empty.precision,
   }
 }
 

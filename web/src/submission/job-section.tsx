@@ -1,4 +1,4 @@
-/** Name, budget and seed; optimizer and its settings. */
+/** Name, budget, seed and precision; optimizer and its settings. */
 
 import { inWords } from '../format/words'
 import { withPreset } from './draft'
@@ -36,6 +36,14 @@ export function JobSection({ draft, catalogue, errors, onChange }: SectionProps)
           value={draft.seed}
           error={errors.get('seed')}
           onChange={(seed) => onChange({ seed })}
+        />
+        <ChoiceField
+          label="Precision"
+          choices={job.get('precision')!.choices!}
+          value={draft.precision}
+          error={errors.get('precision')}
+          hint="of the search; the best design is judged in double"
+          onChange={(precision) => onChange({ precision })}
         />
       </div>
     </section>

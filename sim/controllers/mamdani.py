@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Final
 
 import numpy as np
@@ -106,17 +106,13 @@ class Mamdani:
         Returns:
             By input (n_rules, n_i), 1 where a rule leaves the input out.
         """
-        return [
-            np.stack(
-                [
-                    self.inputs[name][rule.antecedents[name]].membership(values)
-                    if name in rule.antecedents
-                    else np.ones(len(values))
-                    for rule in self.rules
-                ]
-            )
-            for name, values in grid.items()
-        ]
+        degrees = []
+        for name, values in grid.items():
+            grades: dict[str | None, Floats] = {None: np.ones(len(values))}
+            for label, fuzzy_set in self.inputs[name].items():
+                grades[label] = fuzzy_set.membership(values)
+            degrees.append(np.stack([grades[r.antecedents.get(name)] for r in self.rules]))
+        return degrees
 
     def consequents(self) -> list[int]:
         """By rule, the index of the output set that it speaks of."""
@@ -124,14 +120,12 @@ class Mamdani:
         return [names.index(rule.consequent) for rule in self.rules]
 
     def output_memberships(self) -> Floats:
-        """(n_sets, 101) membership of the points of the output universe."""
-        points = self.output_points()
-        return np.stack([s.membership(points, self.output_shape) for s in self.outputs.values()])
+        """(n_sets, 101) membership of the points of the output universe, read-only."""
+        return _memberships(tuple(self.outputs.values()), self.output_shape, self.universe)
 
     def output_points(self) -> Floats:
-        """(101,) samples of the output universe, symmetric to the bit."""
-        half = N_POINTS // 2
-        return np.arange(-half, half + 1) / half * self.universe
+        """(101,) samples of the output universe, symmetric to the bit, read-only."""
+        return _points(self.universe)
 
     def infer(self, grid: Mapping[str, Floats]) -> Floats:
         """Crisp output over the product of the inputs' values.
@@ -168,6 +162,24 @@ class Mamdani:
             strength = reduce(np.minimum, [degree[k] for degree in degrees])
             np.maximum(levels[target], strength * rule.weight, out=levels[target])
         return centroid(levels, self.output_memberships(), self.output_points())
+
+
+def _read_only(array: Floats) -> Floats:
+    array.flags.writeable = False
+    return array
+
+
+@lru_cache(maxsize=64)
+def _points(universe: float) -> Floats:
+    half = N_POINTS // 2
+    return _read_only(np.arange(-half, half + 1) / half * universe)
+
+
+@lru_cache(maxsize=64)
+def _memberships(sets: tuple[FuzzySet, ...], shape: Shape, universe: float) -> Floats:
+    """Few in a job, whose designs differ in their weights mostly."""
+    points = _points(universe)
+    return _read_only(np.stack([s.membership(points, shape) for s in sets]))
 
 
 def centroid(levels: Floats, memberships: Floats, points: Floats) -> Floats:

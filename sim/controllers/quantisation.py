@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import FRACTION_BITS, to_fixed
 from sim.controllers.mamdani import Mamdani
-from sim.controllers.native_inference import infer
+from sim.controllers.native_inference import compiled_table
 
 OUTPUT_BITS: Final = 8
 OUTPUT_SCALE: Final = 127
@@ -130,8 +130,24 @@ def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
     Returns:
         Its values, and the largest output, which they are shares of.
     """
-    crisp = infer(system, {name: axis.grid() for name, axis in axes.items()})
-    largest = float(np.abs(crisp).max())
-    values = np.rint(crisp * (OUTPUT_SCALE / (largest or 1.0))).astype(np.int8)
+    grid = {name: axis.grid() for name, axis in axes.items()}
+    values, largest = compiled_table(system, grid) or reference_table(system, grid)
     values.flags.writeable = False
     return Quantised(values, largest)
+
+
+def reference_table(
+    system: Mamdani, grid: Mapping[str, NDArray[np.float64]]
+) -> tuple[NDArray[np.int8], float]:
+    """The oracle of the compiled table, and its replacement where there is no compiler.
+
+    Args:
+        system: The inference.
+        grid: By input of the system, in its order, the values (n_i,), inside the range.
+
+    Returns:
+        Values in 1/127ths of the largest output, (n_1, n_2, ...), and that output, absolute.
+    """
+    crisp = system.infer(grid)
+    largest = float(np.abs(crisp).max())
+    return np.rint(crisp * (OUTPUT_SCALE / (largest or 1.0))).astype(np.int8), largest

@@ -8,14 +8,15 @@ import skfuzzy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim.compiler.compilation import Target, load_library, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import LookupTable
 from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
-from sim.controllers.fuzzy_pi_3 import integral_system
+from sim.controllers.fuzzy_pi_3 import integral_system, voltage_system
 from sim.controllers.fuzzy_sets import MembershipSets
 from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
-from sim.controllers.native_inference import infer
-from sim.controllers.quantisation import Axis, quantised, table_bytes
+from sim.controllers.native_inference import compiled_table, inference_source
+from sim.controllers.quantisation import Axis, quantised, reference_table, table_bytes
 from tests.examples.walks import PUBLISHED_A
 
 WEIGHTS = st.floats(0.1, 1.0)
@@ -85,21 +86,105 @@ def test_where_no_rule_fires_the_output_is_the_middle_of_its_range() -> None:
     assert system.infer({"error": np.array([0.4]), "current": np.array([0.2])})[0, 0] == 0.0
 
 
+def assert_both_tables_agree(system: Mamdani, axes: dict[str, Axis]) -> None:
+    grid = {name: axis.grid() for name, axis in axes.items()}
+    compiled = compiled_table(system, grid)
+    assert compiled is not None
+    values, largest = reference_table(system, grid)
+    np.testing.assert_array_equal(compiled[0], values)
+    assert compiled[1] == largest
+
+
+ANY_WEIGHT = st.one_of(st.sampled_from([0.0, 1e-290, 1e-9, 0.5, 1.0]), st.floats(1e-290, 1.0))
+WIDTHS = st.one_of(st.sampled_from([0.01, 0.5, 1.0, 2.0, 10.0]), st.floats(0.01, 4.0))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.tuples(ANY_WEIGHT, ANY_WEIGHT, ANY_WEIGHT, ANY_WEIGHT),
+    st.sampled_from(Shape),
+    st.builds(
+        MembershipSets,
+        large_begins=st.floats(0.0, 0.99),
+        small_ends=WIDTHS,
+        positive_peak=WIDTHS,
+        universe=WIDTHS.filter(lambda width: width >= 0.1),
+        extreme_peak=WIDTHS,
+    ),
+)
+def test_the_compiled_table_has_the_same_bits_whatever_the_weights_and_sets(
+    weights: tuple[float, float, float, float], shape: Shape, sets: MembershipSets
+) -> None:
+    axes = {"error": Axis(7, True), "current": CURRENT}
+    assert_both_tables_agree(inference_system(*weights, shape, sets), axes)
+    assert_both_tables_agree(voltage_system(*weights[:3], shape, sets), axes)
+    three = {"error": Axis(4, True), "current": Axis(3, False), "velocity": Axis(6, True)}
+    assert_both_tables_agree(integral_system(*weights[:3], shape, sets), three)
+
+
 @pytest.mark.parametrize("shape", Shape)
-def test_compiled_inference_has_the_same_bits(shape: Shape) -> None:
-    grid = {"error": ERROR.grid(), "current": CURRENT.grid()}
+def test_the_compiled_table_of_a_published_design_has_the_same_bits(shape: Shape) -> None:
     system = inference_system(0.187, 0.961, 0.789, 0.927, shape)
-    np.testing.assert_array_equal(infer(system, grid), system.infer(grid))
+    assert_both_tables_agree(system, {"error": ERROR, "current": CURRENT})
 
 
-def test_a_system_of_more_sets_than_the_compiled_inference_holds_is_inferred_all_the_same() -> None:
-    peaks = np.linspace(-1.0, 1.0, 100)
-    outputs = {f"{k}": FuzzySet(float(peak), 0.1) for k, peak in enumerate(peaks)}
+@pytest.mark.parametrize("wanted", [Target(4, "x86-64-v3"), Target(2, "")], ids=str)
+def test_narrower_vectors_give_the_same_table(wanted: Target) -> None:
+    source = inference_source()
+    narrow = wanted if wanted.lanes <= target().lanes else target()
+    library = load_library("inference", source.encode(), lambda: source, wanted=narrow)
+    system = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
+    grid = {"error": ERROR.grid(), "current": CURRENT.grid()}
+    usual, other = compiled_table(system, grid), compiled_table(system, grid, library=library)
+    assert usual is not None and other is not None
+    np.testing.assert_array_equal(usual[0], other[0])
+    assert usual[1] == other[1]
+
+
+def test_values_in_the_middle_between_two_are_rounded_alike() -> None:
+    """Where one set alone fires, its peak, 1, is the centroid: 63.5 of 127ths of the largest, 2."""
+    outputs = {"one": FuzzySet(1.0, 0.5), "two": FuzzySet(2.0, 0.5)}
+    inputs = {
+        "error": {"one": FuzzySet(-1.0, 1.0), "two": FuzzySet(1.0, 1.0)},
+        "current": {"any": FuzzySet(0.0, 1e9)},
+    }
+    rules = [Rule({"error": name}, name, 1.0) for name in outputs]
+    system = Mamdani(inputs, outputs, rules, universe=2.5)
+    axes = {"error": Axis(8, True), "current": CURRENT}
+    assert_both_tables_agree(system, axes)
+    values = quantised(system, axes).values
+    assert set(values[:128].ravel().tolist()) <= {63, 64}
+    assert set(values[129:].ravel().tolist()) == {127}
+
+
+@pytest.mark.parametrize("count", [5, 6, 32])
+def test_a_table_of_many_sets_has_the_same_bits(count: int) -> None:
+    peaks = np.linspace(-1.0, 1.0, count).tolist()
+    outputs = {f"{peak}": FuzzySet(peak, 0.5) for peak in peaks}
+    inputs = {
+        "error": {f"{peak}": FuzzySet(peak, 0.7) for peak in peaks[:16]},
+        "current": {f"{peak}": FuzzySet(0.5 + peak, 0.7) for peak in peaks[:16]},
+    }
+    rules = [
+        Rule({"error": f"{peak}", "current": f"{other}"}, consequent, 0.8)
+        for peak, other, consequent in zip(peaks[:16], peaks[15::-1], outputs, strict=False)
+    ]
+    assert_both_tables_agree(
+        Mamdani(inputs, outputs, rules, Shape.GAUSS), {"error": Axis(5, True), "current": CURRENT}
+    )
+
+
+@pytest.mark.parametrize(("sets", "rules"), [(33, 16), (16, 17)])
+def test_a_system_larger_than_is_compiled_is_inferred_all_the_same(sets: int, rules: int) -> None:
+    outputs = {f"{k}": FuzzySet(0.01 * k, 0.1) for k in range(sets)}
     inputs = {name: {"near": FuzzySet(0.0, 1.0)} for name in ("error", "current")}
-    rules = [Rule({"error": "near", "current": "near"}, name, 1.0) for name in outputs]
-    system = Mamdani(inputs, outputs, rules)
-    grid = {name: Axis(8, centred=True).grid() for name in inputs}
-    np.testing.assert_array_equal(infer(system, grid), system.infer(grid))
+    system = Mamdani(
+        inputs, outputs, [Rule({"error": "near"}, f"{k % sets}", 0.9) for k in range(rules)]
+    )
+    axes = {name: Axis(6, centred=True) for name in inputs}
+    grid = {name: axis.grid() for name, axis in axes.items()}
+    assert compiled_table(system, grid) is None
+    np.testing.assert_array_equal(quantised(system, axes).values, reference_table(system, grid)[0])
 
 
 def test_table_is_odd_in_the_error_and_follows_it() -> None:

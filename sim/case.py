@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.kernel.batch import Walking, walk_together
 from sim.kernel.walk import Precision
 from sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
 from sim.robot import RobotSource
 from sim.scenario import Scenario
-from sim.simulate import Simulation, simulate
+from sim.simulate import Simulation, simulating
 
 
 class Case(Protocol):
@@ -55,6 +57,52 @@ class Case(Protocol):
         """
 
 
+@runtime_checkable
+class WalkingCase(Case, Protocol):
+    """A case whose walks can be computed together with those of other cases.
+
+    `run` computes the same, alone.
+    """
+
+    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+        """Put designs to the test, beside others.
+
+        Args:
+            designs: As for `run`.
+
+        Returns:
+            The computation, for `walk_together`; its result is that of `run`, to the bit.
+        """
+
+
+def run_together(
+    cases: Sequence[Case], designs: Sequence[NDArray[np.float64]]
+) -> tuple[Outcome, ...]:
+    """Put designs to several cases, whose walks share calls of kernels where they can.
+
+    Args:
+        cases: The cases.
+        designs: Those of each case, as for `Case.run`.
+
+    Returns:
+        The outcome of each case, with the bits that `Case.run` gives it.
+
+    Raises:
+        SimulationInputError: A design cannot be simulated.
+    """
+    pairs = list(zip(cases, designs, strict=True))
+    walking = {
+        index: case.walking(rows)
+        for index, (case, rows) in enumerate(pairs)
+        if isinstance(case, WalkingCase)
+    }
+    outcomes = dict(zip(walking, walk_together(list(walking.values())), strict=True))
+    return tuple(
+        outcomes[index] if index in outcomes else case.run(rows)
+        for index, (case, rows) in enumerate(pairs)
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Walk:
     """Designs of a controller walk through a scenario.
@@ -95,10 +143,16 @@ class Walk:
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
         """Let every design walk."""
-        return self._walk(designs).outcome
+        (outcome,) = walk_together([self.walking(designs)])
+        return outcome
 
-    def _walk(self, designs: NDArray[np.float64]) -> Simulation:
-        return simulate(
+    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+        """Let every design walk, beside walks of other cases."""
+        walked = yield from self._simulating(designs)
+        return walked.outcome
+
+    def _simulating(self, designs: NDArray[np.float64]) -> Walking[Simulation]:
+        return simulating(
             self.scenario,
             self.controller,
             self.variables,
@@ -118,8 +172,8 @@ class MeasuredWalk(Walk):
         told = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
         return (*OBJECTIVES, *told)
 
-    def run(self, designs: NDArray[np.float64]) -> Outcome:
-        """Let every design walk."""
-        walked = self._walk(designs)
+    def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
+        """Let every design walk, beside walks of other cases."""
+        walked = yield from self._simulating(designs)
         columns = [walked.outcome.objectives, walked.measurements.array()]
         return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)

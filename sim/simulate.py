@@ -23,6 +23,7 @@ from sim.controllers import CONTROLLERS, ControlLaw, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles, require_reachable
+from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Coding, Precision, WalkSetup
 from sim.noise import LinkNoise
@@ -87,6 +88,66 @@ def simulate(
         SimulationInputError: A design cannot be simulated, and the variable is named; or single
             precision is asked for without a compiled kernel.
     """
+    (simulation,) = walk_together(
+        [
+            _simulating(
+                scenario,
+                controller,
+                variables,
+                designs,
+                robot=robot,
+                planner=planner,
+                noise=noise,
+                log=log,
+                backend=backend,
+                physics_rate=physics_rate,
+                precision=precision,
+            )
+        ]
+    )
+    return simulation
+
+
+def simulating(
+    scenario: Scenario,
+    controller: str,
+    variables: Sequence[str],
+    designs: NDArray[np.float64],
+    *,
+    robot: RobotChoice = DEFAULT_ROBOT,
+    precision: Precision = "double",
+) -> Walking[Simulation]:
+    """What `simulate` does, for `walk_together` to run beside others.
+
+    Args:
+        scenario: Gait, posture, load and ground.
+        controller: Name of the motor controller.
+        variables: Columns of the designs.
+        designs: (n, len(variables)), in the variables' units.
+        robot: A shipped robot by name, a variant of one, or a `Robot` of your own.
+        precision: Of the physics' numbers.
+
+    Returns:
+        The computation, which wants its walks once, and results in what `simulate` returns.
+    """
+    return _simulating(scenario, controller, variables, designs, robot=robot, precision=precision)
+
+
+def _simulating(
+    scenario: Scenario,
+    controller: str,
+    variables: Sequence[str],
+    designs: NDArray[np.float64],
+    *,
+    robot: RobotChoice,
+    planner: Robot | None = None,
+    noise: LinkNoise | None = None,
+    log: bool = False,
+    backend: Backend = "auto",
+    physics_rate: int = PHYSICS_RATE,
+    precision: Precision = "double",
+) -> Walking[Simulation]:
+    """As `simulate`, which documents the arguments."""
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
     if noise is not None and noise.kind == "angle":
@@ -115,7 +176,8 @@ def simulate(
         plan = plans[key]
         if plan is not None:
             setups[index] = plan(control_law)
-    results = kernel.walk(list(setups.values()), Coding.of(machine, substeps), log=log)
+    coding = Coding.of(machine, substeps)
+    results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups.values()]
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
         statuses[index], objectives[index] = judge(setup, result, substeps, timestep)

@@ -15,7 +15,8 @@ from sim.calibration.catalogue import robot_variables, varied_robot
 from sim.catalogue import design_catalogue
 from sim.controllers import CONTROLLERS, ControlLaw, ControllerName
 from sim.gait.trajectory import Trajectory, desired_angles
-from sim.kernel.walk import Coding, Kernel, Precision, WalkSetup
+from sim.kernel.batch import Walking, WantedWalk, walk_together
+from sim.kernel.walk import Coding, Precision, WalkSetup
 from sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
 from sim.robot import Robot, RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
@@ -70,9 +71,15 @@ class CalibrationWalk:
 
     def run(self, designs: Floats) -> Outcome:
         """Let every robot walk; those that share a kernel walk together."""
+        (outcome,) = walk_together([self.walking(designs)])
+        return outcome
+
+    def walking(self, designs: Floats) -> Walking[Outcome]:
+        """Let every robot walk, beside walks of other cases."""
         objectives = np.full((len(designs), len(RESULTS)), np.nan)
         statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
-        together: dict[tuple[Kernel, Coding, float], dict[int, WalkSetup]] = {}
+        timesteps: dict[int, float] = {}
+        wanted: list[WantedWalk] = []
         of_robot = {variable.name for variable in robot_variables(self.robots)}
         for index, row in enumerate(designs.tolist()):
             values = dict(zip(self.variables, row, strict=True))
@@ -82,15 +89,15 @@ class CalibrationWalk:
             substeps, timestep = control_steps(robot)
             setup = self._setup(described, robot, self.drive(values), timestep)
             if setup is not None:
+                timesteps[index] = timestep
                 kernel = kernel_of(robot, precision=self.precision)
-                key = kernel, Coding.of(robot, substeps), timestep
-                together.setdefault(key, {})[index] = setup
-        for (kernel, coding, timestep), setups in together.items():
-            results = kernel.walk(list(setups.values()), coding, log=False)
-            for (index, setup), result in zip(setups.items(), results, strict=True):
-                judged = judge(setup, result, coding.substeps, timestep)
-                statuses[index], objectives[index, :N_OBJECTIVES] = judged
-                objectives[index, N_OBJECTIVES:] = measure(setup, result, coding.substeps)
+                wanted.append(WantedWalk(kernel, Coding.of(robot, substeps), setup))
+        results = yield wanted
+        for (index, timestep), walk, result in zip(timesteps.items(), wanted, results, strict=True):
+            substeps = walk.coding.substeps
+            judged = judge(walk.setup, result, substeps, timestep)
+            statuses[index], objectives[index, :N_OBJECTIVES] = judged
+            objectives[index, N_OBJECTIVES:] = measure(walk.setup, result, substeps)
         return Outcome(objectives, statuses)
 
     def drive(self, values: Mapping[str, float]) -> dict[str, float]:

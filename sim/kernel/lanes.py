@@ -1,0 +1,124 @@
+"""In which order walks enter the lanes of a kernel that refills them."""
+
+from __future__ import annotations
+
+import heapq
+from bisect import bisect_left, insort
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+_GOOD_ENOUGH: Final = 1.005
+"""Of the time that lanes would take which all end at once; what is nearer is not worth a search."""
+
+_EXCHANGES_PER_LANE: Final = 4
+"""The search's length at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class LanePlan:
+    """Walks on lanes, each of which begins its next walk when one ends.
+
+    Attributes:
+        order: indices of the walks, in the order in which they begin.
+        end: when the last lane is done, in the durations' unit.
+        use: share of the lanes' time until then that is walked [1].
+    """
+
+    order: tuple[int, ...]
+    end: float
+    use: float
+
+
+def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
+    """Spread walks over lanes so that all lanes end at nearly the same time.
+
+    Longest first onto the lane that is free first (Graham's LPT rule); then walks of the lane that
+    ends last are moved or exchanged, as long as that lets it end earlier.
+
+    Args:
+        durations: of the walks, in any unit, > 0.
+        lanes: walks that are computed together, >= 1.
+
+    Returns:
+        The plan. A kernel that fills each free lane with the next walk of its order follows it.
+    """
+    if not durations:
+        return LanePlan((), 0.0, 1.0)
+    filled = _longest_first(durations, lanes)
+    ideal = sum(durations) / lanes
+    for _ in range(_EXCHANGES_PER_LANE * lanes):
+        if filled[0].end <= _GOOD_ENOUGH * ideal or not _relieve(filled):
+            break
+        filled.sort(key=lambda lane: -lane.end)
+    begins = [entry for lane in filled for entry in lane.begins()]
+    order = tuple(index for _, index in sorted(begins))
+    return LanePlan(order, filled[0].end, ideal / filled[0].end)
+
+
+@dataclass(slots=True)
+class _Lane:
+    """walks: (duration, index), the shortest first."""
+
+    end: float
+    walks: list[tuple[float, int]]
+
+    def put(self, walk: tuple[float, int]) -> None:
+        insort(self.walks, walk)
+        self.end += walk[0]
+
+    def drop(self, walk: tuple[float, int]) -> None:
+        self.walks.remove(walk)
+        self.end -= walk[0]
+
+    def begins(self) -> list[tuple[float, int]]:
+        """(time, index) of every walk; the longest is first."""
+        time, begun = 0.0, []
+        for duration, index in reversed(self.walks):
+            begun.append((time, index))
+            time += duration
+        return begun
+
+
+def _longest_first(durations: Sequence[float], lanes: int) -> list[_Lane]:
+    """The lane that ends last first."""
+    filled = [_Lane(0.0, []) for _ in range(lanes)]
+    free = [(0.0, k) for k in range(lanes)]
+    for index in sorted(range(len(durations)), key=lambda k: -durations[k]):
+        _, k = free[0]
+        filled[k].put((durations[index], index))
+        heapq.heapreplace(free, (filled[k].end, k))
+    return sorted(filled, key=lambda lane: -lane.end)
+
+
+def _relieve(filled: list[_Lane]) -> bool:
+    """Let the first lane, which ends last, end earlier without another then ending as late.
+
+    Returns whether a walk was moved, or exchanged for a shorter one.
+    """
+    last = filled[0]
+    best: tuple[float, _Lane, tuple[float, int], tuple[float, int] | None] | None = None
+    for lane in filled[1:]:
+        gap = last.end - lane.end
+        for given in last.walks:
+            for taken in _near(lane, given[0] - 0.5 * gap):
+                shift = given[0] - (taken[0] if taken else 0.0)
+                end = max(last.end - shift, lane.end + shift)
+                if end < (best[0] if best else last.end * (1.0 - 1e-9)):
+                    best = end, lane, given, taken
+    if best is None:
+        return False
+    _, lane, given, taken = best
+    last.drop(given)
+    lane.put(given)
+    if taken:
+        lane.drop(taken)
+        last.put(taken)
+    return True
+
+
+def _near(lane: _Lane, duration: float) -> list[tuple[float, int] | None]:
+    """The lane's walks just below and above a duration; None is no walk."""
+    at = bisect_left(lane.walks, (duration, -1))
+    below = lane.walks[at - 1] if at else None
+    return [below, lane.walks[at]] if at < len(lane.walks) else [below]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
@@ -11,8 +12,11 @@ import numpy as np
 
 from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from services.worker.cutting import Chunk, cut
 from services.worker.fair_queue import FairQueue
-from services.worker.tasks import Answer, Chunk, Task, cut
+from services.worker.pace import Pace, TaskTime
+from services.worker.tasks import Answer, Task
+from sim.case import WalkingCase
 from sim.outcome import Outcome
 from sim.provenance import Provenance
 
@@ -23,6 +27,10 @@ _NO_STATUS: Final = 255
 """In place of a status that has not come yet; no `Status` has this value."""
 
 
+_PACES_KEPT: Final = 64
+"""Jobs whose pace is remembered: those that ran last."""
+
+
 @dataclass(slots=True, eq=False)
 class Batch:
     """One request under way.
@@ -31,6 +39,7 @@ class Batch:
         request: What was asked.
         outcomes: One per case, filled in as results come.
         missing: Chunks that have no result yet.
+        times: Of the tasks whose results have come.
         error: With which the request failed; None if it has not.
         dropped: Whether nobody waits for it any more.
     """
@@ -38,6 +47,7 @@ class Batch:
     request: EvaluationRequest
     outcomes: tuple[Outcome, ...]
     missing: set[Chunk]
+    times: list[TaskTime] = field(default_factory=list)
     error: BaseException | None = None
     dropped: bool = False
 
@@ -64,23 +74,21 @@ class Work:
 
     Attributes:
         batch: Which it belongs to.
-        chunk: Some of the batch's designs in one case.
+        chunk: Some of the batch's designs in some of its cases.
         attempts: How often it was sent out before.
+        taken: When it was taken to be run; monotonic [s].
     """
 
     batch: Batch
     chunk: Chunk
     attempts: int = 0
+    taken: float = 0.0
 
     @property
     def task(self) -> Task:
         """What is sent to the worker."""
-        request, chunk = self.batch.request, self.chunk
-        return Task(
-            case=request.cases[chunk.case],
-            designs=np.ascontiguousarray(request.designs[chunk.start : chunk.stop]),
-            provenance=request.provenance,
-        )
+        request = self.batch.request
+        return Task.of(request.cases, request.designs, self.chunk.parts, request.provenance)
 
 
 @dataclass(slots=True, eq=False)
@@ -92,7 +100,7 @@ class Dispatcher:
 
     Attributes:
         slots: Tasks that run at the same time.
-        lanes: Tells how many designs the kernel steps at once.
+        lanes: Tells how many designs the compiled kernel steps at once.
     """
 
     slots: int
@@ -100,14 +108,14 @@ class Dispatcher:
     _queue: FairQueue[Work] = field(default_factory=FairQueue)
     _changed: threading.Condition = field(default_factory=threading.Condition)
     _closed: str | None = None
+    _paces: dict[str, Pace] = field(default_factory=dict)
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
         """Queue the chunks of a request, and put their results together."""
-        durations = [case.duration for case in request.cases]
         count = len(request.designs)
-        chunks = cut(durations, count, slots=self.slots, lanes=self.lanes())
+        chunks = self._cut(request)
         blank = tuple(
             Outcome(
                 np.full((count, len(case.objectives)), np.nan),
@@ -122,6 +130,7 @@ class Dispatcher:
                 self._queue.push(request.job_id, chunk.cost, Work(batch, chunk))
             self._changed.notify_all()
         self._await(batch, should_stop)
+        self._note_pace(batch)
         return batch.outcomes
 
     def take(self, timeout: float) -> Work | None:
@@ -135,7 +144,10 @@ class Dispatcher:
         """
         with self._changed:
             self._changed.wait_for(lambda: bool(self._queue) or self.closed, timeout)
-            return None if self.closed else self._queue.pop()
+            work = None if self.closed else self._queue.pop()
+        if work is not None:
+            work.taken = time.monotonic()
+        return work
 
     def complete(self, work: Work, answer: Answer | Outcome) -> None:
         """The chunk has its result; a second one of the same chunk is the same and ignored.
@@ -147,23 +159,31 @@ class Dispatcher:
         """
         chunk, batch = work.chunk, work.batch
         expected = batch.request.provenance
-        # A worker of an earlier version answers with the bare outcome.
-        outcome = (
-            answer.outcome if isinstance(answer, Answer) and answer.provenance == expected else None
-        )
         with self._changed:
             if not batch.awaits(chunk):
                 return
-            if outcome is None:
+            # A worker of an earlier version answers with the bare outcome.
+            if (
+                not isinstance(answer, Answer)
+                or answer.outcomes is None
+                or answer.provenance != expected
+            ):
                 self._end(batch, _unlike(expected, answer))
                 return
-            into = batch.outcomes[chunk.case]
-            wanted = (chunk.stop - chunk.start, into.objectives.shape[1])
-            if outcome.objectives.shape != wanted:
-                self._end(batch, _misshapen(outcome, wanted))
+            shapes = [outcome.objectives.shape for outcome in answer.outcomes]
+            wanted = [
+                (part.stop - part.start, batch.outcomes[part.case].objectives.shape[1])
+                for part in chunk.parts
+            ]
+            if shapes != wanted:
+                self._end(batch, _misshapen(shapes, wanted))
                 return
-            into.objectives[chunk.start : chunk.stop] = outcome.objectives
-            into.statuses[chunk.start : chunk.stop] = outcome.statuses
+            for part, outcome in zip(chunk.parts, answer.outcomes, strict=True):
+                into = batch.outcomes[part.case]
+                into.objectives[part.start : part.stop] = outcome.objectives
+                into.statuses[part.start : part.stop] = outcome.statuses
+            overhead = time.monotonic() - work.taken - answer.seconds
+            batch.times.append(TaskTime(chunk.cost, answer.seconds, overhead))
             batch.missing.remove(chunk)
             self._changed.notify_all()
 
@@ -206,6 +226,27 @@ class Dispatcher:
             self._queue.discard(lambda _: True)
             self._changed.notify_all()
 
+    def _cut(self, request: EvaluationRequest) -> tuple[Chunk, ...]:
+        # The interpreter walks alone.
+        lanes = self.lanes() if request.provenance.backend == "native" else 1
+        return cut(
+            [case.duration for case in request.cases],
+            len(request.designs),
+            slots=self.slots,
+            lanes=lanes,
+            pace=self._paces.get(request.job_id),
+            together=all(isinstance(case, WalkingCase) for case in request.cases),
+        )
+
+    def _note_pace(self, batch: Batch) -> None:
+        """For the job's next iteration."""
+        with self._changed:
+            job_id = batch.request.job_id
+            pace = self._paces.pop(job_id, Pace()).after(batch.times)
+            self._paces[job_id] = pace
+            if len(self._paces) > _PACES_KEPT:
+                del self._paces[next(iter(self._paces))]
+
     def _await(self, batch: Batch, should_stop: Callable[[], bool]) -> None:
         while True:
             with self._changed:
@@ -235,9 +276,9 @@ class Dispatcher:
             raise EvaluatorUnavailable(self._closed)
 
 
-def _misshapen(outcome: Outcome, wanted: tuple[int, int]) -> RuntimeError:
+def _misshapen(shapes: list[tuple[int, ...]], wanted: list[tuple[int, int]]) -> RuntimeError:
     return RuntimeError(
-        f"a worker sent objectives of shape {outcome.objectives.shape} for a chunk of {wanted};"
+        f"a worker sent objectives of shapes {shapes} for a chunk of {wanted};"
         " it runs other code than this process"
     )
 

@@ -1,104 +1,86 @@
-"""How one iteration is cut into tasks, and one task as it is sent to a worker."""
+"""One task, as it is sent to a worker, and what comes back."""
 
 from __future__ import annotations
 
-import itertools
-import math
 import pickle
 import platform
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.case import Case
+from services.worker.cutting import Part
+from sim.case import Case, run_together
 from sim.errors import SimulationError
 from sim.outcome import Outcome
 from sim.provenance import Provenance, provenance_of, simulator_digest
 
-_TASKS_PER_SLOT: Final = 3
-"""Enough for the last tasks to end at about the same time, few enough to keep each long."""
-
-_SHORTEST: Final = 10.0
-"""Simulated seconds in a task at least: tens of milliseconds of work, against milliseconds to
-send it."""
-
-_LONGEST: Final = 250.0
-"""Simulated seconds in a task at most, if its case can be cut so fine: about a second, so
-that other jobs, and whoever cancels this one, need not wait."""
-
-
-@dataclass(frozen=True, slots=True)
-class Chunk:
-    """Designs start <= index < stop in one case.
-
-    Attributes:
-        case: Index of the case.
-        start: Index of the first design.
-        stop: Index after the last design.
-        cost: Simulated seconds that the kernel steps through, with its lanes filled up.
-    """
-
-    case: int
-    start: int
-    stop: int
-    cost: float
-
-
-def cut(durations: Sequence[float], designs: int, *, slots: int, lanes: int) -> tuple[Chunk, ...]:
-    """Cut an iteration into chunks of all cases, longest first.
-
-    Args:
-        durations: Simulated seconds of each case.
-        designs: Their number.
-        slots: How many chunks run at the same time.
-        lanes: How many walkers the kernel steps together, present or not: every chunk but a case's
-            last is a multiple of it.
-
-    Returns:
-        The chunks; every design of every case is in one.
-    """
-    blocks = math.ceil(designs / lanes)
-    total = sum(durations) * blocks * lanes
-    wanted = min(max(total / (_TASKS_PER_SLOT * slots), _SHORTEST), _LONGEST)
-    chunks: list[Chunk] = []
-    for case, duration in enumerate(durations):
-        largest = max(1, round(wanted / (duration * lanes)))
-        pieces = max(1, math.ceil(blocks / largest))
-        edges = [blocks * piece // pieces for piece in range(pieces + 1)]
-        chunks += [
-            Chunk(case, a * lanes, min(b * lanes, designs), (b - a) * lanes * duration)
-            for a, b in itertools.pairwise(edges)
-            if b > a
-        ]
-    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.case, chunk.start)))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """Some designs in one case, as they are sent to a worker.
+    """Some designs in one case or several, as they are sent to a worker.
 
     Attributes:
-        case: What the designs are put to.
-        designs: (n, v).
-        provenance: What the outcome is to have.
+        cases: What the designs are put to.
+        parts: Which designs are put to which case.
+        designs: (n, v), all that the parts name.
+        provenance: What the outcomes are to have.
     """
 
-    case: Case
+    cases: tuple[Case, ...]
+    parts: tuple[Part, ...]
     designs: NDArray[np.float64]
     provenance: Provenance
 
-    def run(self) -> Answer:
-        """Put the designs to the case, unless this process computes something else.
+    @classmethod
+    def of(
+        cls,
+        cases: Sequence[Case],
+        designs: NDArray[np.float64],
+        parts: Sequence[Part],
+        provenance: Provenance,
+    ) -> Task:
+        """The task for some parts of an iteration, without what they do not need of it.
+
+        Args:
+            cases: All cases.
+            designs: All designs.
+            parts: Designs in cases.
+            provenance: What the outcomes are to have.
 
         Returns:
-            The outcome, or None in its place, with the provenance of this process.
+            The task, whose outcomes are in the order of the parts.
         """
-        here = provenance_of(*self.case.robots, precision=self.case.precision)
-        outcome = self.case.run(self.designs) if here == self.provenance else None
-        return Answer(here, outcome, platform.node())
+        first = min(part.start for part in parts)
+        last = max(part.stop for part in parts)
+        return cls(
+            cases=tuple(cases[part.case] for part in parts),
+            parts=tuple(
+                Part(index, part.start - first, part.stop - first)
+                for index, part in enumerate(parts)
+            ),
+            designs=np.ascontiguousarray(designs[first:last]),
+            provenance=provenance,
+        )
+
+    def run(self) -> Answer:
+        """Put the designs to the cases, unless this process computes something else.
+
+        Returns:
+            The outcomes, or None in their place, with the provenance of this process.
+        """
+        begun = time.perf_counter()
+        for robots, precision in {(case.robots, case.precision) for case in self.cases}:
+            here = provenance_of(*robots, precision=precision)
+            if here != self.provenance:
+                return Answer(here, None, platform.node())
+        outcomes = run_together(
+            [self.cases[part.case] for part in self.parts],
+            [self.designs[part.start : part.stop] for part in self.parts],
+        )
+        return Answer(self.provenance, outcomes, platform.node(), time.perf_counter() - begun)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,13 +89,16 @@ class Answer:
 
     Attributes:
         provenance: That of the process that ran it.
-        outcome: None if the provenance is not what the task asks for, so that nothing was computed.
+        outcomes: Of the parts; None if the provenance is not what the task asks for, so that
+            nothing was computed.
         host: Name of the machine.
+        seconds: That the task took there [s].
     """
 
     provenance: Provenance
-    outcome: Outcome | None
+    outcomes: tuple[Outcome, ...] | None
     host: str
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

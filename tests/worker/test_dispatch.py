@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import ProvenanceChanged
+from services.optimizer.run.evaluator import EvaluationRequest
+from services.worker.cutting import Part
 from services.worker.dispatch import Dispatcher, Work
 from services.worker.tasks import Answer, Task
+from sim.case import Case
 from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.provenance import provenance_of
-from tests.worker.requests import request
+from tests.worker.requests import request, walked_at_once
 
 LANES = 4
 COUNT = 8 * LANES
@@ -52,17 +55,19 @@ def taken(dispatcher: Dispatcher) -> list[Work]:
     return works
 
 
-def result_of(work: Work) -> Outcome:
-    """One that tells the chunks from each other."""
-    size = work.chunk.stop - work.chunk.start
-    value = 100.0 * work.chunk.case + work.chunk.start
-    return Outcome(
-        np.full((size, N_OBJECTIVES), value), np.full(size, Status.STALLED, dtype=np.uint8)
+def results_of(work: Work) -> tuple[Outcome, ...]:
+    """Those that tell the parts of all chunks from each other."""
+    return tuple(
+        Outcome(
+            np.full((part.stop - part.start, N_OBJECTIVES), 100.0 * part.case + part.start),
+            np.full(part.stop - part.start, Status.STALLED, dtype=np.uint8),
+        )
+        for part in work.chunk.parts
     )
 
 
 def answer_of(work: Work) -> Answer:
-    return Answer(HERE, result_of(work), "node-7")
+    return Answer(HERE, results_of(work), "node-7")
 
 
 def test_a_chunk_that_comes_twice_counts_once(
@@ -77,10 +82,10 @@ def test_a_chunk_that_comes_twice_counts_once(
     outcomes = results.result(PATIENCE)
 
     for work in works:
-        chunk = work.chunk
-        rows = outcomes[chunk.case].objectives[chunk.start : chunk.stop]
-        np.testing.assert_array_equal(rows, result_of(work).objectives)
-        assert (outcomes[chunk.case].statuses == Status.STALLED).all()
+        for part, expected in zip(work.chunk.parts, results_of(work), strict=True):
+            rows = outcomes[part.case].objectives[part.start : part.stop]
+            np.testing.assert_array_equal(rows, expected.objectives)
+            assert (outcomes[part.case].statuses == Status.STALLED).all()
 
 
 def test_a_chunk_that_was_sent_again_after_its_result_came_is_not_run_again(
@@ -118,7 +123,7 @@ def test_a_result_of_another_shape_fails_the_request_instead_of_filling_it(
 ) -> None:
     work, *_ = taken(dispatcher)
     outcome = Outcome(np.zeros(shape), np.zeros(shape[0], dtype=np.uint8))
-    dispatcher.complete(work, Answer(HERE, outcome, "node-7"))
+    dispatcher.complete(work, Answer(HERE, (outcome,), "node-7"))
     with pytest.raises(RuntimeError, match="other code"):
         results.result(PATIENCE)
 
@@ -128,8 +133,8 @@ def test_a_worker_without_a_compiler_fails_the_request_and_is_named(
     dispatcher: Dispatcher, results: Future[Results], declined: bool
 ) -> None:
     work, *_ = taken(dispatcher)
-    outcome = None if declined else result_of(work)
-    dispatcher.complete(work, Answer(NO_COMPILER, outcome, "node-7"))
+    outcomes = None if declined else results_of(work)
+    dispatcher.complete(work, Answer(NO_COMPILER, outcomes, "node-7"))
     with pytest.raises(ProvenanceChanged, match=r"node-7 .*: no C compiler: backend reference"):
         results.result(PATIENCE)
 
@@ -138,13 +143,94 @@ def test_a_worker_that_does_not_say_what_it_computes_fails_the_request(
     dispatcher: Dispatcher, results: Future[Results]
 ) -> None:
     work, *_ = taken(dispatcher)
-    dispatcher.complete(work, result_of(work))
+    dispatcher.complete(work, results_of(work)[0])
     with pytest.raises(ProvenanceChanged, match="does not say what it computes"):
         results.result(PATIENCE)
 
 
 def test_a_task_is_not_run_by_a_process_that_computes_something_else() -> None:
-    task = Task(request(2).cases[0], request(2).designs, HERE)
-    assert task.run().outcome is not None
+    wanted = request(2)
+    task = Task.of(wanted.cases, wanted.designs, [Part(0, 0, 2), Part(1, 0, 2)], HERE)
+    assert task.run().outcomes is not None
     declined = replace(task, provenance=NO_COMPILER).run()
-    assert (declined.outcome, declined.provenance) == (None, HERE)
+    assert (declined.outcomes, declined.provenance) == (None, HERE)
+
+
+def test_a_task_carries_only_the_designs_and_cases_of_its_parts() -> None:
+    wanted = request(9)
+    task = Task.of(wanted.cases, wanted.designs, [Part(1, 4, 6), Part(0, 5, 7)], HERE)
+    assert task.cases == (wanted.cases[1], wanted.cases[0])
+    np.testing.assert_array_equal(task.designs, wanted.designs[4:7])
+    outcomes = task.run().outcomes
+    assert outcomes is not None
+    whole = walked_at_once(wanted)
+    for found, case, rows in zip(outcomes, (1, 0), (slice(4, 6), slice(5, 7)), strict=True):
+        assert found.objectives.tobytes() == whole[case].objectives[rows].tobytes()
+
+
+class OneLook(Exception):
+    """The request has been cut."""
+
+
+def chunks_of(dispatcher: Dispatcher, wanted: EvaluationRequest) -> list[Work]:
+    """Its chunks, of which none is run."""
+
+    def look() -> bool:
+        raise OneLook
+
+    with pytest.raises(OneLook):
+        dispatcher.evaluate(wanted, look)
+    works = []
+    while work := dispatcher.take(0.0):
+        works.append(work)
+    return works
+
+
+def test_with_fewer_slots_than_cases_a_task_holds_walks_of_all_cases() -> None:
+    (work,) = chunks_of(Dispatcher(slots=1, lanes=lambda: LANES), request(3))
+    assert work.chunk.parts == (Part(0, 0, 3), Part(1, 0, 3))
+
+
+def test_with_as_many_slots_as_cases_a_task_is_of_one_case() -> None:
+    works = chunks_of(Dispatcher(slots=2, lanes=lambda: LANES), request(3))
+    assert {work.chunk.parts for work in works} == {(Part(0, 0, 3),), (Part(1, 0, 3),)}
+
+
+def test_cases_without_walks_to_share_have_tasks_of_their_own() -> None:
+    class Alone:
+        def __init__(self, case: Case) -> None:
+            self.name, self.duration, self.robots = case.name, case.duration, case.robots
+            self.objectives, self.run = case.objectives, case.run
+
+    wanted = request(3)
+    alone = replace(wanted, cases=tuple(Alone(case) for case in wanted.cases))
+    works = chunks_of(Dispatcher(slots=1, lanes=lambda: LANES), alone)
+    assert {work.chunk.parts for work in works} == {(Part(0, 0, 3),), (Part(1, 0, 3),)}
+
+
+def test_the_interpreter_which_walks_alone_is_not_given_lanes_to_fill() -> None:
+    slow = replace(request(5), provenance=NO_COMPILER)
+    (work,) = chunks_of(Dispatcher(slots=1, lanes=lambda: 64), slow)
+    assert work.chunk.cost == pytest.approx(5 * sum(case.duration for case in slow.cases))
+
+
+def test_the_next_iteration_of_a_job_is_cut_by_the_pace_of_the_last() -> None:
+    dispatcher = Dispatcher(slots=1, lanes=lambda: LANES)
+    wanted = request(40)
+    with ThreadPoolExecutor(1) as pool:
+        under_way = pool.submit(dispatcher.evaluate, wanted, lambda: False)
+        seconds = 0.0
+        while not under_way.done():
+            work = dispatcher.take(0.05)
+            if work is None:
+                continue
+            # Half a minute for each simulated second: nothing larger than a lane's walk ends soon.
+            seconds += 30.0 * work.chunk.cost
+            answer = replace(answer_of(work), seconds=30.0 * work.chunk.cost)
+            dispatcher.complete(work, answer)
+        under_way.result()
+    first = chunks_of(dispatcher, replace(wanted, job_id="another"))
+    second = chunks_of(dispatcher, wanted)
+    longest = LANES * max(case.duration for case in wanted.cases)
+    assert max(work.chunk.cost for work in first) > 10.0 * longest
+    assert max(work.chunk.cost for work in second) < 1.5 * longest

@@ -24,13 +24,18 @@ from tests.worker.requests import SCENARIOS, bits, never, request, walked_at_onc
 
 pytestmark = pytest.mark.slow
 
+MORE_CASES_THAN_SLOTS = (*SCENARIOS, short_walk(name="slower", cycle_time=1.2))
 
+
+@pytest.mark.parametrize("scenarios", [SCENARIOS, MORE_CASES_THAN_SLOTS], ids=["2", "3"])
 @pytest.mark.parametrize("count", [1, 7, 41])
 def test_results_are_those_of_one_batch_in_index_order_to_the_bit(
-    evaluator: Evaluator, count: int
+    evaluator: Evaluator, count: int, scenarios: tuple[Scenario, ...]
 ) -> None:
-    wanted = request(count)
-    assert bits(evaluator.evaluate(wanted, never)) == bits(walked_at_once(wanted))
+    wanted = request(count, scenarios=scenarios)
+    # The second time, the work is cut by what was measured in the first.
+    for _ in range(2):
+        assert bits(evaluator.evaluate(wanted, never)) == bits(walked_at_once(wanted))
 
 
 def test_a_design_is_worth_the_same_in_whatever_company(evaluator: Evaluator) -> None:

@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.batch import Walking, walk_together
+from sim.kernel.batch import KernelTime, Walking, walk_together
 from sim.kernel.walk import Precision
 from sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
 from sim.robot import RobotSource
@@ -76,13 +76,16 @@ class WalkingCase(Case, Protocol):
 
 
 def run_together(
-    cases: Sequence[Case], designs: Sequence[NDArray[np.float64]]
+    cases: Sequence[Case],
+    designs: Sequence[NDArray[np.float64]],
+    kernel_time: KernelTime | None = None,
 ) -> tuple[Outcome, ...]:
     """Put designs to several cases, whose walks share calls of kernels where they can.
 
     Args:
         cases: The cases.
         designs: Those of each case, as for `Case.run`.
+        kernel_time: Is added to, by cases whose walks can be shared.
 
     Returns:
         The outcome of each case, with the bits that `Case.run` gives it.
@@ -96,7 +99,7 @@ def run_together(
         for index, (case, rows) in enumerate(pairs)
         if isinstance(case, WalkingCase)
     }
-    outcomes = dict(zip(walking, walk_together(list(walking.values())), strict=True))
+    outcomes = dict(zip(walking, walk_together(list(walking.values()), kernel_time), strict=True))
     return tuple(
         outcomes[index] if index in outcomes else case.run(rows)
         for index, (case, rows) in enumerate(pairs)

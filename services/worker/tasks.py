@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from services.worker.cutting import Part
 from sim.case import Case, run_together
 from sim.errors import SimulationError
+from sim.kernel.batch import KernelTime
 from sim.outcome import Outcome
 from sim.provenance import Provenance, provenance_of, simulator_digest
 
@@ -76,11 +77,16 @@ class Task:
             here = provenance_of(*robots, precision=precision)
             if here != self.provenance:
                 return Answer(here, None, platform.node())
+        kernel_time = KernelTime()
         outcomes = run_together(
             [self.cases[part.case] for part in self.parts],
             [self.designs[part.start : part.stop] for part in self.parts],
+            kernel_time,
         )
-        return Answer(self.provenance, outcomes, platform.node(), time.perf_counter() - begun)
+        seconds = time.perf_counter() - begun
+        return Answer(
+            self.provenance, outcomes, platform.node(), seconds, kernel_seconds=kernel_time.seconds
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,12 +99,14 @@ class Answer:
             nothing was computed.
         host: Name of the machine.
         seconds: That the task took there [s].
+        kernel_seconds: Of these, in kernels that compute walks [s].
     """
 
     provenance: Provenance
     outcomes: tuple[Outcome, ...] | None
     host: str
     seconds: float = 0.0
+    kernel_seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -34,7 +35,20 @@ Walking = Generator[Sequence[WantedWalk], Sequence[WalkResult], T]
 became of them, in their order, as often as it likes, and returns the result."""
 
 
-def walk_together(walkings: Sequence[Walking[T]]) -> tuple[T, ...]:
+@dataclass(slots=True)
+class KernelTime:
+    """What calls of kernels took, of those who ask for it.
+
+    Attributes:
+        seconds: wall time in the calls, added to [s].
+    """
+
+    seconds: float = 0.0
+
+
+def walk_together(
+    walkings: Sequence[Walking[T]], kernel_time: KernelTime | None = None
+) -> tuple[T, ...]:
     """Run several computations side by side; walks of one kernel and coding share one call.
 
     walkings                        calls
@@ -44,6 +58,7 @@ def walk_together(walkings: Sequence[Walking[T]]) -> tuple[T, ...]:
 
     Args:
         walkings: The computations, none of which was begun.
+        kernel_time: Is added to.
 
     Returns:
         Their results, in order; a walk has the same bits in any company.
@@ -61,18 +76,22 @@ def walk_together(walkings: Sequence[Walking[T]]) -> tuple[T, ...]:
                 wanted[index] = next(walking) if answer is None else walking.send(answer)
             except StopIteration as ended:
                 results[index] = ended.value
-        computed = iter(_computed([walk for walks in wanted.values() for walk in walks]))
-        answers = {index: list(islice(computed, len(walks))) for index, walks in wanted.items()}
+        walks = [walk for own in wanted.values() for walk in own]
+        computed = iter(_computed(walks, kernel_time or KernelTime()))
+        answers = {index: list(islice(computed, len(own))) for index, own in wanted.items()}
     return tuple(results[index] for index in range(len(walkings)))
 
 
-def _computed(walks: Sequence[WantedWalk]) -> list[WalkResult]:
+def _computed(walks: Sequence[WantedWalk], kernel_time: KernelTime) -> list[WalkResult]:
     """What became of the walks, in order."""
     calls: dict[tuple[Kernel, Coding, bool], list[int]] = {}
     for index, walk in enumerate(walks):
         calls.setdefault((walk.kernel, walk.coding, walk.log), []).append(index)
     found: dict[int, WalkResult] = {}
     for (kernel, coding, log), indices in calls.items():
-        results = kernel.walk([walks[index].setup for index in indices], coding, log=log)
+        setups = [walks[index].setup for index in indices]
+        begun = time.perf_counter()
+        results = kernel.walk(setups, coding, log=log)
+        kernel_time.seconds += time.perf_counter() - begun
         found.update(zip(indices, results, strict=True))
     return [found[index] for index in range(len(walks))]

@@ -1,0 +1,127 @@
+"""How much of the workers' time a job uses: walking, preparing, waiting, and 1 slot against 2.
+
+    python -m benchmarks.idle [--evaluator ray] [--particles 25] [--iterations 25] [--rounds 1]
+                              [--slots 1 2] [--json]
+
+The demo's job, run here and now with a database on disk, as `gaitswarm optimize` does. Time counts
+from the first committed iteration to the last, so that start-up is no part of it. Shares are of the
+wall time of all slots:
+
+    walking      in kernels
+    preparing    in tasks, outside of kernels: tables, desired angles, objectives
+    waiting      in evaluations, outside of tasks: sending, answers, the last worker's end
+    between      from one evaluation to the next: judging, telling, asking, storing
+
+Efficiency is the wall time of one slot over twice that of two.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from unittest.mock import patch
+
+from services.optimizer.jobs.job import CompletedIteration, JobState
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.pso import PsoSettings
+from services.optimizer.service import JobService
+from services.runtime import open_evaluator, open_store, run_embedded
+from services.worker import EvaluatorKind
+from services.worker.dispatch import Dispatcher, Work
+from services.worker.tasks import Answer
+
+
+@dataclass(frozen=True)
+class Use:
+    """Shares of the wall time of all slots [1]; seconds and fitness of the job."""
+
+    slots: int
+    seconds: float
+    tasks: float
+    walking: float
+    preparing: float
+    waiting: float
+    between: float
+    fitness: float
+
+
+def run(kind: EvaluatorKind, slots: int, particles: int, iterations: int) -> Use:
+    """One job on a number of slots."""
+    answers: list[Answer] = []
+    commits: list[tuple[float, float, int]] = []
+    complete = Dispatcher.complete
+
+    def note_answer(self: Dispatcher, work: Work, answer: Answer) -> None:
+        answers.append(answer)
+        complete(self, work, answer)
+
+    def note_commit(done: CompletedIteration, _state: JobState) -> None:
+        commits.append((time.perf_counter(), done.evaluate_seconds, len(answers)))
+
+    spec = JobSpec(optimizer=PsoSettings(particles=particles), iterations=iterations)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        patch.object(Dispatcher, "complete", note_answer),
+    ):
+        store = open_store(f"sqlite:///{folder}/jobs.db")
+        evaluator = open_evaluator(kind, cpus=slots)
+        job, _ = JobService(store).submit(spec)
+        ended = run_embedded(store, evaluator, job.id, on_commit=note_commit)
+        evaluator.close()
+        store.close()
+    first, last = commits[0], commits[-1]
+    counted = answers[first[2] : last[2]]
+    wall = last[0] - first[0]
+    evaluated = sum(seconds for _, seconds, _ in commits[1:])
+    walking = sum(answer.kernel_seconds for answer in counted)
+    in_tasks = sum(answer.seconds for answer in counted)
+    assert ended.progress.best_fitness is not None
+    return Use(
+        slots=slots,
+        seconds=wall,
+        tasks=len(counted) / (len(commits) - 1),
+        walking=walking / (slots * wall),
+        preparing=(in_tasks - walking) / (slots * wall),
+        waiting=evaluated / wall - in_tasks / (slots * wall),
+        between=1.0 - evaluated / wall,
+        fitness=ended.progress.best_fitness,
+    )
+
+
+def main() -> None:
+    """Print a table, or JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--evaluator", choices=["ray", "in-process"], default="ray")
+    parser.add_argument("--particles", type=int, default=25)
+    parser.add_argument("--iterations", type=int, default=25)
+    parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--slots", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    uses = [
+        run(options.evaluator, slots, options.particles, options.iterations)
+        for _, slots in itertools.product(range(options.rounds), options.slots)
+    ]
+    if options.json:
+        print(json.dumps([asdict(use) for use in uses], indent=2))
+        return
+    print("slots seconds tasks  walking preparing waiting between  fitness")
+    for use in uses:
+        print(
+            f"{use.slots:5d} {use.seconds:7.2f} {use.tasks:5.1f} {use.walking:8.1%}"
+            f" {use.preparing:9.1%} {use.waiting:7.1%} {use.between:7.1%}  {use.fitness!r}"
+        )
+    quickest = {
+        slots: min(use.seconds for use in uses if use.slots == slots) for slots in options.slots
+    }
+    for slots in options.slots[1:]:
+        efficiency = quickest[options.slots[0]] * options.slots[0] / (quickest[slots] * slots)
+        print(f"efficiency of {slots} slots: {efficiency:.1%}")
+
+
+if __name__ == "__main__":
+    main()

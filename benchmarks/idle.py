@@ -1,13 +1,13 @@
 """How much of the workers' time a job uses: walking, preparing, waiting, and 1 slot against 2.
 
     python -m benchmarks.idle [--evaluator ray] [--particles 25] [--iterations 25] [--rounds 1]
-                              [--slots 1 2] [--json]
+                              [--slots 1 2] [--precision double] [--json]
 
 The demo's job, run here and now with a database on disk, as `gaitswarm optimize` does. Time counts
 from the first committed iteration to the last, so that start-up is no part of it. Shares are of the
 wall time of all slots:
 
-    walking      in kernels
+    walking      in kernels, whose lanes are used as "lanes" says
     preparing    in tasks, outside of kernels: tables, desired angles, objectives
     waiting      in evaluations, outside of tasks: sending, answers, the last worker's end
     between      from one evaluation to the next: judging, telling, asking, storing
@@ -25,7 +25,8 @@ import time
 from dataclasses import asdict, dataclass
 from unittest.mock import patch
 
-from services.optimizer.jobs.job import CompletedIteration, JobState
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from services.optimizer.service import JobService
@@ -33,6 +34,7 @@ from services.runtime import open_evaluator, open_store, run_embedded
 from services.worker import EvaluatorKind
 from services.worker.dispatch import Dispatcher, Work
 from services.worker.tasks import Answer
+from sim.kernel.walk import LaneUse, Precision
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class Use:
     slots: int
     seconds: float
     tasks: float
+    lane_use: float
     walking: float
     preparing: float
     waiting: float
@@ -49,7 +52,9 @@ class Use:
     fitness: float
 
 
-def run(kind: EvaluatorKind, slots: int, particles: int, iterations: int) -> Use:
+def run(
+    kind: EvaluatorKind, slots: int, particles: int, iterations: int, precision: Precision
+) -> Use:
     """One job on a number of slots."""
     answers: list[Answer] = []
     commits: list[tuple[float, float, int]] = []
@@ -62,7 +67,9 @@ def run(kind: EvaluatorKind, slots: int, particles: int, iterations: int) -> Use
     def note_commit(done: CompletedIteration, _state: JobState) -> None:
         commits.append((time.perf_counter(), done.evaluate_seconds, len(answers)))
 
-    spec = JobSpec(optimizer=PsoSettings(particles=particles), iterations=iterations)
+    spec = JobSpec(
+        optimizer=PsoSettings(particles=particles), iterations=iterations, precision=precision
+    )
     with (
         tempfile.TemporaryDirectory() as folder,
         patch.object(Dispatcher, "complete", note_answer),
@@ -77,13 +84,14 @@ def run(kind: EvaluatorKind, slots: int, particles: int, iterations: int) -> Use
     counted = answers[first[2] : last[2]]
     wall = last[0] - first[0]
     evaluated = sum(seconds for _, seconds, _ in commits[1:])
-    walking = sum(answer.kernel_seconds for answer in counted)
+    walking = sum(answer.kernel_time.seconds for answer in counted)
     in_tasks = sum(answer.seconds for answer in counted)
     assert ended.progress.best_fitness is not None
     return Use(
         slots=slots,
         seconds=wall,
         tasks=len(counted) / (len(commits) - 1),
+        lane_use=sum((answer.kernel_time.lane_use for answer in counted), LaneUse()).share,
         walking=walking / (slots * wall),
         preparing=(in_tasks - walking) / (slots * wall),
         waiting=evaluated / wall - in_tasks / (slots * wall),
@@ -96,6 +104,7 @@ def main() -> None:
     """Print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--evaluator", choices=["ray", "in-process"], default="ray")
+    parser.add_argument("--precision", choices=["double", "single"], default="double")
     parser.add_argument("--particles", type=int, default=25)
     parser.add_argument("--iterations", type=int, default=25)
     parser.add_argument("--rounds", type=int, default=1)
@@ -103,17 +112,18 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     uses = [
-        run(options.evaluator, slots, options.particles, options.iterations)
+        run(options.evaluator, slots, options.particles, options.iterations, options.precision)
         for _, slots in itertools.product(range(options.rounds), options.slots)
     ]
     if options.json:
         print(json.dumps([asdict(use) for use in uses], indent=2))
         return
-    print("slots seconds tasks  walking preparing waiting between  fitness")
+    print("slots seconds tasks lanes  walking preparing waiting between  fitness")
     for use in uses:
         print(
-            f"{use.slots:5d} {use.seconds:7.2f} {use.tasks:5.1f} {use.walking:8.1%}"
-            f" {use.preparing:9.1%} {use.waiting:7.1%} {use.between:7.1%}  {use.fitness!r}"
+            f"{use.slots:5d} {use.seconds:7.2f} {use.tasks:5.1f} {use.lane_use:5.1%}"
+            f" {use.walking:8.1%} {use.preparing:9.1%} {use.waiting:7.1%} {use.between:7.1%}"
+            f"  {use.fitness!r}"
         )
     quickest = {
         slots: min(use.seconds for use in uses if use.slots == slots) for slots in options.slots

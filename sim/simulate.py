@@ -240,9 +240,16 @@ def prepare(
     return kernel_of(load_robot(robot), backend, precision=precision).backend
 
 
-def lanes() -> int:
-    """Walkers that the kernel steps together; chunks of a batch should be multiples of it."""
-    return target().lanes
+def lanes(precision: Precision = "double") -> int:
+    """How many walkers the compiled kernel steps together.
+
+    Args:
+        precision: Of the physics' numbers; of single ones twice as many fit into a register.
+
+    Returns:
+        Their number; chunks of a batch should be multiples of it.
+    """
+    return target().lanes * (2 if precision == "single" else 1)
 
 
 def _check_arguments(

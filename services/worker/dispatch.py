@@ -17,6 +17,7 @@ from services.worker.fair_queue import FairQueue
 from services.worker.pace import Pace, TaskTime
 from services.worker.tasks import Answer, Task
 from sim.case import WalkingCase
+from sim.kernel.walk import Precision
 from sim.outcome import Outcome
 from sim.provenance import Provenance
 
@@ -100,11 +101,11 @@ class Dispatcher:
 
     Attributes:
         slots: Tasks that run at the same time.
-        lanes: Tells how many designs the compiled kernel steps at once.
+        lanes: Tells how many designs the compiled kernel of a precision steps at once.
     """
 
     slots: int
-    lanes: Callable[[], int]
+    lanes: Callable[[Precision], int]
     _queue: FairQueue[Work] = field(default_factory=FairQueue)
     _changed: threading.Condition = field(default_factory=threading.Condition)
     _closed: str | None = None
@@ -227,8 +228,9 @@ class Dispatcher:
             self._changed.notify_all()
 
     def _cut(self, request: EvaluationRequest) -> tuple[Chunk, ...]:
-        # The interpreter walks alone.
-        lanes = self.lanes() if request.provenance.backend == "native" else 1
+        # The interpreter steps one walk.
+        is_compiled = request.provenance.backend == "native"
+        lanes = max(self.lanes(case.precision) if is_compiled else 1 for case in request.cases)
         return cut(
             [case.duration for case in request.cases],
             len(request.designs),

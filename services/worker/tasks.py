@@ -6,7 +6,7 @@ import pickle
 import platform
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,9 +84,7 @@ class Task:
             kernel_time,
         )
         seconds = time.perf_counter() - begun
-        return Answer(
-            self.provenance, outcomes, platform.node(), seconds, kernel_seconds=kernel_time.seconds
-        )
+        return Answer(self.provenance, outcomes, platform.node(), seconds, kernel_time)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,14 +97,14 @@ class Answer:
             nothing was computed.
         host: Name of the machine.
         seconds: That the task took there [s].
-        kernel_seconds: Of these, in kernels that compute walks [s].
+        kernel_time: Of these, and how the kernels' lanes were used.
     """
 
     provenance: Provenance
     outcomes: tuple[Outcome, ...] | None
     host: str
     seconds: float = 0.0
-    kernel_seconds: float = 0.0
+    kernel_time: KernelTime = field(default_factory=KernelTime)
 
 
 @dataclass(frozen=True, slots=True)

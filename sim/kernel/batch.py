@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from typing import TypeVar
 
-from sim.kernel.walk import Coding, Kernel, WalkResult, WalkSetup
+from sim.kernel.walk import Coding, Kernel, LaneUse, WalkResult, WalkSetup
 
 T = TypeVar("T")
 
@@ -41,9 +41,11 @@ class KernelTime:
 
     Attributes:
         seconds: wall time in the calls, added to [s].
+        lane_use: of all of them.
     """
 
     seconds: float = 0.0
+    lane_use: LaneUse = field(default_factory=LaneUse)
 
 
 def walk_together(
@@ -93,5 +95,6 @@ def _computed(walks: Sequence[WantedWalk], kernel_time: KernelTime) -> list[Walk
         begun = time.perf_counter()
         results = kernel.walk(setups, coding, log=log)
         kernel_time.seconds += time.perf_counter() - begun
+        kernel_time.lane_use += results.lane_use
         found.update(zip(indices, results, strict=True))
     return [found[index] for index in range(len(walks))]

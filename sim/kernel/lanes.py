@@ -37,7 +37,7 @@ def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
     ends last are moved or exchanged, as long as that lets it end earlier.
 
     Args:
-        durations: of the walks, in any unit, > 0.
+        durations: of the walks, in any unit, >= 0.
         lanes: walks that are computed together, >= 1.
 
     Returns:
@@ -53,7 +53,8 @@ def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
         filled.sort(key=lambda lane: -lane.end)
     begins = [entry for lane in filled for entry in lane.begins()]
     order = tuple(index for _, index in sorted(begins))
-    return LanePlan(order, filled[0].end, ideal / filled[0].end)
+    end = filled[0].end
+    return LanePlan(order, end, ideal / end if end else 1.0)
 
 
 @dataclass(slots=True)

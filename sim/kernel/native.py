@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sim.compiler.compilation import Target, load_library
 from sim.controllers.base import LookupTable, Response
 from sim.errors import KernelBuildError, SimulationInputError
+from sim.kernel.lanes import plan_lanes
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.source import kernel_identity, kernel_source
 from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkResults, WalkSetup
@@ -174,7 +175,7 @@ class NativeKernel:
                 )
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
-        """All walks, `lanes` at a time: where one ends, the longest that is left begins.
+        """All walks, `lanes` at a time: where one ends, the next one of `plan_lanes` begins.
 
         Args:
             setups: Walks of this kernel's robot.
@@ -199,8 +200,7 @@ class NativeKernel:
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
         walkers = (_Walker * n)()
         addresses = _Addresses()
-        # Longest first, so that the last walks to end are short ones.
-        order = sorted(range(n), key=lambda k: -setups[k].ticks)
+        order = plan_lanes([setup.ticks for setup in setups], self.lanes).order
         for walker, k in zip(walkers, order, strict=True):
             setup, record = setups[k], logs[k]
             law = setup.control_law

@@ -12,7 +12,7 @@ from sim.calibration.walk import CalibrationWalk
 from sim.case import Case, MeasuredWalk, Walk, run_together
 from sim.kernel.batch import Walking, walk_together
 from sim.kernel.native import NativeKernel
-from sim.kernel.walk import Coding, WalkResult, WalkSetup
+from sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
 from sim.outcome import Objective, Outcome
 from sim.robot import RobotSource
 from sim.scenario import Scenario
@@ -73,6 +73,7 @@ class NoWalk:
     name = "n"
     duration = 1.0
     robots: tuple[RobotSource, ...] = ("szabadka2",)
+    precision: Precision = "double"
     objectives: tuple[Objective, ...] = ()
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:

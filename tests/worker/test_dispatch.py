@@ -14,7 +14,8 @@ from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.cutting import Part
 from services.worker.dispatch import Dispatcher, Work
 from services.worker.tasks import Answer, Task
-from sim.case import Case
+from sim.case import Case, Walk
+from sim.kernel.walk import Precision
 from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.provenance import provenance_of
 from tests.worker.requests import request, walked_at_once
@@ -31,7 +32,7 @@ NO_COMPILER = HERE.model_copy(update={"backend": "reference"})
 
 @pytest.fixture
 def dispatcher() -> Iterator[Dispatcher]:
-    opened = Dispatcher(slots=64, lanes=lambda: LANES)
+    opened = Dispatcher(slots=64, lanes=lambda _: LANES)
     yield opened
     opened.close("the test has ended")
 
@@ -187,12 +188,12 @@ def chunks_of(dispatcher: Dispatcher, wanted: EvaluationRequest) -> list[Work]:
 
 
 def test_with_fewer_slots_than_cases_a_task_holds_walks_of_all_cases() -> None:
-    (work,) = chunks_of(Dispatcher(slots=1, lanes=lambda: LANES), request(3))
+    (work,) = chunks_of(Dispatcher(slots=1, lanes=lambda _: LANES), request(3))
     assert work.chunk.parts == (Part(0, 0, 3), Part(1, 0, 3))
 
 
 def test_with_as_many_slots_as_cases_a_task_is_of_one_case() -> None:
-    works = chunks_of(Dispatcher(slots=2, lanes=lambda: LANES), request(3))
+    works = chunks_of(Dispatcher(slots=2, lanes=lambda _: LANES), request(3))
     assert {work.chunk.parts for work in works} == {(Part(0, 0, 3),), (Part(1, 0, 3),)}
 
 
@@ -201,21 +202,37 @@ def test_cases_without_walks_to_share_have_tasks_of_their_own() -> None:
         def __init__(self, case: Case) -> None:
             self.name, self.duration, self.robots = case.name, case.duration, case.robots
             self.objectives, self.run = case.objectives, case.run
+            self.precision = case.precision
 
     wanted = request(3)
     alone = replace(wanted, cases=tuple(Alone(case) for case in wanted.cases))
-    works = chunks_of(Dispatcher(slots=1, lanes=lambda: LANES), alone)
+    works = chunks_of(Dispatcher(slots=1, lanes=lambda _: LANES), alone)
     assert {work.chunk.parts for work in works} == {(Part(0, 0, 3),), (Part(1, 0, 3),)}
+
+
+def test_twice_as_many_lanes_are_filled_in_single_precision() -> None:
+    def lanes(precision: Precision) -> int:
+        return LANES if precision == "double" else 2 * LANES
+
+    wanted = request(3 * LANES)
+    case = wanted.cases[0]
+    assert isinstance(case, Walk)
+    single = replace(wanted, cases=(replace(case, precision="single"),))
+    works = chunks_of(Dispatcher(slots=4, lanes=lanes), single)
+    assert [work.chunk.parts for work in works] == [
+        (Part(0, 0, 2 * LANES),),
+        (Part(0, 2 * LANES, 3 * LANES),),
+    ]
 
 
 def test_the_interpreter_which_walks_alone_is_not_given_lanes_to_fill() -> None:
     slow = replace(request(5), provenance=NO_COMPILER)
-    (work,) = chunks_of(Dispatcher(slots=1, lanes=lambda: 64), slow)
+    (work,) = chunks_of(Dispatcher(slots=1, lanes=lambda _: 64), slow)
     assert work.chunk.cost == pytest.approx(5 * sum(case.duration for case in slow.cases))
 
 
 def test_the_next_iteration_of_a_job_is_cut_by_the_pace_of_the_last() -> None:
-    dispatcher = Dispatcher(slots=1, lanes=lambda: LANES)
+    dispatcher = Dispatcher(slots=1, lanes=lambda _: LANES)
     wanted = request(40)
     with ThreadPoolExecutor(1) as pool:
         under_way = pool.submit(dispatcher.evaluate, wanted, lambda: False)

@@ -98,7 +98,7 @@ class Embedded:
             try:
                 run_embedded(
                     store,
-                    lambda: self._opened(progress),
+                    lambda: self._opened(progress, stop),
                     job.id if claim is None else claim,
                     on_commit=committed,
                     on_retry=lambda seconds, why: progress.remark(
@@ -120,12 +120,14 @@ class Embedded:
             self._evaluator.close()
             self._evaluator = None
 
-    def _opened(self, progress: Progress) -> Evaluator:
+    def _opened(self, progress: Progress, stop: threading.Event) -> Evaluator:
         if self._evaluator is None:
             kind, address = self._settings.evaluator, self._settings.ray_address
-            if kind == "ray":
-                progress.remark("connecting to Ray" if address else "starting Ray")
-            self._evaluator = open_evaluator(kind, address=address, cpus=self._settings.cpus)
+            if kind == "ray" and address:
+                progress.remark("connecting to Ray")
+            self._evaluator = open_evaluator(
+                kind, address=address, cpus=self._settings.cpus, should_stop=stop.is_set
+            )
         return self._evaluator
 
 

@@ -119,8 +119,8 @@ class WorkerOptions:
     evaluator: Annotated[
         str | None,
         typer.Option(
-            help="ray, or in-process (threads of this process). [env: GAITSWARM_EVALUATOR; default:"
-            " ray]",
+            help="in-process: threads of this process; ray: the same, and Ray in long jobs or at an"
+            " address. [env: GAITSWARM_EVALUATOR; default: ray]",
         ),
     ] = None
     cpus: Annotated[
@@ -135,8 +135,7 @@ class WorkerOptions:
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Use this Ray cluster; else one is started, and ended. [env:"
-            " GAITSWARM_RAY_ADDRESS]",
+            help="Use this Ray cluster for all walks. [env: GAITSWARM_RAY_ADDRESS]",
         ),
     ] = None
 

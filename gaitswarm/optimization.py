@@ -113,10 +113,10 @@ def optimize(
             robot, compiler) has changed, which is then recorded with it.
         db: Database to keep the job in: a file, or a URL as for `gaitswarm.open`. None: that of
             the environment (GAITSWARM_DB), else the user's own.
-        evaluator: "in-process": threads of this process; "ray": a Ray cluster; or an evaluator
-            that is open already and stays so.
+        evaluator: "in-process": threads of this process; "ray": the same, and Ray in long jobs
+            or at `ray_address`; or an evaluator that is open already and stays so.
         cpus: Walks to compute at once on this machine; default all processors.
-        ray_address: A Ray cluster that runs already; without, one is started and ended.
+        ray_address: A Ray cluster that runs already, for all walks.
         on_iteration: Called after each iteration is committed, for progress.
         **options: Fields laid over the spec, see `SpecOptions`: name, robot, controller,
             scenarios, variables, fixed, preference, optimizer, particles, iterations, seed,

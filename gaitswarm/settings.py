@@ -36,7 +36,7 @@ class Settings(BaseSettings):
     )
     evaluator: EvaluatorKind = Field(default="ray", description="Where walks run.")
     ray_address: str | None = Field(
-        default=None, description="Ray cluster to use; one is started if there is none."
+        default=None, description="Ray cluster for all walks; else one is started in long jobs."
     )
     cpus: int | None = Field(
         default=None, ge=1, description="Walks to compute at once on this machine; default all."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import FrameType
@@ -16,32 +16,41 @@ from services.optimizer.run.runner import Runner
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 from services.worker import EvaluatorKind
+from services.worker.hybrid import HybridEvaluator
+from services.worker.in_process import InProcessEvaluator
+from services.worker.ray_evaluator import RayEvaluator
 
 
 def open_evaluator(
-    kind: EvaluatorKind = "ray", *, address: str | None = None, cpus: int | None = None
+    kind: EvaluatorKind = "ray",
+    *,
+    address: str | None = None,
+    cpus: int | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> Evaluator:
     """Open workers for walks.
 
     Args:
         kind: Where walks run.
-        address: Of a Ray cluster; None starts one that ends with this process.
+        address: Of a Ray cluster. Without one, walks run in this process at once, and long jobs on
+            a cluster that is started for them and ends with this process.
         cpus: Walks to compute at once on this machine; all of its cores by default.
+        should_stop: Polled several times a second while a cluster is connected.
 
     Returns:
         The workers; whoever opens them closes them.
 
     Raises:
-        EvaluatorUnavailable: They cannot be started or reached; says what to do.
+        EvaluatorUnavailable: They cannot be reached; says what to do.
+        EvaluationStopped: `should_stop` said so.
     """
     if kind == "in-process":
-        from services.worker.in_process import InProcessEvaluator  # noqa: PLC0415 - see below
-
         return InProcessEvaluator(cpus)
-    # Ray takes a second to import, which nobody who does not use it should wait for.
-    from services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
-
-    return RayEvaluator(address, cpus=cpus)
+    if address is None:
+        return HybridEvaluator(cpus)
+    cluster = RayEvaluator(address, cpus=cpus)
+    cluster.wait_until_open(should_stop)
+    return cluster
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,24 +77,27 @@ def open_runtime(
     cpus: int | None = None,
     concurrent_jobs: int = 2,
     lease_seconds: float = 30.0,
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Runtime]:
     """Open a database and run its queued jobs until the block is left; then close all.
 
     Args:
         database: URL for `open_store`.
         evaluator: Where walks run; None for a process that runs no jobs.
-        ray_address: Of a Ray cluster; None starts one that ends with this process.
+        ray_address: Of a Ray cluster, as for `open_evaluator`.
         cpus: Walks to compute at once on this machine; all of its cores by default.
         concurrent_jobs: Jobs to run at once.
         lease_seconds: After so long without a word from this process another one takes its jobs
             over [s].
+        should_stop: As for `open_evaluator`.
 
     Yields:
         What was opened.
 
     Raises:
         StoreUnavailable: The database cannot be opened.
-        EvaluatorUnavailable: The workers cannot be started or reached.
+        EvaluatorUnavailable: The workers cannot be reached.
+        EvaluationStopped: `should_stop` said so.
     """
     with ExitStack() as stack:
         store = open_store(database)
@@ -94,7 +106,7 @@ def open_runtime(
         if evaluator is None:
             yield Runtime(service, None, None)
             return
-        workers = open_evaluator(evaluator, address=ray_address, cpus=cpus)
+        workers = open_evaluator(evaluator, address=ray_address, cpus=cpus, should_stop=should_stop)
         stack.callback(workers.close)
         runner = Runner(store, workers, concurrency=concurrent_jobs, lease_seconds=lease_seconds)
         stack.callback(runner.stop)

@@ -9,6 +9,7 @@ import typer
 from cli.options import RunnerOptions, with_groups
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from contextlib import AbstractContextManager
 
     from gaitswarm.settings import Settings
@@ -83,24 +84,36 @@ def runner(options: RunnerOptions) -> None:
     """
     import logging
     import threading
+    from contextlib import suppress
     from dataclasses import asdict
 
     from cli.output import log_to_stderr
     from gaitswarm.settings import read_settings
+    from services.optimizer.run.evaluator import EvaluationStopped
     from services.runtime import stop_on_signals
 
     settings = read_settings(**asdict(options))
     log_to_stderr(settings.log_level)
     log = logging.getLogger(__name__)
     stop = threading.Event()
-    with stop_on_signals(stop), _runtime(settings) as opened:
+    # A stop while a cluster is connected ends the command before it is ready.
+    with (
+        suppress(EvaluationStopped),
+        stop_on_signals(stop),
+        _runtime(settings, should_stop=stop.is_set) as opened,
+    ):
         slots = opened.evaluator.slots if opened.evaluator else 0
         log.info("ready: %d slots, %d jobs at once", slots, settings.concurrent_jobs)
         stop.wait()
         log.info("stopping: jobs under way go back to the queue")
 
 
-def _runtime(settings: Settings, *, runs_jobs: bool = True) -> AbstractContextManager[Runtime]:
+def _runtime(
+    settings: Settings,
+    *,
+    runs_jobs: bool = True,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> AbstractContextManager[Runtime]:
     from gaitswarm.jobs.open import database_to_write
     from services.runtime import open_runtime
 
@@ -111,4 +124,5 @@ def _runtime(settings: Settings, *, runs_jobs: bool = True) -> AbstractContextMa
         cpus=settings.cpus,
         concurrent_jobs=settings.concurrent_jobs,
         lease_seconds=settings.lease_seconds,
+        should_stop=should_stop,
     )

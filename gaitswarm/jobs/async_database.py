@@ -103,7 +103,7 @@ class AsyncDatabaseJobs(AsyncJobs):
             job_id: Identifier of the job.
             evaluator: As for `DatabaseJobs.run`.
             cpus: Walks to compute at once on this machine; default all processors.
-            ray_address: A Ray cluster that runs already; without, one is started and ended.
+            ray_address: A Ray cluster that runs already, for all walks.
             accept_changes: Whether the job goes on although what its numbers depend on (code,
                 robot, compiler) has changed, which is then recorded with it.
             on_iteration: Called in the event loop after each iteration is committed.
@@ -114,7 +114,7 @@ class AsyncDatabaseJobs(AsyncJobs):
         Raises:
             Conflict: The job was cancelled.
             ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
-            EvaluatorUnavailable: Ray cannot be started or reached.
+            EvaluatorUnavailable: The cluster cannot be reached.
         """
         jobs = await self._jobs()
         stop = threading.Event()

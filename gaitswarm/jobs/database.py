@@ -141,10 +141,10 @@ class DatabaseJobs(Jobs):
 
         Args:
             job: Identifier of the job; or what `submit_embedded` answered.
-            evaluator: "in-process": threads of this process; "ray": a Ray cluster; or an evaluator
-                that is open already and stays so.
+            evaluator: "in-process": threads of this process; "ray": the same, and Ray in long
+                jobs or at `ray_address`; or an evaluator that is open already and stays so.
             cpus: Walks to compute at once on this machine; default all processors.
-            ray_address: A Ray cluster that runs already; without, one is started and ended.
+            ray_address: A Ray cluster that runs already, for all walks.
             accept_changes: Whether the job goes on although what its numbers depend on (code,
                 robot, compiler) has changed, which is then recorded with it.
             on_iteration: Called after each iteration is committed.
@@ -158,7 +158,7 @@ class DatabaseJobs(Jobs):
             Interrupted: Ctrl-C; says how to go on.
             Conflict: The job was cancelled.
             ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
-            EvaluatorUnavailable: Ray cannot be started or reached.
+            EvaluatorUnavailable: The cluster cannot be reached.
         """
         workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
         job_id = job if isinstance(job, str) else job.job.id

@@ -29,7 +29,7 @@ class Workers:
     Attributes:
         evaluator: A kind of workers to open, or workers that are open already.
         cpus: Walks to compute at once on this machine; all of its cores by default.
-        ray_address: Of a Ray cluster; None starts one that ends with this process.
+        ray_address: Of a Ray cluster, as for `open_evaluator`.
 
     Raises:
         InvalidRequest: The kind does not exist, or `cpus` is less than 1.
@@ -49,8 +49,13 @@ class Workers:
             raise InvalidRequest("must be at least 1", field="cpus")
 
     @contextmanager
-    def when_needed(self) -> Iterator[Evaluator | Callable[[], Evaluator]]:
+    def when_needed(
+        self, should_stop: Callable[[], bool]
+    ) -> Iterator[Evaluator | Callable[[], Evaluator]]:
         """Open workers no earlier than they are needed, and close those again.
+
+        Args:
+            should_stop: Polled while they are opened, which it ends with EvaluationStopped.
 
         Yields:
             Workers that are open already, or a function that opens them at its first call.
@@ -62,7 +67,11 @@ class Workers:
 
         def open_once() -> Evaluator:
             if not opened:
-                opened.append(open_evaluator(kind, address=self.ray_address, cpus=self.cpus))
+                opened.append(
+                    open_evaluator(
+                        kind, address=self.ray_address, cpus=self.cpus, should_stop=should_stop
+                    )
+                )
             return opened[0]
 
         try:
@@ -131,7 +140,7 @@ def run_here(
 
     stop = stop or threading.Event()
     try:
-        with _ctrl_c(stop) as interrupted, workers.when_needed() as evaluator:
+        with _ctrl_c(stop) as interrupted, workers.when_needed(stop.is_set) as evaluator:
             ended = run_embedded(
                 service.store,
                 evaluator,

@@ -5,4 +5,4 @@ from __future__ import annotations
 from typing import Literal
 
 EvaluatorKind = Literal["ray", "in-process"]
-"""Processes of a Ray cluster, or threads of this process."""
+"""Threads of this process, and Ray in long jobs or at an address; or threads throughout."""

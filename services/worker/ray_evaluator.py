@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import threading
 import time
@@ -10,7 +11,7 @@ from concurrent.futures import Future
 from typing import Any, Final
 
 from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationRequest
+from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from services.worker.dispatch import Dispatcher, Work
 from services.worker.preparation import KernelBuilder, awaited
 from services.worker.ray_session import RaySession, open_ray
@@ -36,21 +37,21 @@ _PULSE: Final = 4.0
 _PATIENCE: Final = 10.0
 """Seconds to wait for a connection that is to be closed, and may be busy being opened."""
 
+_PATIENCE_EMBEDDED: Final = 30.0
+"""The same for a cluster of our own, which opens sooner or later, however busy the machine is."""
+
 _log = logging.getLogger(__name__)
 
 
 class RayEvaluator:
     """`Evaluator` on Ray.
 
-    A cluster that was lost is opened again by the next `evaluate`, so that a caller who tries
-    again later, as the runner does, outlives it.
+    Ray is opened in a thread from construction on. A cluster that was lost is opened again by the
+    next `evaluate`, so that a caller who tries again later, as the runner does, outlives it.
 
     Args:
         address: As for `open_ray`.
         cpus: As for `open_ray`.
-
-    Raises:
-        EvaluatorUnavailable: Ray cannot be opened; says what to do.
     """
 
     def __init__(self, address: str | None = None, *, cpus: int | None = None) -> None:
@@ -60,18 +61,54 @@ class RayEvaluator:
         self._closed = False
         self._kernels = KernelBuilder()
         self._link = _Link(address, cpus)
-        try:
-            # Compiling and starting processes take seconds each, and can be done side by side.
-            simulate.prepare()
-            self._link.opened.result()
-        except BaseException:
-            self._link.close()
-            raise
 
     @property
     def slots(self) -> int:
-        """CPUs of the cluster."""
+        """CPUs of the cluster; waits until it is open."""
         return self._link.opened.result().slots
+
+    @property
+    def lost(self) -> bool:
+        """Whether the connection was lost, or could not be opened."""
+        return self._link.lost
+
+    def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
+        """Return when Ray is open; if it cannot be, or need not be any more, this is closed.
+
+        Args:
+            should_stop: Polled several times a second.
+
+        Raises:
+            EvaluatorUnavailable: Ray cannot be opened; says what to do.
+            EvaluationStopped: `should_stop` said so. What was begun ends by itself, at the latest
+                with the process.
+        """
+        try:
+            awaited(self._link.opened, should_stop)
+        except EvaluationStopped:
+            # Nobody can interrupt Ray while it connects, and whoever stops it need not wait.
+            atexit.register(self.close)
+            threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
+            raise
+        except BaseException:
+            self.close()
+            raise
+
+    def is_warm(self) -> bool:
+        """Whether Ray is open, and every slot had a process that has imported what walks need.
+
+        A connection that was lost begins to be opened again.
+
+        Raises:
+            EvaluatorUnavailable: Ray cannot be opened; says what to do.
+        """
+        link = self._link
+        if not link.opened.done():
+            return False
+        if link.opened.result().closed:
+            self._living_link()
+            return False
+        return link.warm.is_set()
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
@@ -104,13 +141,16 @@ class _Link:
     An embedded cluster dies with the thread that started it, so one thread does it all. A process
     has one connection at a time: a second is opened when the one before has been closed.
 
-    opened: what takes the requests, or what kept it from being opened.
+    opened: what takes the requests, or what kept it from being opened. warm: set when every slot's
+    process has imported what walks need.
     """
 
     def __init__(
         self, address: str | None, cpus: int | None, *, after: _Link | None = None
     ) -> None:
         self.opened: Future[Dispatcher] = Future()
+        self.warm = threading.Event()
+        self._patience = _PATIENCE if address else _PATIENCE_EMBEDDED
         self._closing = threading.Event()
         self._thread = threading.Thread(
             target=self._live, args=(address, cpus, after), name="ray-link", daemon=True
@@ -128,9 +168,9 @@ class _Link:
         """Disconnect, and wait until that is done, within reason. Idempotent."""
         self._closing.set()
         self._end()
-        self._thread.join(_PATIENCE)
+        self._thread.join(self._patience)
         if self._thread.is_alive():
-            _log.warning("Ray did not let go within %.0f s", _PATIENCE)
+            _log.warning("Ray did not let go within %.0f s", self._patience)
 
     def _end(self) -> None:
         """Let the pump end, if it is to and has begun."""
@@ -150,7 +190,7 @@ class _Link:
         self.opened.set_result(dispatcher)
         self._end()
         try:
-            _Pump(session, dispatcher).run()
+            _Pump(session, dispatcher, self.warm).run()
         except Exception as error:  # noqa: BLE001 - whatever Ray raises when it is going down
             _log.warning("Ray was lost: %s", error)
             dispatcher.close(f"Ray was lost: {error}")
@@ -161,9 +201,10 @@ class _Link:
 class _Pump:
     """Keeps Ray supplied with tasks, and collects what comes back."""
 
-    def __init__(self, session: RaySession, dispatcher: Dispatcher) -> None:
+    def __init__(self, session: RaySession, dispatcher: Dispatcher, warm: threading.Event) -> None:
         self._ray = session.ray
         self._dispatcher = dispatcher
+        self._warm = warm
         # Ray's own retries would run a task again behind our accounts.
         options = {"num_cpus": 1, "max_retries": 0}
         self._walk = session.ray.remote(**options)(run_in_worker)
@@ -182,7 +223,13 @@ class _Pump:
             self._send()
             self._collect()
             self._feel_pulse()
-        del starting
+            if not self._warm.is_set():
+                self._note_warmth(starting)
+
+    def _note_warmth(self, starting: list[Any]) -> None:
+        done, _ = self._ray.wait(starting, num_returns=len(starting), timeout=0.0)
+        if len(done) == len(starting):
+            self._warm.set()
 
     def _send(self) -> None:
         while len(self._flying) < self._most:

@@ -103,7 +103,13 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
         # A token is not shown to a cluster unless it is asked for.
         os.environ.setdefault("RAY_AUTH_MODE", "token")
     with _quiet():
-        import ray  # noqa: PLC0415 - its environment had to be set first
+        try:
+            import ray  # noqa: PLC0415 - its environment had to be set first
+        except ImportError as error:
+            raise EvaluatorUnavailable(
+                f"Ray cannot be imported: {_first_line(error)}; install it anew, or use the"
+                " in-process evaluator instead"
+            ) from error
 
         if ray.is_initialized():
             raise EvaluatorUnavailable("this process has a connection to Ray already")

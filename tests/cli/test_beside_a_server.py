@@ -34,7 +34,6 @@ def server(db: Path) -> Iterator[str]:
 def test_an_optimization_beside_a_server_of_its_database_keeps_its_job(
     small_spec: Path, db: Path, server: str
 ) -> None:
-    # Ray takes seconds to start, in which the server looks for queued jobs many times.
     process = start_python(*OPTIMIZE, "--spec", small_spec, "--db", db, "--cpus", "1", "--json")
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err

@@ -105,7 +105,7 @@ def test_an_optimization_whose_database_is_overwritten_with_garbage_does_not_end
     assert f"gaitswarm: database {db}" in err
 
 
-def test_an_optimization_on_embedded_ray_gives_the_same_bits_and_ends_quietly(
+def test_an_optimization_on_the_default_workers_gives_the_bits_of_threads_and_ends_quietly(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path, tmp_path: Path
 ) -> None:
     options = ("optimize", "--spec", small_spec, "--db", db, "--json")

@@ -108,6 +108,7 @@ def test_the_ask_is_stored_before_it_is_sent_out() -> None:
         sent.request.designs, SPEC.design_space().designs(first.ask.positions)
     )
     assert sent.request.cases == SPEC.cases({})
+    assert sent.request.iterations_left == SPEC.iterations - 1
 
 
 @pytest.mark.parametrize("crash_before", range(2 * SPEC.iterations + 1))

@@ -15,7 +15,7 @@ from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
-from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
+from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
 from services.optimizer.run.runner import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
@@ -146,6 +146,19 @@ def test_a_job_whose_workers_cannot_be_opened_is_queued(store: Store) -> None:
     with pytest.raises(EvaluatorUnavailable):
         run_embedded(store, opened, claim)
     assert store.job(claim.job.id).state is JobState.QUEUED
+
+
+def test_a_run_that_is_told_to_stop_while_its_workers_are_opened_leaves_the_job_queued(
+    store: Store,
+) -> None:
+    stop = threading.Event()
+
+    def opened() -> Evaluator:
+        stop.set()
+        raise EvaluationStopped
+
+    job = run_embedded(store, opened, submitted(store), stop=stop)
+    assert (job.state, job.progress.iterations) == (JobState.QUEUED, 0)
 
 
 def test_a_job_that_another_process_runs_is_followed_to_its_end(store: Store, told: Told) -> None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from typing import cast
 
-from services.runtime import EvaluatorKind, open_evaluator, open_store, run_embedded
+from services.runtime import open_evaluator, open_store, run_embedded
+from services.worker.ray_evaluator import RayEvaluator
 
 
 def main(url: str, job_id: str, kind: str) -> None:
     store = open_store(url)
-    evaluator = open_evaluator(cast("EvaluatorKind", kind), cpus=2)
+    # On Ray from the first walk on, however short the job is.
+    evaluator = RayEvaluator(cpus=2) if kind == "ray" else open_evaluator("in-process", cpus=2)
 
     def tell(done: object, state: object) -> None:
         sys.stdout.write(f"{state}\n")

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from services.optimizer.run.evaluator import Evaluator
+from services.worker.hybrid import HybridEvaluator
 from services.worker.in_process import InProcessEvaluator
 from services.worker.ray_evaluator import RayEvaluator
 
@@ -25,7 +26,14 @@ def in_process_evaluator() -> Iterator[InProcessEvaluator]:
     opened.close()
 
 
-@pytest.fixture(params=["in_process", pytest.param("ray", marks=pytest.mark.slow)])
+@pytest.fixture(scope="session")
+def hybrid_evaluator() -> Iterator[HybridEvaluator]:
+    opened = HybridEvaluator(2)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(params=["in_process", "hybrid", pytest.param("ray", marks=pytest.mark.slow)])
 def evaluator(request: pytest.FixtureRequest) -> Evaluator:
     """Every implementation of the port."""
     opened: Evaluator = request.getfixturevalue(f"{request.param}_evaluator")

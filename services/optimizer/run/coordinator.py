@@ -335,7 +335,7 @@ def _reevaluate(state: Coordination, done: CompletedIteration) -> Evaluate:
 
 
 def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> Evaluate:
-    job, _ = _current(state)
+    job, ask = _current(state)
     if state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
     return Evaluate(
@@ -344,6 +344,7 @@ def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> 
             cases=spec.cases(state.recordings),
             designs=spec.design_space().simulated(designs),
             provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
+            iterations_left=spec.iterations - ask.iteration - 1,
         )
     )
 

@@ -12,7 +12,7 @@ from services.optimizer.errors import GaitswarmError, LeaseLost
 from services.optimizer.jobs.iteration import CompletedIteration, Iteration
 from services.optimizer.jobs.job import Claim, Job, JobState
 from services.optimizer.run.coordinator import Backoff
-from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from services.optimizer.run.heartbeat import Heartbeat
 from services.optimizer.run.runner import OnCommit, OnRetry, Surroundings, run_claim, runner_name
 from services.optimizer.store.base import Store
@@ -64,6 +64,7 @@ def run_embedded(
     Args:
         store: Where the job is kept.
         evaluator: Where its walks run; or what opens that, called when the job is this process's.
+            It may raise EvaluationStopped when `stop` is set.
         job: Its id; or the claim of a process that has submitted it for itself.
         on_commit: Called after an iteration that this process has stored.
         on_retry: Called before a wait for the workers.
@@ -149,9 +150,14 @@ class _EmbeddedRun:
         self._catch_up()
         if self.following:
             self.on_news(_FREE)
+        try:
+            evaluator = self._opened(claim)
+        except EvaluationStopped:
+            self.job = self.store.job(self.job.id)
+            return
         around = Surroundings(
             self.store,
-            self._opened(claim),
+            evaluator,
             lease_seconds=EMBEDDED_LEASE_SECONDS,
             backoff=self.backoff,
             on_commit=self._committed,

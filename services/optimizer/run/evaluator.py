@@ -23,12 +23,14 @@ class EvaluationRequest:
         cases: What every design is put to.
         designs: (n, v) float64.
         provenance: That of the process that asks; the outcomes are to have it.
+        iterations_left: Iterations of the job that follow this one, as far as is known.
     """
 
     job_id: str
     cases: tuple[Case, ...]
     designs: NDArray[np.float64]
     provenance: Provenance
+    iterations_left: int = 0
 
 
 class Evaluator(Protocol):

@@ -1,0 +1,92 @@
+"""Lets Ray take over from threads, in a process of its own, and loses or closes it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+from services.worker.hybrid import HybridEvaluator
+from services.worker.tasks import Task, cut
+from sim import simulate
+from tests.examples.processes import eventually, within
+from tests.worker.processes import descendants
+from tests.worker.requests import bits, never, request, walked_at_once
+
+WANTED = replace(request(100), iterations_left=1)
+
+
+def take_over() -> str:
+    evaluator = HybridEvaluator(2, long_job_seconds=0.0)
+    durations = [case.duration for case in WANTED.cases]
+    chunks = cut(durations, len(WANTED.designs), slots=2, lanes=simulate.lanes())
+    expected = bits(walked_at_once(WANTED))
+    # Chunks that were walked in this process.
+    with patch.object(Task, "run", autospec=True, side_effect=Task.run) as here:
+        requests = 0
+        while not evaluator.on_ray:
+            here.reset_mock()
+            assert bits(evaluator.evaluate(WANTED, never)) == expected
+            requests += 1
+            # All of a request's chunks; or none, if Ray took over a moment ago.
+            assert here.call_count == len(chunks) or evaluator.on_ray
+        assert requests > 1
+        here.reset_mock()
+        assert bits(evaluator.evaluate(WANTED, never)) == expected
+        assert here.call_count == 0
+    evaluator.close()
+    return "took over"
+
+
+def lose() -> str:
+    evaluator = HybridEvaluator(1, long_job_seconds=0.0)
+    expected = bits(evaluator.evaluate(WANTED, never))
+    eventually(lambda: evaluator.on_ray)
+    assert bits(evaluator.evaluate(WANTED, never)) == expected
+    for process in descendants(os.getpid()):
+        if "gcs_server" in process.title:
+            os.kill(process.pid, signal.SIGKILL)
+
+    def lost() -> bool:
+        assert bits(evaluator.evaluate(WANTED, never)) == expected
+        return not evaluator.on_ray
+
+    eventually(lost)
+    eventually(lambda: evaluator.on_ray)
+    assert bits(evaluator.evaluate(WANTED, never)) == expected
+    evaluator.close()
+    return "here, then on Ray again"
+
+
+def close(state: str) -> str:
+    evaluator = HybridEvaluator(1, long_job_seconds=0.0)
+    left = 0 if state == "in threads" else 1
+    evaluator.evaluate(replace(WANTED, iterations_left=left), never)
+    if state == "while Ray is started":
+        eventually(lambda: bool(descendants(os.getpid())))
+    if state == "on Ray":
+        eventually(lambda: evaluator.on_ray)
+        evaluator.evaluate(WANTED, never)
+    evaluator.close()
+    mine = f"gaitswarm-ray-{os.getpid()}-*"
+    assert within(10.0, lambda: not descendants(os.getpid()))
+    assert not list(Path(tempfile.gettempdir()).glob(mine))
+    return "nothing left"
+
+
+def main(what: str, *arguments: str) -> None:
+    if what == "take-over":
+        told = take_over()
+    elif what == "lose":
+        told = lose()
+    else:
+        told = close(*arguments)
+    sys.stdout.write(f"{told}\n")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -9,9 +9,10 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
-from typing import TextIO, cast
+from typing import Any, TextIO, cast
 
 import typer
+from typer.core import TyperGroup
 
 from cli.commands import (
     bench,
@@ -34,8 +35,36 @@ from cli.commands import (
 from cli.exit_codes import ExitCode, exit_code, explanation
 from cli.output import OutputClosed, Stdout, note, replace_closed_streams, warnings_as_notes
 
+
+class _HelpAtOnce(TyperGroup):
+    """Shows a command's help before anything is parsed: Typer imports Pydantic to read options."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse arguments, unless a command's help is among them."""
+        words = args[: args.index("--")] if "--" in args else args
+        if not set(words).isdisjoint(ctx.help_option_names):
+            command, context = self._command_named(ctx, words)
+            if command is not None:
+                typer.echo(command.get_help(context), color=ctx.color)
+                ctx.exit()
+        return list(super().parse_args(ctx, args))
+
+    def _command_named(self, context: Any, words: list[str]) -> tuple[Any, Any]:
+        """The innermost command that is named, with its context; None where one is unknown."""
+        command: Any = self
+        for word in words:
+            if word.startswith("-") or not isinstance(command, TyperGroup):
+                break
+            command = command.get_command(context, word)
+            if command is None:
+                break
+            context = typer.Context(command, parent=context, info_name=word)
+        return command, context
+
+
 app = typer.Typer(
     name="gaitswarm",
+    cls=_HelpAtOnce,
     help="Find robust drive controllers for walking robots.",
     epilog="Exit codes: 0 done, 1 job failed or cancelled, 2 bad input, 3 not found, 4 not possible"
     " in the job's state, 5 server, database, workers or output unavailable, 70 a bug, 130"

@@ -18,8 +18,24 @@ HEAVY = (
 
 
 @pytest.mark.slow
-def test_help_imports_none_of_the_heavy_packages() -> None:
-    assert loaded_by("from cli.main import run; assert run(['--help']) == 0", HEAVY) == set()
+@pytest.mark.parametrize("of", [[], ["optimize"], ["serve"], ["study", "noise"]])
+def test_help_imports_none_of_the_heavy_packages(of: list[str]) -> None:
+    statements = f"from cli.main import run; assert run({[*of, '--help']}) == 0"
+    assert loaded_by(statements, HEAVY) == set()
+
+
+def test_help_is_that_of_the_innermost_command_wherever_it_is_asked_for(
+    gaitswarm: Gaitswarm,
+) -> None:
+    for words in ("study noise --help", "study noise --kind torque -h", "study -h noise"):
+        shown = gaitswarm(*words.split())
+        assert (shown.code, shown.err) == (0, "")
+        assert shown.out.startswith(f"Usage: gaitswarm {words.partition(' -')[0]} ")
+
+
+def test_help_after_two_dashes_is_an_argument(gaitswarm: Gaitswarm) -> None:
+    result = gaitswarm("status", "--", "--help")
+    assert (result.code, result.out) == (ExitCode.NOT_FOUND, "")
 
 
 def test_help_documents_the_exit_codes(gaitswarm: Gaitswarm) -> None:
@@ -28,7 +44,9 @@ def test_help_documents_the_exit_codes(gaitswarm: Gaitswarm) -> None:
     assert documented - {ExitCode.BUG} == set(ExitCode) - {ExitCode.BUG}
 
 
-@pytest.mark.parametrize("arguments", [["fly"], ["status"], ["list", "--limit", "none"]])
+@pytest.mark.parametrize(
+    "arguments", [["fly"], ["fly", "--help"], ["status"], ["list", "--limit", "none"]]
+)
 def test_wrong_usage_is_exit_code_2(gaitswarm: Gaitswarm, arguments: list[str]) -> None:
     result = gaitswarm(*arguments)
     assert result.code == 2

@@ -11,14 +11,17 @@ from pathlib import Path
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.store import engine as engine_module
+from services.optimizer.store import migrate as migrations
 from services.optimizer.store.engine import Database, connect, parse_url
 from services.optimizer.store.migrate import head, lock_for_migration
 from services.optimizer.store.sql_store import SqlStore, open_store
 from services.optimizer.store.tables import metadata
+from tests.examples.processes import loaded_by
 from tests.store.examples import LEASE, spec
 from tests.store.postgres_server import postgres_binaries
 
@@ -86,6 +89,19 @@ def test_the_migrations_make_exactly_the_tables_that_the_code_uses(fresh_url: st
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, metadata) == []
     database.close()
+
+
+def test_the_newest_revision_is_the_head_of_all_migrations() -> None:
+    scripts = ScriptDirectory(Path(migrations.__file__).with_name("migrations"))
+    assert scripts.get_heads() == [head()]
+    assert len({script.revision for script in scripts.walk_revisions()}) == int(head())
+
+
+@pytest.mark.slow
+def test_a_database_that_is_up_to_date_is_opened_without_alembic(tmp_path: Path) -> None:
+    opened = f"from services.runtime import open_store; open_store({str(tmp_path / 'jobs.db')!r})"
+    assert loaded_by(opened, ["alembic", "sqlalchemy"]) == {"alembic", "sqlalchemy"}
+    assert loaded_by(opened, ["alembic", "sqlalchemy"]) == {"sqlalchemy"}
 
 
 def test_a_database_of_a_newer_gaitswarm_is_left_alone(fresh_url: str) -> None:

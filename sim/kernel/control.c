@@ -95,32 +95,63 @@ static dvec place(const Axis *a, int h, dvec x)
   return clamp(half_up(x * a->gain[h]) + a->middle[h], DSPLAT(0.0), a->last[h]) * a->stride[h];
 }
 
-static dvec look_up(const Tables *t, int h, dvec error, dvec current, dvec change)
-{
-  const dvec at =
-      place(&t->error, h, error) + place(&t->current, h, current) + place(&t->velocity, h, change);
-  dvec value;
-  for (int k = 0; k < DOUBLES; k++) value[k] = t->values[h * DOUBLES + k][(int64_t)at[k]];
-  return value * t->output_gain[h];
-}
+/* Coded angle errors, their change since the tick before, and absolute currents. */
+typedef struct {
+  wide error[NJ], change[NJ], current[NJ];
+} Readings;
 
-/* Controllers of joint j: coded error and current to PWM counts (thesis 5.3). */
-static dvec control(Control *s, const Coding *c, int j, int h, dvec error, dvec current)
+/* All joints at once: lanes' numbers are written and read apart, which stalls if it follows at once. */
+static void look_up(const Tables *t, const Readings *r, wide *output)
 {
-  const dvec full = DSPLAT(c->pwm_counts);
-  const dvec change = (dvec)((divec)(error - s->error[j][h]) & s->begun[h]);
-  dvec direct = error * s->proportional_gain[h] + change * s->derivative_gain[h];
-  dvec grown = s->integral[j][h] + error * s->integral_gain[h];
-  if (s->direct.used) direct += look_up(&s->direct, h, error, current, change);
-  if (s->integrated.used) grown += look_up(&s->integrated, h, error, current, change);
-  s->error[j][h] = error;
-  s->integral[j][h] = clamp(grown, -full, full);
-  const dvec output = clamp(half_up(direct) + half_up(s->integral[j][h]), -full, full);
-  return clamp(coarsen(output, c->pwm_step), -full, full);
+  wide at[NJ];
+  for (int j = 0; j < NJ; j++)
+    for (int h = 0; h < HALVES; h++)
+      at[j][h] = place(&t->error, h, r->error[j][h]) + place(&t->current, h, r->current[j][h]) +
+                 place(&t->velocity, h, r->change[j][h]);
+  for (int j = 0; j < NJ; j++)
+    for (int k = 0; k < LANES; k++)
+      OF_LANE(output[j], k) = t->values[k][(int64_t)OF_LANE(at[j], k)];
+  for (int j = 0; j < NJ; j++)
+    for (int h = 0; h < HALVES; h++) output[j][h] *= t->output_gain[h];
 }
 
 /* A diverged lane reads nonsense; the bounds keep it inside the tables. */
 static dvec code_of(dvec reading, double counts, double low, double high, int64_t step)
 {
   return coarsen(dvec_round(clamp(reading * DSPLAT(counts), DSPLAT(low), DSPLAT(high))), step);
+}
+
+/* Joint j's readings from its encoder and its current's sensor. */
+static void read_joint(Readings *r, const Control *s, const Coding *c, int j, int h, dvec angle,
+                       dvec current, dvec desired)
+{
+  const dvec limit = DSPLAT(CODE_LIMIT);
+  const dvec code =
+      code_of(angle, c->angle_counts, -4 * CODE_LIMIT, 4 * CODE_LIMIT, c->angle_step);
+  r->error[j][h] = clamp(desired - code, -limit, limit);
+  r->change[j][h] = (dvec)((divec)(r->error[j][h] - s->error[j][h]) & s->begun[h]);
+  r->current[j][h] = code_of(current, c->current_counts, 0, CODE_LIMIT, c->current_step);
+}
+
+/* PWM counts of all joints (thesis 5.3). */
+static void control(Control *s, const Coding *c, const Readings *r, wide *counts)
+{
+  const dvec full = DSPLAT(c->pwm_counts);
+  wide direct[NJ], integrated[NJ];
+  if (s->direct.used) look_up(&s->direct, r, direct);
+  else memset(direct, 0, sizeof direct);
+  if (s->integrated.used) look_up(&s->integrated, r, integrated);
+  else memset(integrated, 0, sizeof integrated);
+  for (int j = 0; j < NJ; j++)
+    for (int h = 0; h < HALVES; h++) {
+      const dvec error = r->error[j][h];
+      const dvec now = error * s->proportional_gain[h] +
+                       r->change[j][h] * s->derivative_gain[h] + direct[j][h];
+      const dvec grown = s->integral[j][h] + error * s->integral_gain[h] + integrated[j][h];
+      s->error[j][h] = error;
+      s->integral[j][h] = clamp(grown, -full, full);
+      const dvec output = clamp(half_up(now) + half_up(s->integral[j][h]), -full, full);
+      counts[j][h] = clamp(coarsen(output, c->pwm_step), -full, full);
+    }
+  memset(s->begun, -1, sizeof s->begun);
 }

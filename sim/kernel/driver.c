@@ -37,11 +37,11 @@ typedef struct {
   int walking[LANES];
   int64_t tick[LANES];
   int now; /* of the two states */
-  wide q[2][NQ];
+  dvec q[2][HALVES][NQ];
   vec v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
-  wide timestep, motor[NJ]; /* motors' angles, where reals do not keep their small increments */
+  dvec timestep[HALVES], motor[HALVES][NJ]; /* motors' angles, where reals do not keep their small increments */
   Control control;
-  int filtered, disturbed; /* whether any lane's current or links are */
+  int filtered; /* whether any lane's current has been */
   vec sensed[NJ], smoothing;
   wide sums[N_INTEGRANDS];
   vec peak;
@@ -58,21 +58,20 @@ static void enter(Lanes *s, int k, Walker *w)
   s->walker[k] = w;
   s->walking[k] = 1;
   s->tick[k] = 0;
-  for (int i = 0; i < NQ; i++) OF_LANE(s->q[s->now][i], k) = w->q0[i];
+  for (int i = 0; i < NQ; i++) s->q[s->now][k / DOUBLES][i][k % DOUBLES] = w->q0[i];
   for (int i = 0; i < NV; i++) s->v[s->now][i][k] = 0;
   for (int i = 0; i < NI; i++) s->internal[s->now][i][k] = (real)w->internal_state[i];
   for (int i = 0; i < NP; i++) s->p[i][k] = (real)w->parameters[i];
   for (int i = 0; i < N_INTEGRANDS; i++) OF_LANE(s->sums[i], k) = 0.0;
   for (int j = 0; j < NJ; j++) {
     s->current[j][k] = s->sensed[j][k] = s->disturbance[j][k] = 0;
-    OF_LANE(s->motor[j], k) = BACKLASH ? w->internal_state[j] : 0.0;
+    s->motor[k / DOUBLES][j][k % DOUBLES] = BACKLASH ? w->internal_state[j] : 0.0;
   }
   s->peak[k] = 0;
   s->smoothing[k] = (real)w->current_smoothing;
   OF_LANE(s->timestep, k) = w->parameters[TIMESTEP];
   set_control(&s->control, k, &w->law);
   if (w->current_smoothing < 1.0) s->filtered = 1;
-  if (w->disturbance) s->disturbed = 1;
 }
 
 static void leave(Lanes *s, int k, int64_t status)
@@ -80,7 +79,7 @@ static void leave(Lanes *s, int k, int64_t status)
   Walker *w = s->walker[k];
   w->status = status;
   for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = OF_LANE(s->sums[i], k);
-  for (int i = 0; i < NQ; i++) w->end[i] = OF_LANE(s->q[s->now][i], k);
+  for (int i = 0; i < NQ; i++) w->end[i] = s->q[s->now][k / DOUBLES][i][k % DOUBLES];
   w->peak_current = s->peak[k];
   s->walking[k] = 0;
 }
@@ -88,9 +87,9 @@ static void leave(Lanes *s, int k, int64_t status)
 static dvec encoder(const Lanes *s, int j, int h)
 {
 #if !BACKLASH
-  return s->q[s->now][7 + j][h];
+  return s->q[s->now][h][7 + j];
 #elif defined(SINGLE)
-  return s->motor[j][h];
+  return s->motor[h][j];
 #else
   return vec_widened(&s->internal[s->now][j], h);
 #endif
@@ -99,30 +98,25 @@ static dvec encoder(const Lanes *s, int j, int h)
 static void control_tick(Lanes *s, const Coding *c)
 {
   const vec *current = s->filtered ? s->sensed : s->current;
-  const dvec limit = DSPLAT(CODE_LIMIT);
-  const int32_t *desired[LANES];
+  wide desired[NJ], counts[NJ];
+  Readings readings;
   for (int k = 0; k < LANES; k++) {
     const Walker *w = s->walker[k];
     const int64_t row = (s->tick[k] < w->ticks ? s->tick[k] : w->ticks - 1) * NJ;
-    desired[k] = w->desired + row;
-    if (s->disturbed && w->disturbance)
+    for (int j = 0; j < NJ; j++) OF_LANE(desired[j], k) = w->desired[row + j];
+    if (w->disturbance)
       for (int j = 0; j < NJ; j++) s->disturbance[j][k] = (real)w->disturbance[row + j];
   }
   for (int j = 0; j < NJ; j++) {
-    const vec load = vec_abs(current[j]);
-    for (int h = 0; h < HALVES; h++) {
-      dvec wanted;
-      for (int k = 0; k < DOUBLES; k++) wanted[k] = desired[h * DOUBLES + k][j];
-      const dvec angle = code_of(encoder(s, j, h), c->angle_counts, -4 * CODE_LIMIT,
-                                 4 * CODE_LIMIT, c->angle_step);
-      const dvec amperes = code_of(vec_widened(&load, h), c->current_counts, 0, CODE_LIMIT,
-                                   c->current_step);
-      const dvec error = clamp(wanted - angle, -limit, limit);
-      const dvec counts = control(&s->control, c, j, h, error, amperes);
-      vec_narrow(&s->duty[j], h, counts * DSPLAT(c->duty_per_count));
-    }
+    const vec absolute = vec_abs(current[j]);
+    for (int h = 0; h < HALVES; h++)
+      read_joint(&readings, &s->control, c, j, h, encoder(s, j, h), vec_widened(&absolute, h),
+                 desired[j][h]);
   }
-  memset(s->control.begun, -1, sizeof s->control.begun);
+  control(&s->control, c, &readings, counts);
+  for (int j = 0; j < NJ; j++)
+    for (int h = 0; h < HALVES; h++)
+      vec_narrow(&s->duty[j], h, counts[j][h] * DSPLAT(c->duty_per_count));
 }
 
 static void write_log(const Lanes *s)
@@ -130,7 +124,7 @@ static void write_log(const Lanes *s)
   for (int k = 0; k < LANES; k++) {
     if (!s->walker[k]->log || !s->walking[k]) continue;
     double *row = s->walker[k]->log + s->tick[k] * NLOG;
-    for (int i = 0; i < NQ; i++) *row++ = OF_LANE(s->q[s->now][i], k);
+    for (int i = 0; i < NQ; i++) *row++ = s->q[s->now][k / DOUBLES][i][k % DOUBLES];
     for (int i = 0; i < NV; i++) *row++ = s->v[s->now][i][k];
     for (int i = 0; i < NI; i++) *row++ = s->internal[s->now][i][k];
     for (int i = 0; i < NJ; i++) *row++ = s->duty[i][k];
@@ -155,11 +149,11 @@ static void unfiltered(vec *sensed, const vec *current, vec smoothing)
 /* Lanes whose state is finite; x - x is zero for a finite x only. */
 static divec all_finite(const Lanes *s, int h)
 {
-  const wide *q = s->q[s->now];
+  const dvec *q = s->q[s->now][h];
   const vec *v = s->v[s->now], *internal = s->internal[s->now];
   dvec precise = DSPLAT(0.0);
   vec residue = SPLAT(0.0);
-  for (int i = 0; i < NQ; i++) precise += q[i][h] - q[i][h];
+  for (int i = 0; i < NQ; i++) precise += q[i] - q[i];
   for (int i = 0; i < NV; i++) residue += v[i] - v[i];
   for (int i = 0; i < NI; i++) residue += internal[i] - internal[i];
   return precise + vec_widened(&residue, h) == DSPLAT(0.0);
@@ -170,17 +164,17 @@ static divec all_finite(const Lanes *s, int h)
    small for floats, so they are kept, and grow, in doubles. */
 static void drift(Lanes *s, int h)
 {
-  const wide *q = s->q[s->now];
-  wide *after = s->q[1 - s->now];
+  const dvec *q = s->q[s->now][h];
+  dvec *after = s->q[1 - s->now][h];
   const vec *v = s->v[1 - s->now];
   const dvec dt = s->timestep[h], half = DSPLAT(0.5) * dt, one = DSPLAT(1.0);
-  const dvec x = q[3][h], y = q[4][h], z = q[5][h], w = q[6][h];
+  const dvec x = q[3], y = q[4], z = q[5], w = q[6];
   const dvec vx = vec_widened(&v[0], h), vy = vec_widened(&v[1], h), vz = vec_widened(&v[2], h);
   const dvec tx = DSPLAT(2.0) * (y * vz - z * vy), ty = DSPLAT(2.0) * (z * vx - x * vz),
              tz = DSPLAT(2.0) * (x * vy - y * vx);
-  after[0][h] = q[0][h] + dt * (vx + w * tx + (y * tz - z * ty));
-  after[1][h] = q[1][h] + dt * (vy + w * ty + (z * tx - x * tz));
-  after[2][h] = q[2][h] + dt * (vz + w * tz + (x * ty - y * tx));
+  after[0] = q[0] + dt * (vx + w * tx + (y * tz - z * ty));
+  after[1] = q[1] + dt * (vy + w * ty + (z * tx - x * tz));
+  after[2] = q[2] + dt * (vz + w * tz + (x * ty - y * tx));
   dvec a = half * vec_widened(&v[3], h), b = half * vec_widened(&v[4], h),
        c = half * vec_widened(&v[5], h);
   const dvec square = a * a + b * b + c * c;
@@ -192,13 +186,13 @@ static void drift(Lanes *s, int h)
   const dvec length = turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] +
                       turned[3] * turned[3];
   const dvec correction = DSPLAT(1.5) - DSPLAT(0.5) * length;
-  for (int i = 0; i < 4; i++) after[3 + i][h] = turned[i] * correction;
-  for (int j = 0; j < NJ; j++) after[7 + j][h] = q[7 + j][h] + dt * vec_widened(&v[6 + j], h);
+  for (int i = 0; i < 4; i++) after[3 + i] = turned[i] * correction;
+  for (int j = 0; j < NJ; j++) after[7 + j] = q[7 + j] + dt * vec_widened(&v[6 + j], h);
 #if BACKLASH
   vec *internal = s->internal[1 - s->now];
   for (int j = 0; j < NJ; j++) {
-    s->motor[j][h] += dt * vec_widened(&internal[NJ + j], h);
-    vec_narrow(&internal[j], h, s->motor[j][h]);
+    s->motor[h][j] += dt * vec_widened(&internal[NJ + j], h);
+    vec_narrow(&internal[j], h, s->motor[h][j]);
   }
 #endif
 }
@@ -211,7 +205,7 @@ static void advance(Lanes *s, vec *integrands, vec *largest)
 #ifdef SINGLE
   vec q[NQ], unused[NQ];
   for (int i = 0; i < NQ; i++)
-    for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[now][i][h]);
+    for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[now][h][i]);
   step(q, s->v[now], s->internal[now], s->duty, s->disturbance, s->p, unused, s->v[next],
        s->internal[next], s->current, integrands, largest);
   for (int h = 0; h < HALVES; h++) drift(s, h);
@@ -239,8 +233,8 @@ static int end_tick(Lanes *s)
 {
   int walked = 0;
   for (int h = 0; h < HALVES; h++) {
-    const wide *q = s->q[s->now];
-    const dvec qx = q[3][h], qy = q[4][h], height = q[2][h];
+    const dvec *q = s->q[s->now][h];
+    const dvec qx = q[3], qy = q[4], height = q[2];
     const dvec upright = DSPLAT(1.0) - DSPLAT(2.0) * (qx * qx + qy * qy);
     const divec sound = all_finite(s, h);
     for (int n = 0; n < DOUBLES; n++) {

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from services.worker.pace import Pace
+from services.worker.pace import LONGEST_UNMEASURED, Pace
 from sim.kernel.lanes import plan_lanes
 
 _TASKS_PER_SLOT: Final = 3
@@ -118,9 +118,12 @@ def _across_cases(
     """
     total = designs * sum(durations)
     shortest, longest = pace.bounds()
+    block = lanes * max(durations)
     # Rounded, so that nearly the same pace gives the same cut, which is then known.
-    longest = max(2.0 ** (0.25 * math.floor(4.0 * math.log2(longest))), lanes * max(durations))
-    shortest = min(max(shortest, lanes * max(durations)), longest)
+    longest = 2.0 ** (0.25 * math.floor(4.0 * math.log2(longest)))
+    # Of one walk a lane, a kernel cannot refill; of two, it leaves some 5 % idle and not 20.
+    longest = max(longest, block, min(2.0 * block, LONGEST_UNMEASURED))
+    shortest = min(max(shortest, block), longest)
     cuts = [
         _cut_walks(durations, designs, lanes, _rounds(total, slots, share, shortest, longest))
         for share in _ROUND_SHARES

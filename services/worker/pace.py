@@ -17,7 +17,7 @@ _OVERHEAD_SHARE: Final = 0.05
 """Of a task's time, that it takes to send it and its answer, if its job is large enough."""
 
 _SHORTEST_UNMEASURED: Final = 10.0
-_LONGEST_UNMEASURED: Final = 256.0
+LONGEST_UNMEASURED: Final = 256.0
 """Simulated seconds in a task, as long as nothing was measured: a job's first iteration."""
 
 
@@ -79,7 +79,7 @@ class Pace:
     def bounds(self) -> tuple[float, float]:
         """Least and largest cost of a task that is worth sending and ends soon [simulated s]."""
         if not self.seconds:
-            return _SHORTEST_UNMEASURED, _LONGEST_UNMEASURED
+            return _SHORTEST_UNMEASURED, LONGEST_UNMEASURED
         longest = _LONGEST_SECONDS / self.seconds
         return min(self.overhead / _OVERHEAD_SHARE / self.seconds, longest), longest
 

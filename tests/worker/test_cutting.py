@@ -98,7 +98,7 @@ def test_the_more_the_paces_differ_the_more_is_left_for_short_tasks_at_the_end()
 
 @pytest.mark.parametrize("slots", [1, 2, 8])
 def test_a_task_of_a_big_job_takes_a_second_at_the_pace_that_was_measured(slots: int) -> None:
-    for seconds in (1e-4, 1e-3, 1e-2):
+    for seconds in (1e-4, 1e-3, 3e-3):
         chunks = cut(DURATIONS, 3000, slots=slots, lanes=8, pace=Pace(seconds, 5e-3, 0.02))
         longest = max(chunk.cost for chunk in chunks) * seconds
         assert 0.3 <= longest <= 1.1
@@ -128,3 +128,11 @@ def test_half_of_what_is_known_of_the_pace_is_of_the_last_iteration() -> None:
     pace = Pace().after([TaskTime(10.0, 1.0, 0.5)]).after([TaskTime(10.0, 3.0, 0.1)])
     assert (pace.seconds, pace.overhead, pace.spread) == pytest.approx((0.2, 0.3, 0.0))
     assert pace.after([]) == pace
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0, 120.0, 250.0])
+@pytest.mark.parametrize("lanes", [4, 8, 16])
+def test_a_slow_robot_leaves_at_most_a_tenth_of_the_lanes_idle(rate: float, lanes: int) -> None:
+    """At so many simulated seconds a second, tasks of a second have few walks in each lane."""
+    chunks = cut(DURATIONS, 25, slots=2, lanes=lanes, pace=Pace(1.0 / rate, 5e-3, 0.02))
+    assert SWARM_SECONDS / math.fsum(chunk.cost for chunk in chunks) >= 0.9

@@ -250,4 +250,4 @@ def test_the_next_iteration_of_a_job_is_cut_by_the_pace_of_the_last() -> None:
     second = chunks_of(dispatcher, wanted)
     longest = LANES * max(case.duration for case in wanted.cases)
     assert max(work.chunk.cost for work in first) > 10.0 * longest
-    assert max(work.chunk.cost for work in second) < 1.5 * longest
+    assert max(work.chunk.cost for work in second) < 3.0 * longest

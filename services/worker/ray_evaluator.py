@@ -26,7 +26,10 @@ _ATTEMPTS: Final = 4
 """How often a task is sent out whose worker died."""
 
 _GLANCE: Final = 0.02
-"""Seconds between looks for new work, while there is room for it."""
+"""Seconds between looks for new work, while a slot is free."""
+
+_GLANCE_AHEAD: Final = 0.1
+"""The same while all slots are taken, and new work would only lie at hand."""
 
 _IDLE: Final = 0.5
 """Seconds between looks at whether it is time to end."""
@@ -241,7 +244,10 @@ class _Pump:
     def _collect(self) -> None:
         if not self._flying:
             return
-        patience = _GLANCE if len(self._flying) < self._most else _IDLE
+        patience = _IDLE
+        if len(self._flying) < self._most:
+            all_run = len(self._flying) >= self._dispatcher.slots
+            patience = _GLANCE_AHEAD if all_run else _GLANCE
         done, _ = self._ray.wait(list(self._flying), num_returns=1, timeout=patience)
         for reference in done:
             self._settle(reference, self._flying.pop(reference))

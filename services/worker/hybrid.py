@@ -97,7 +97,7 @@ class HybridEvaluator:
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
         # Built before the clock is started: what takes long only once says nothing of the job.
-        self._kernels.build((robot for case in request.cases for robot in case.robots), should_stop)
+        self._kernels.build(request.cases, should_stop)
         begun = time.monotonic()
         outcomes = self._threads.evaluate(request, should_stop)
         if (time.monotonic() - begun) * request.iterations_left > self._long_job_seconds:

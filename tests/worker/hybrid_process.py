@@ -11,8 +11,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 from services.worker.hybrid import HybridEvaluator
-from services.worker.tasks import Task, cut
-from sim import simulate
+from services.worker.tasks import Task
 from tests.examples.processes import eventually, within
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request, walked_at_once
@@ -22,18 +21,18 @@ WANTED = replace(request(100), iterations_left=1)
 
 def take_over() -> str:
     evaluator = HybridEvaluator(2, long_job_seconds=0.0)
-    durations = [case.duration for case in WANTED.cases]
-    chunks = cut(durations, len(WANTED.designs), slots=2, lanes=simulate.lanes())
+    wanted = len(WANTED.cases) * len(WANTED.designs)
     expected = bits(walked_at_once(WANTED))
-    # Chunks that were walked in this process.
+    # Tasks that were run in this process.
     with patch.object(Task, "run", autospec=True, side_effect=Task.run) as here:
         requests = 0
         while not evaluator.on_ray:
             here.reset_mock()
             assert bits(evaluator.evaluate(WANTED, never)) == expected
             requests += 1
-            # All of a request's chunks; or none, if Ray took over a moment ago.
-            assert here.call_count == len(chunks) or evaluator.on_ray
+            parts = [part for call in here.call_args_list for part in call.args[0].parts]
+            # All of a request's walks; or none, if Ray took over a moment ago.
+            assert sum(part.stop - part.start for part in parts) == wanted or evaluator.on_ray
         assert requests > 1
         here.reset_mock()
         assert bits(evaluator.evaluate(WANTED, never)) == expected

@@ -16,6 +16,7 @@ from services.worker.in_process import InProcessEvaluator
 from sim import simulate
 from sim.case import Walk
 from sim.errors import KernelBuildError, SimulationInputError
+from sim.kernel.walk import Precision
 from sim.outcome import Outcome
 from sim.robot import RobotVariant
 from sim.scenario import Scenario
@@ -89,7 +90,7 @@ def test_whether_to_stop_is_asked_at_least_once_a_second(
     evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A kernel that takes a second and a half, and then walks for as long.
-    monkeypatch.setattr(simulate, "prepare", lambda _: time.sleep(1.5))
+    monkeypatch.setattr(simulate, "prepare", lambda _, precision: time.sleep(1.5))
     long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
     asked = [time.monotonic()]
 
@@ -111,7 +112,7 @@ def test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_no
     slow = RobotVariant(name="szabadka2", contact_law="stick")
     cases = tuple(Walk(slow, "pi", scenario, ("P", "I")) for scenario in SCENARIOS)
 
-    def build(robot: object) -> None:
+    def build(robot: object, *, precision: Precision) -> None:
         if robot == slow:
             building.set()
             may_end.wait()
@@ -126,7 +127,7 @@ def test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_no
 def test_a_kernel_that_cannot_be_built_is_an_error_to_all_who_need_it(
     evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(_robot: object) -> None:
+    def refuse(_robot: object, *, precision: Precision) -> None:
         raise KernelBuildError("cc: 7 errors")
 
     with monkeypatch.context() as patched:

@@ -84,7 +84,7 @@ def test_the_time_that_a_kernel_takes_to_build_says_nothing_of_how_long_a_job_is
     opening: Opening, hybrid: HybridEvaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     takes = iter([1.0])
-    monkeypatch.setattr("sim.simulate.prepare", lambda _: time.sleep(next(takes, 0.0)))
+    monkeypatch.setattr("sim.simulate.prepare", lambda _, precision: time.sleep(next(takes, 0.0)))
     hybrid.evaluate(replace(request(1), iterations_left=60), never)
     assert opening.count == 0
 

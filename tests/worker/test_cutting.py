@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 
 from services.worker.cutting import Chunk, cut
 from services.worker.pace import Pace, TaskTime
+from services.worker.tasks import Task
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.kernel.walk import LaneUse
 from sim.scenario import SCENARIOS
+from sim.simulate import lanes
+from tests.examples.walks import short_walk
+from tests.worker.requests import request
 
 DURATIONS = [scenario.duration for scenario in SCENARIOS]
 
@@ -136,3 +142,30 @@ def test_a_slow_robot_leaves_at_most_a_tenth_of_the_lanes_idle(rate: float, lane
     """At so many simulated seconds a second, tasks of a second have few walks in each lane."""
     chunks = cut(DURATIONS, 25, slots=2, lanes=lanes, pace=Pace(1.0 / rate, 5e-3, 0.02))
     assert SWARM_SECONDS / math.fsum(chunk.cost for chunk in chunks) >= 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slots", [1, 2])
+def test_the_kernel_steps_as_many_lanes_as_was_planned_and_5_percent_of_them_idle(
+    slots: int,
+) -> None:
+    """The six scenarios in small."""
+    walks = [
+        short_walk(name=f"walk-{index}", cycle_time=scenario.cycle_time / 5.0)
+        for index, scenario in enumerate(SCENARIOS)
+    ]
+    wanted = request(25, scenarios=tuple(walks))
+    chunks = cut(
+        [case.duration for case in wanted.cases],
+        25,
+        slots=slots,
+        lanes=lanes(),
+        pace=Pace(1e-3, 5e-3, 0.02),
+    )
+    use, planned = LaneUse(), 0.0
+    for chunk in chunks:
+        task = Task.of(wanted.cases, wanted.designs, chunk.parts, wanted.provenance)
+        use += task.run().kernel_time.lane_use
+        planned += chunk.cost / CONTROL_PERIOD
+    assert use.computed == pytest.approx(planned, rel=1e-6)
+    assert use.share >= 0.95

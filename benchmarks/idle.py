@@ -1,11 +1,11 @@
 """How much of the workers' time a job uses: walking, preparing, waiting, and 1 slot against 2.
 
-    python -m benchmarks.idle [--evaluator ray] [--particles 25] [--iterations 25] [--rounds 1]
-                              [--slots 1 2] [--precision double] [--json]
+    python -m benchmarks.idle [--evaluator in-process] [--precision double] [--slots 1 2]
+                              [--particles 25] [--iterations 25] [--rounds 1] [--json]
 
-The demo's job, run here and now with a database on disk, as `gaitswarm optimize` does. Time counts
-from the first committed iteration to the last, so that start-up is no part of it. Shares are of the
-wall time of all slots:
+The demo's job, run here and now with a database on disk, in threads or on Ray throughout. Time
+counts from the first committed iteration to the last, so that start-up is no part of it. Shares are
+of the wall time of all slots:
 
     walking      in kernels, whose lanes are used as "lanes" says
     preparing    in tasks, outside of kernels: tables, desired angles, objectives
@@ -30,9 +30,11 @@ from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from services.optimizer.service import JobService
-from services.runtime import open_evaluator, open_store, run_embedded
+from services.runtime import open_store, run_embedded
 from services.worker import EvaluatorKind
 from services.worker.dispatch import Dispatcher, Work
+from services.worker.in_process import InProcessEvaluator
+from services.worker.ray_evaluator import RayEvaluator
 from services.worker.tasks import Answer
 from sim.kernel.walk import LaneUse, Precision
 
@@ -75,7 +77,7 @@ def run(
         patch.object(Dispatcher, "complete", note_answer),
     ):
         store = open_store(f"sqlite:///{folder}/jobs.db")
-        evaluator = open_evaluator(kind, cpus=slots)
+        evaluator = RayEvaluator(cpus=slots) if kind == "ray" else InProcessEvaluator(slots)
         job, _ = JobService(store).submit(spec)
         ended = run_embedded(store, evaluator, job.id, on_commit=note_commit)
         evaluator.close()
@@ -103,7 +105,7 @@ def run(
 def main() -> None:
     """Print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--evaluator", choices=["ray", "in-process"], default="ray")
+    parser.add_argument("--evaluator", choices=["ray", "in-process"], default="in-process")
     parser.add_argument("--precision", choices=["double", "single"], default="double")
     parser.add_argument("--particles", type=int, default=25)
     parser.add_argument("--iterations", type=int, default=25)

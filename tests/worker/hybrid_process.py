@@ -8,7 +8,7 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from unittest.mock import patch
+from unittest.mock import Mock, patch
 
 from services.worker.hybrid import HybridEvaluator
 from services.worker.tasks import Task
@@ -19,24 +19,28 @@ from tests.worker.requests import bits, never, request, walked_at_once
 WANTED = replace(request(100), iterations_left=1)
 
 
+def walked(here: Mock) -> int:
+    """Walks that this process was asked for."""
+    tasks = [call.args[0] for call in here.call_args_list]
+    return sum(part.stop - part.start for task in tasks for part in task.parts)
+
+
 def take_over() -> str:
     evaluator = HybridEvaluator(2, long_job_seconds=0.0)
-    wanted = len(WANTED.cases) * len(WANTED.designs)
+    walks = len(WANTED.designs) * len(WANTED.cases)
     expected = bits(walked_at_once(WANTED))
-    # Tasks that were run in this process.
     with patch.object(Task, "run", autospec=True, side_effect=Task.run) as here:
         requests = 0
         while not evaluator.on_ray:
             here.reset_mock()
             assert bits(evaluator.evaluate(WANTED, never)) == expected
             requests += 1
-            parts = [part for call in here.call_args_list for part in call.args[0].parts]
             # All of a request's walks; or none, if Ray took over a moment ago.
-            assert sum(part.stop - part.start for part in parts) == wanted or evaluator.on_ray
+            assert walked(here) == walks or evaluator.on_ray
         assert requests > 1
         here.reset_mock()
         assert bits(evaluator.evaluate(WANTED, never)) == expected
-        assert here.call_count == 0
+        assert walked(here) == 0
     evaluator.close()
     return "took over"
 

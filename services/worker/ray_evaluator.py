@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import logging
 import threading
 import time
@@ -89,8 +88,7 @@ class RayEvaluator:
         try:
             awaited(self._link.opened, should_stop)
         except EvaluationStopped:
-            # Nobody can interrupt Ray while it connects, and whoever stops it need not wait.
-            atexit.register(self.close)
+            # Ray cannot be interrupted while it connects, and whoever stops it need not wait.
             threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
             raise
         except BaseException:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -88,6 +89,33 @@ def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_neve
 def _bits(gaitswarm: Gaitswarm, job_id: str, db: Path) -> Any:
     history = gaitswarm("history", job_id, "--db", db, "--json").json
     return [iteration["evaluations"] for iteration in history["iterations"]]
+
+
+@pytest.mark.parametrize(
+    ("command", "stop", "code"),
+    [
+        ("optimize", signal.SIGINT, 130),
+        ("optimize", signal.SIGTERM, 130),
+        ("runner", signal.SIGTERM, 0),
+    ],
+)
+def test_a_stop_is_heard_while_a_cluster_is_connected_that_never_answers(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, command: str, stop: signal.Signals, code: int
+) -> None:
+    spec = ("--spec", small_spec) if command == "optimize" else ()
+    with socket.create_server(("127.0.0.1", 0)) as cluster:
+        address = f"127.0.0.1:{cluster.getsockname()[1]}"
+        process = start_python(*COMMAND_LINE, command, *spec, "--db", db, "--ray-address", address)
+        cluster.settimeout(60.0)
+        with cluster.accept()[0]:
+            process.send_signal(stop)
+            _, err = process.communicate(timeout=20)
+    assert process.returncode == code
+    assert "Traceback" not in err
+    if command == "optimize":
+        assert "go on with" in err
+        (job,) = gaitswarm("list", "--db", db, "--json").json
+        assert (job["state"], job["iterations"]) == ("queued", 0)
 
 
 def test_an_optimization_whose_database_is_overwritten_with_garbage_does_not_end_well(

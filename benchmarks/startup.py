@@ -51,29 +51,29 @@ def shown(arguments: Sequence[str]) -> float:
 
 def optimized(folder: Path, cache: Mapping[str, str], iterations: int) -> dict[str, float]:
     """Seconds to the first walk, the result, and from there to the prompt, of one job."""
-    begun = time.monotonic()
-    with subprocess.Popen(
-        [
-            *(sys.executable, "-c", WALK, "optimize", "--db", str(folder / "job.db"), "--json"),
-            *("--particles", "25", "--iterations", str(iterations), "--seed", "1"),
-        ],
-        env=os.environ | cache,
-        stdout=subprocess.PIPE,
-        stderr=(folder / "said").open("w"),
-    ) as process:
+    command = [
+        *(sys.executable, "-c", WALK, "optimize", "--db", str(folder / "job.db"), "--json"),
+        *("--particles", "25", "--iterations", str(iterations), "--seed", "1"),
+    ]
+    said = folder / "said"
+    begun = result = time.monotonic()
+    with (
+        said.open("w") as errors,
+        subprocess.Popen(
+            command, env=os.environ | cache, stdout=subprocess.PIPE, stderr=errors
+        ) as process,
+    ):
         assert process.stdout is not None
-        # Until the pipe is closed, which is not before the process ends, but for the last read.
-        while block := os.read(process.stdout.fileno(), 1 << 20):
-            last, told = time.monotonic(), block
-        process.wait()
+        # The last block that comes is the end of the result.
+        while os.read(process.stdout.fileno(), 1 << 20):
+            result = time.monotonic()
     ended = time.monotonic()
-    assert process.returncode == 0, (folder / "said").read_text()
-    (line,) = [x for x in (folder / "said").read_text().splitlines() if x.startswith("first walk")]
-    assert told
+    assert process.returncode == 0, said.read_text()
+    (line,) = [x for x in said.read_text().splitlines() if x.startswith("first walk")]
     return {
         "first walk": float(line.split()[2]) - begun,
-        "result": last - begun,
-        "prompt": ended - last,
+        "result": result - begun,
+        "prompt": ended - result,
     }
 
 

@@ -32,3 +32,15 @@ def test_the_history_benchmark_reads_a_store_of_its_own() -> None:
     assert found["evaluations"] == 500
     assert found["seconds"]
     assert all(0.0 < seconds < 60.0 for seconds in found["seconds"].values())
+
+
+@pytest.mark.slow
+def test_the_start_up_benchmark_tells_how_long_people_wait() -> None:
+    done = python("-m", "benchmarks.startup", "--rounds", "1", "--iterations", "1", "--json")
+    assert done.returncode == 0, done.stderr
+    seconds = json.loads(done.stdout)
+    assert all(0.0 < waited < 120.0 for waited in seconds.values())
+    for cache in ("warm", "cold"):
+        assert seconds[f"optimize, {cache}: first walk"] < seconds[f"optimize, {cache}: result"]
+    # With an empty cache there is a kernel to compile first.
+    assert seconds["optimize, warm: first walk"] < seconds["optimize, cold: first walk"]

@@ -107,6 +107,7 @@ class HybridEvaluator:
     def _start_ray(self) -> None:
         with self._changing:
             if self._ray is None and not self._closed:
+                _log.info("Ray is started for a long job")
                 self._ray = RayEvaluator(cpus=self.slots)
 
     def _ready_ray(self) -> RayEvaluator | None:

@@ -10,7 +10,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiler.compilation import find_compiler
+from sim.compiler.toolchain import find_compiler, without_compiler
 from sim.controllers import ControlLaw
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
@@ -65,12 +65,11 @@ def kernel_of(
     if native is not None:
         return native
     if backend == "native":
-        raise SimulationInputError("backend: no C compiler found for the native kernel")
+        raise SimulationInputError(f"backend: no native kernel here; {without_compiler()}")
     if backend == "auto":
         check_precision(robot, precision)
         warnings.warn(
-            "no C compiler found: simulating with the interpreter, some hundred times slower;"
-            " install gcc or clang, or `pip install gaitswarm[compiler]`",
+            f"{without_compiler()}; simulating with the interpreter, some hundred times slower",
             RuntimeWarning,
             stacklevel=3,
         )
@@ -105,8 +104,7 @@ def check_precision(robot: Robot, precision: Precision) -> None:
     """
     if precision != "double" and not has_native_kernel(robot, precision):
         raise SimulationInputError(
-            f"precision: {precision} needs the compiled kernel, and no C compiler was found;"
-            " install gcc or clang, or `pip install gaitswarm[compiler]`, or choose double"
+            f"precision: {precision} needs the compiled kernel; {without_compiler()}, or choose double"
         )
 
 

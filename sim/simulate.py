@@ -18,7 +18,7 @@ from sim.assembly import (
     measure,
     plan_walk,
 )
-from sim.compiler.compilation import target
+from sim.compiler.target import target
 from sim.controllers import CONTROLLERS, ControlLaw, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import secrets
 import shutil
 import socket
@@ -209,6 +210,8 @@ def _sweep() -> None:
 
 
 def _alive(pid: int) -> bool:
+    if platform.system() == "Windows":  # where signal 0 is Ctrl-C
+        return True
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -28,19 +28,20 @@ _DAY: Final = 86400.0
 _OWN_FILE: Final = re.compile(r"(?P<stem>.+-[0-9a-f]{24})(-.+\.(so|sha256|tmp)|\.lock)")
 
 
-def find(pattern: str) -> tuple[Path | None, tuple[Path, ...]]:
+def find(pattern: str, directory: Path | None = None) -> tuple[Path | None, tuple[Path, ...]]:
     """Look for a library in the usual directory, then in this user's private one.
 
     Args:
         pattern: File name, or a glob of file names.
+        directory: The only one to look into, in place of these two.
 
     Returns:
         The first library that is intact, or None; and the damaged ones that were met on the way.
     """
     damaged: list[Path] = []
-    for directory in _directories():
+    for place in _directories() if directory is None else (directory,):
         try:
-            candidates = sorted(directory.glob(pattern))
+            candidates = sorted(place.glob(pattern))
         except OSError:  # not a directory, or not to be read
             continue
         for library in candidates:
@@ -67,7 +68,9 @@ def is_intact(library: Path) -> bool:
         return False
 
 
-def build(stem: str, file: str, make: Callable[[Path], None]) -> Path:
+def build(
+    stem: str, file: str, make: Callable[[Path], None], directory: Path | None = None
+) -> Path:
     """Put a library into the cache, unless another process has done so meanwhile.
 
     Processes that want the same library wait for the one that builds it. Whatever happens, and
@@ -78,22 +81,23 @@ def build(stem: str, file: str, make: Callable[[Path], None]) -> Path:
         stem: Begins the names of all files of this library, whatever compiler makes it.
         file: The library's name; begins with `stem`.
         make: Writes the library to the path that it is given, in a directory of its own.
+        directory: Where it is to be.
 
     Returns:
-        Where the library is: in the usual directory, or where that cannot be written in the
-        private one.
+        Where the library is: in that directory, else in the usual one, or where that cannot be
+        written in the private one.
 
     Raises:
-        KernelBuildError: Neither directory can be written, or the disk is full; and what `make`
-            raises.
+        KernelBuildError: No directory can be written, or the disk is full; and what `make` raises.
     """
-    directory = _writable_directory()
-    library = directory / file
+    place = directory or _writable_directory()
+    library = place / file
     try:
-        with _locked(directory / f"{stem}.lock"):
+        place.mkdir(parents=True, exist_ok=True)
+        with _locked(place / f"{stem}.lock"):
             if not is_intact(library):
                 with tempfile.TemporaryDirectory(
-                    prefix=f"{stem}-", suffix=".tmp", dir=directory, ignore_cleanup_errors=True
+                    prefix=f"{stem}-", suffix=".tmp", dir=place, ignore_cleanup_errors=True
                 ) as scratch:
                     built = Path(scratch) / "library.so"
                     make(built)
@@ -103,7 +107,8 @@ def build(stem: str, file: str, make: Callable[[Path], None]) -> Path:
             f"{library} cannot be stored: {error}; set XDG_CACHE_HOME to a directory for compiled"
             " kernels"
         ) from error
-    _sweep(directory)
+    if directory is None:
+        _sweep(place)
     return library
 
 
@@ -144,8 +149,8 @@ def _directories() -> Iterator[Path]:
     usual = _usual_directory()
     if usual is not None:
         yield usual
-    private = _private_directory()
-    if _is_private(private):
+    # Windows tells nobody whose a directory is.
+    if hasattr(os, "getuid") and _is_private(private := _private_directory()):
         yield private
 
 

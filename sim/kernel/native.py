@@ -11,7 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiler.compilation import Target, load_library
+from sim.compiler.compilation import load_library
+from sim.compiler.target import Target
 from sim.controllers.base import LookupTable, Response
 from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.lanes import plan_lanes

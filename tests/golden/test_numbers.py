@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from sim.assembly import Backend
-from sim.compiler.compilation import Target, target
+from sim.compiler.target import Target, target
 from sim.errors import SimulationInputError
 from sim.scenario import SCENARIOS
 from sim.simulate import prepare
@@ -32,8 +32,8 @@ GOLDEN = read()
 # its environment to leave the wider instructions alone.
 NARROW_MACHINE = """
 import json, sys
-from sim.compiler import compilation
-narrow = compilation.Target(int(sys.argv[1]), sys.argv[2])
+from sim.compiler import compilation, target
+narrow = target.Target(int(sys.argv[1]), sys.argv[2])
 compilation.target = lambda: narrow
 from sim.robot import DEFAULT_ROBOT, load_robot
 from sim.assembly import kernel_of

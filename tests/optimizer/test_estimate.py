@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from typing import Any
 
@@ -99,6 +100,17 @@ def test_without_a_job_alike_a_walk_is_measured_once(monkeypatch: pytest.MonkeyP
     assert "measured on this machine" in first.basis
     monkeypatch.setattr("services.optimizer.jobs.estimate.create_optimizer", None)
     assert estimate(SPEC, SPEC.cases({}), (), rates) == first
+
+
+@pytest.mark.slow
+def test_where_no_process_is_told_its_processors_a_walk_is_measured_for_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 96)
+    found = estimate(SPEC, SPEC.cases({}), (), MeasuredRates())
+    assert found.seconds is not None
+    assert "96 cores" in found.basis
 
 
 @pytest.mark.slow

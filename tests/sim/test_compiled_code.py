@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from sim.compiler.compilation import Target, build_library, find_compiler, target
+from sim.compiler.compilation import build_library
+from sim.compiler.target import Target, target
+from sim.compiler.toolchain import find_compiler
 from sim.controllers.native_inference import inference_source
 from sim.kernel.native import load_kernel, native_kernel
 from sim.kernel.source import kernel_identity, kernel_source

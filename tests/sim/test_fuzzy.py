@@ -8,7 +8,8 @@ import skfuzzy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.compiler.compilation import Target, load_library, target
+from sim.compiler.compilation import load_library
+from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import LookupTable
 from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table

@@ -107,7 +107,7 @@ def test_without_a_compiler_single_precision_is_refused_rather_than_computed_in_
         XDG_CACHE_HOME=str(tmp_path),
         TMPDIR=str(tmp_path),
     )
-    said = "precision: single needs the compiled kernel, and no C compiler was found"
+    said = "precision: single needs the compiled kernel; no C compiler found"
     lines = done.stdout.splitlines()
     assert len(lines) == 2 and all(line.startswith(said) for line in lines), done
     assert all("install gcc or clang" in line and "choose double" in line for line in lines)

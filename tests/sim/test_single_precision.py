@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from sim.assembly import control_steps, judge, plan_walk
-from sim.compiler.compilation import Target, load_library, target, vector_header
+from sim.compiler.compilation import load_library, vector_header
+from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw
 from sim.kernel.native import NativeKernel, load_kernel, native_kernel

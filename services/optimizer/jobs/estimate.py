@@ -127,7 +127,9 @@ class MeasuredRates:
         """
         if prepare(spec.robot, precision=spec.precision) != "native":
             return None, "nothing: without a C compiler walks take some hundred times as long"
-        cores = len(os.sched_getaffinity(0))
+        # Only Linux says which processors a process may use.
+        affinity = getattr(os, "sched_getaffinity", None)
+        cores = len(affinity(0)) if affinity else os.cpu_count() or 1
         with self._lock:
             key = _kind_of_walk(spec)
             rate = self._rates.pop(key, None) or _measure(spec, cases)

@@ -1,0 +1,187 @@
+"""C compilers: found, asked for their version, and ended in time."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from sim.compiler.target import Target, host_architecture
+from sim.errors import KernelBuildError
+
+# No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on
+# compiler or machine. Integers wrap: a lane that has diverged computes on.
+FLAGS: Final = (
+    "-std=gnu11",
+    "-O2",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fwrapv",
+    "-fPIC",
+    "-shared",
+    "-Wall",
+    "-Wextra",
+)
+"""For every compiler and target."""
+
+_PROBE_LIMIT: Final = 30.0
+"""Seconds that a compiler may take to say its version."""
+
+_ADVICE: Final[Mapping[str, str]] = {
+    "Windows": "kernels are compiled on Linux and macOS only; run gaitswarm in WSL",
+    "Darwin": "install one with `xcode-select --install`, or `pip install gaitswarm[compiler]`",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Compiler:
+    """A C compiler: its command, and the first line it says of its version."""
+
+    command: tuple[str, ...]
+    version: str
+
+    def flags(self, aim: Target) -> tuple[str, ...]:
+        """Flags for a target, whose level zig spells in its own way.
+
+        Args:
+            aim: What it is to compile for.
+
+        Returns:
+            What goes between the command and the source.
+        """
+        if not aim.level:
+            return FLAGS
+        if _is_zig(self.command):
+            return (*FLAGS, "-mcpu=" + aim.level.replace("-", "_"))
+        return (*FLAGS, f"-march={aim.level}")
+
+
+def find_compiler(architecture: str = "") -> Compiler | None:
+    """Look for a C compiler, once a process.
+
+    Args:
+        architecture: Of the code that it is to make; this machine's if empty.
+
+    Returns:
+        For this machine $CC, cc, gcc, clang, or the `ziglang` wheel's, the first that says its
+        version; for another architecture ARCHITECTURE-linux-gnu-gcc, or zig's compiler. None if
+        this machine has none, or runs Windows, for which nothing is compiled.
+    """
+    wanted = architecture or host_architecture()
+    return _find(wanted, wanted == host_architecture())
+
+
+@lru_cache(maxsize=4)
+def _find(architecture: str, native: bool) -> Compiler | None:
+    if platform.system() == "Windows":
+        return None
+    for command in _for_this_machine() if native else _for_another(architecture):
+        version = _version(command)
+        if version:
+            return Compiler(tuple(command), version)
+    return None
+
+
+def without_compiler() -> str:
+    """What is missing where nothing can be compiled.
+
+    Returns:
+        Half a sentence for people: that there is no compiler, and the way out on this system.
+    """
+    system = platform.system()
+    advice = _ADVICE.get(system, "install gcc or clang, or `pip install gaitswarm[compiler]`")
+    return f"no C compiler found: {advice}"
+
+
+def run_compiler(
+    compiler: Compiler, arguments: Sequence[str], scratch: Path, purpose: str, time_limit: float
+) -> None:
+    """Run a compiler to its end.
+
+    Args:
+        compiler: Which one.
+        arguments: Its command line.
+        scratch: A directory for what it keeps for itself meanwhile.
+        purpose: What it is to do, for messages; follows "did not".
+        time_limit: Seconds that it may take. It is ended then, with all that it started.
+
+    Raises:
+        KernelBuildError: It cannot be run, takes too long or refuses; with what it says.
+    """
+    command = shlex.join(compiler.command)
+    # What the compiler keeps for itself goes with the directory, even if it is killed.
+    environment = {**os.environ, "TMPDIR": str(scratch)}
+    try:
+        done = _run([*compiler.command, *arguments], time_limit, environment)
+    except subprocess.TimeoutExpired as error:
+        raise KernelBuildError(
+            f"{command} did not {purpose} within {time_limit:g} s, and was ended"
+        ) from error
+    except OSError as error:
+        raise KernelBuildError(f"{command} cannot be run: {error}") from error
+    if done.returncode != 0:
+        raise KernelBuildError(f"{command} did not {purpose}:\n{done.stderr[-2000:]}")
+
+
+def _for_this_machine() -> Iterable[list[str]]:
+    yield from (shlex.split(os.environ.get("CC", "")), ["cc"], ["gcc"], ["clang"])
+    yield from _zig()
+
+
+def _for_another(architecture: str) -> Iterable[list[str]]:
+    yield [f"{architecture}-linux-gnu-gcc"]
+    for zig in (*_zig(), ["zig", "cc"]):
+        yield [*zig, "-target", f"{architecture}-linux-gnu"]
+
+
+def _zig() -> Iterable[list[str]]:
+    if importlib.util.find_spec("ziglang"):
+        yield [sys.executable, "-m", "ziglang", "cc"]
+
+
+def _is_zig(command: Sequence[str]) -> bool:
+    return "ziglang" in command or Path(command[0]).name == "zig"
+
+
+def _version(command: Sequence[str]) -> str:
+    if not command or not shutil.which(command[0]):
+        return ""
+    try:
+        done = _run([*command, "--version"], _PROBE_LIMIT)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.partition("\n")[0] if done.returncode == 0 else ""
+
+
+def _run(
+    command: Sequence[str], time_limit: float, environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """`subprocess.run`, but when time is up, all that the command started ends with it."""
+    with subprocess.Popen(
+        command,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
+        try:
+            out, err = process.communicate(timeout=time_limit)
+        except BaseException:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, out, err)

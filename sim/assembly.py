@@ -104,7 +104,8 @@ def check_precision(robot: Robot, precision: Precision) -> None:
     """
     if precision != "double" and not has_native_kernel(robot, precision):
         raise SimulationInputError(
-            f"precision: {precision} needs the compiled kernel; {without_compiler()}, or choose double"
+            f"precision: {precision} needs the compiled kernel; {without_compiler()},"
+            " or choose double"
         )
 
 

@@ -35,7 +35,9 @@ def vector_header() -> str:
     Returns:
         C text that defines `vec` of as many reals as a register holds, and its operations.
     """
-    return (resources.files("sim.compiler") / "vec.h").read_text(encoding="utf-8")
+    folder = resources.files("sim.compiler")
+    vectors, fused = ((folder / name).read_text(encoding="utf-8") for name in ("vec.h", "fma.h"))
+    return vectors.replace('#include "fma.h"\n', fused)
 
 
 def load_library(
@@ -133,7 +135,8 @@ def build_library(
     def make(built: Path) -> None:
         code = built.with_name("kernel.c")
         code.write_text(f"#define DOUBLES {aim.lanes}\n{source()}", encoding="utf-8")
-        arguments.extend([str(code), "-o", str(built)])
+        # The mathematical library for its fma, where the processor has none.
+        arguments.extend([str(code), "-o", str(built), "-lm"])
         run_compiler(compiler, arguments, built.parent, f"compile {stem}", time_limit)
 
     return cache.build(stem, file, make, directory)

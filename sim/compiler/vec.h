@@ -7,6 +7,9 @@
 #ifdef __AVX__
 #include <immintrin.h>
 #endif
+#ifdef __aarch64__
+#include <arm_neon.h>
+#endif
 
 #ifdef SINGLE
 #define LANES (2 * DOUBLES)
@@ -78,6 +81,8 @@ OPERATION vec vec_less(vec a, vec b) { return (vec)((a < b) & (ivec)SPLAT(1.0));
 
 #define SIGN_BIT ((integer)((uint64_t)1 << (8 * sizeof(real) - 1)))
 OPERATION vec vec_abs(vec a) { return (vec)((ivec)a & ISPLAT(~SIGN_BIT)); }
+
+#include "fma.h"
 
 OPERATION vec vec_sqrt(vec a)
 {

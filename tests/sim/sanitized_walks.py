@@ -7,6 +7,7 @@ import dataclasses
 import hashlib
 import os
 import struct
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -27,7 +28,9 @@ ROBOTS = {
 }
 
 
-def digest_of_walks(kernel: NativeKernel, robot: Robot) -> str:
+def digest_of_walks(
+    kernel: NativeKernel, robot: Robot, *, logs: Sequence[bool] = (True, False)
+) -> str:
     """Published optimum A in all scenarios, with a fall and a divergence, an uneven number."""
     law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
     substeps, timestep = control_steps(robot)
@@ -46,7 +49,7 @@ def digest_of_walks(kernel: NativeKernel, robot: Robot) -> str:
         setups.append(dataclasses.replace(setups[0], parameters=parameters))
     digest = hashlib.sha256()
     statuses = set()
-    for log in (True, False):
+    for log in logs:
         for result in kernel.walk(setups, Coding.of(robot, substeps), log=log):
             statuses.add(result.status)
             states = np.empty(0) if result.states is None else result.states

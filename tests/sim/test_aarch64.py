@@ -1,0 +1,49 @@
+"""The kernel on another architecture: compiled for aarch64 here, and run by an emulator."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import pytest
+
+from sim.compiler.target import target
+from sim.kernel.native import NativeKernel, native_kernel
+from sim.kernel.source import kernel_source
+from tests.sim.emulated import EmulatedLibrary, tools_for_arm
+from tests.sim.sanitized_walks import ROBOTS, digest_of_walks
+from tests.sim.test_vectors import SOURCE, bits, call, triples
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def emulator() -> Iterator[list[str]]:
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        yield tools_for_arm(monkeypatch)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_walks_and_falls_have_the_same_bits_on_aarch64(
+    name: str, emulator: list[str], tmp_path: Path
+) -> None:
+    robot = ROBOTS[name]
+    here = native_kernel(robot)
+    assert here is not None
+    library = EmulatedLibrary(kernel_source(robot), tmp_path, emulator)
+    there = NativeKernel(robot, cast(ctypes.CDLL, library))
+    assert there.lanes == 2
+    expected, found = (digest_of_walks(kernel, robot, logs=[True]) for kernel in (here, there))
+    assert found == expected
+
+
+def test_operations_have_the_same_bits_on_aarch64(emulator: list[str], tmp_path: Path) -> None:
+    library = EmulatedLibrary(SOURCE, tmp_path, emulator)
+    a, b, c = triples()
+    for name, inputs, results in (("fused", (a, b, c), 3), ("others", (a, b), 7)):
+        found = np.empty((len(a), results))
+        getattr(library, f"gaitswarm_{name}")(*inputs, found, len(a))
+        assert np.array_equal(bits(found), bits(call(target(), name, *inputs, results=results)))

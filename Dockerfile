@@ -24,12 +24,15 @@ COPY --from=code /openapi.json /src/web/openapi.json
 RUN cd /src/web && npm run types && npm run build
 
 FROM code AS build
+# Kernels for every level of this architecture, whatever machine builds the image.
+RUN apt-get update && apt-get install --yes --no-install-recommends gcc libc6-dev
+COPY scripts/prebuilt.py /src/scripts/
+RUN cd /src && python -m scripts.prebuilt
 COPY --from=page /src/api/page /src/api/page
 RUN pip install --no-deps --no-build-isolation /src
 
 FROM python:3.13-slim-bookworm
-# The compiler stays: a machine with other vector instructions than the one that built the image
-# compiles its own kernel.
+# The compiler stays for robots of one's own.
 RUN apt-get update \
     && apt-get install --yes --no-install-recommends gcc libc6-dev \
     && rm -rf /var/lib/apt/lists/* \

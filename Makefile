@@ -13,7 +13,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page bench test unit lint format architecture pictures lock clean setup setup-dev page-if-possible
+.PHONY: help demo serve page wheel bench test unit lint format architecture pictures lock clean setup setup-dev page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -27,6 +27,11 @@ serve: setup page-if-possible ## Serve page and REST API on http://127.0.0.1:800
 
 page: setup ## Build the page that is served (with node and npm, or those of a wheel).
 	@scripts/page.sh
+
+wheel: setup page-if-possible ## Build a wheel into dist/, with the page and compiled kernels.
+	@$(BIN)/python -m scripts.prebuilt
+	@$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	@rm -rf sim/compiler/prebuilt
 
 bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)

@@ -21,10 +21,12 @@ from sim.compiler.target import Target, host_architecture
 from sim.errors import KernelBuildError
 
 # No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on
-# compiler or machine. Integers wrap: a lane that has diverged computes on.
+# compiler or machine. Integers wrap: a lane that has diverged computes on. Zig's compiler adds what
+# a debugger needs, ten times the code, unless it is told not to.
 FLAGS: Final = (
     "-std=gnu11",
     "-O2",
+    "-g0",
     "-ffp-contract=off",
     "-fno-math-errno",
     "-fwrapv",

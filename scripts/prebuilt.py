@@ -1,0 +1,85 @@
+"""Build the shipped robots' kernels for machines without a compiler: python -m scripts.prebuilt
+
+They are put into the package, where git ignores them and a wheel brings them. What is built is a
+matter of this machine's compilers: for its own architecture any, for the other one a cross-compiler
+or zig (`scripts/emulator.sh` fetches it).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from sim.compiler.compilation import PREBUILT, build_library
+from sim.compiler.target import ARM, ARM_TARGET, X86_TARGETS, Target
+from sim.compiler.toolchain import find_compiler
+from sim.controllers.native_inference import inference_source
+from sim.kernel.source import kernel_identity, kernel_source
+from sim.robot.shipped import SHIPPED, shipped_robot
+
+TARGETS: Final[Mapping[str, Target]] = {
+    **{aim.level: aim for aim in X86_TARGETS},
+    ARM: ARM_TARGET,
+}
+"""What is built, by name."""
+
+Source = tuple[str, bytes, Callable[[], str]]
+
+
+def sources(robots: Sequence[str]) -> Iterator[Source]:
+    """What robots need: the name, the identity and the text of each library, but once."""
+    inference = inference_source()
+    yield "inference", inference.encode(), partial(str, inference)
+    seen: set[bytes] = set()
+    for name in robots:
+        robot = shipped_robot(name)
+        identity = kernel_identity(robot)
+        if identity not in seen:
+            seen.add(identity)
+            yield f"kernel-{name}", identity, partial(str, kernel_source(robot))
+
+
+def build(robots: Sequence[str], targets: Sequence[str], directory: Path) -> list[Path]:
+    """Build all libraries of robots for targets into a directory; returns their paths."""
+    built = []
+    for name, identity, source in sources(robots):
+        for target in targets:
+            library = build_library(
+                name, identity, source, wanted=TARGETS[target], directory=directory
+            )
+            if library is None:
+                raise SystemExit(f"{target}: there is no compiler for {TARGETS[target]}")
+            print(f"{target:10} {library.stat().st_size / 1000:5.0f} kB  {library}")
+            built.append(library)
+    return built
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Build what is asked for, and remove what is of no use any more."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--targets", nargs="+", choices=TARGETS, help="default: all that can be")
+    parser.add_argument("--robots", nargs="+", choices=SHIPPED, default=SHIPPED)
+    parser.add_argument("--directory", type=Path, default=PREBUILT)
+    given = parser.parse_args(arguments)
+    targets = given.targets or [
+        name for name, aim in TARGETS.items() if find_compiler(aim.architecture) is not None
+    ]
+    for name in TARGETS.keys() - set(targets):
+        print(f"{name} is left out", file=sys.stderr)
+    built = build(given.robots, targets, given.directory)
+    kept = {
+        path for library in built for path in (library, library.with_name(f"{library.name}.sha256"))
+    }
+    for path in given.directory.iterdir():
+        if path not in kept:
+            path.unlink()
+
+
+if __name__ == "__main__":
+    main()

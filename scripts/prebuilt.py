@@ -12,13 +12,14 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, get_args
 
 from sim.compiler.compilation import PREBUILT, build_library
 from sim.compiler.target import ARM, ARM_TARGET, X86_TARGETS, Target
 from sim.compiler.toolchain import find_compiler
 from sim.controllers.native_inference import inference_source
 from sim.kernel.source import kernel_identity, kernel_source
+from sim.kernel.walk import Precision
 from sim.robot.shipped import SHIPPED, shipped_robot
 
 TARGETS: Final[Mapping[str, Target]] = {
@@ -37,10 +38,12 @@ def sources(robots: Sequence[str]) -> Iterator[Source]:
     seen: set[bytes] = set()
     for name in robots:
         robot = shipped_robot(name)
-        identity = kernel_identity(robot)
-        if identity not in seen:
-            seen.add(identity)
-            yield f"kernel-{name}", identity, partial(str, kernel_source(robot))
+        for precision in get_args(Precision):
+            identity = kernel_identity(robot, precision)
+            if identity not in seen:
+                seen.add(identity)
+                text = kernel_source(robot, precision)
+                yield f"kernel-{precision}-{name}", identity, partial(str, text)
 
 
 def build(robots: Sequence[str], targets: Sequence[str], directory: Path) -> list[Path]:

@@ -13,9 +13,10 @@ import pytest
 from sim.compiler.target import target
 from sim.kernel.native import NativeKernel, native_kernel
 from sim.kernel.source import kernel_source
+from sim.kernel.walk import Precision
 from tests.sim.emulated import EmulatedLibrary, tools_for_arm
 from tests.sim.sanitized_walks import ROBOTS, digest_of_walks
-from tests.sim.test_vectors import SOURCE, bits, call, triples
+from tests.sim.test_vectors import PRECISIONS, bits, call, source, triples
 
 pytestmark = pytest.mark.slow
 
@@ -26,24 +27,32 @@ def emulator() -> Iterator[list[str]]:
         yield tools_for_arm(monkeypatch)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(
+    ("name", "precision"),
+    [("plain", "double"), ("plain", "single"), ("all internal state", "double")],
+)
 def test_walks_and_falls_have_the_same_bits_on_aarch64(
-    name: str, emulator: list[str], tmp_path: Path
+    name: str, precision: Precision, emulator: list[str], tmp_path: Path
 ) -> None:
     robot = ROBOTS[name]
-    here = native_kernel(robot)
+    here = native_kernel(robot, precision)
     assert here is not None
-    library = EmulatedLibrary(kernel_source(robot), tmp_path, emulator)
+    library = EmulatedLibrary(kernel_source(robot, precision), tmp_path, emulator)
     there = NativeKernel(robot, cast(ctypes.CDLL, library))
-    assert there.lanes == 2
+    assert there.lanes == (2 if precision == "double" else 4)
     expected, found = (digest_of_walks(kernel, robot, logs=[True]) for kernel in (here, there))
     assert found == expected
 
 
-def test_operations_have_the_same_bits_on_aarch64(emulator: list[str], tmp_path: Path) -> None:
-    library = EmulatedLibrary(SOURCE, tmp_path, emulator)
-    a, b, c = triples()
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_operations_have_the_same_bits_on_aarch64(
+    precision: Precision, emulator: list[str], tmp_path: Path
+) -> None:
+    library = EmulatedLibrary(source(precision), tmp_path, emulator)
+    a, b, c = triples(precision)
     for name, inputs, results in (("fused", (a, b, c), 3), ("others", (a, b), 7)):
-        found = np.empty((len(a), results))
+        found = np.empty((len(a), results), dtype=a.dtype)
         getattr(library, f"gaitswarm_{name}")(*inputs, found, len(a))
-        assert np.array_equal(bits(found), bits(call(target(), name, *inputs, results=results)))
+        np.testing.assert_array_equal(
+            bits(found), bits(call(target(), name, *inputs, results=results))
+        )

@@ -24,7 +24,9 @@ ANSWER = "int answer(void) { return 42; }"
 WALK = """
 from sim.simulate import prepare
 from tests.examples.walks import short_walk, walk
-print(prepare(), walk(short_walk(cycle_time=0.4)).outcome.objectives.tobytes().hex())
+for precision in ("double", "single"):
+    done = walk(short_walk(cycle_time=0.4), precision=precision)
+    print(prepare(), done.outcome.objectives.tobytes().hex())
 """
 PREPARE_ANOTHER = """
 from sim.robot import RobotVariant
@@ -101,7 +103,7 @@ def test_a_damaged_kernel_of_a_wheel_is_refused_with_what_to_do(
     installed: Path, tmp_path: Path
 ) -> None:
     copied = Path(shutil.copytree(installed, tmp_path / "packages"))
-    (kernel,) = copied.glob("sim/compiler/prebuilt/kernel-*.so")
+    (kernel,) = copied.glob("sim/compiler/prebuilt/kernel-double-*.so")
     kernel.write_bytes(kernel.read_bytes()[:-1])
     done = walk_without_a_compiler(copied, tmp_path)
     assert done.returncode == 1
@@ -112,7 +114,9 @@ def test_a_damaged_kernel_of_a_wheel_is_refused_with_what_to_do(
 def test_every_library_of_a_wheel_has_its_checksum(installed: Path) -> None:
     files = {path.name for path in (installed / "sim" / "compiler" / "prebuilt").iterdir()}
     libraries = {name for name in files if name.endswith(".so")}
-    assert {name.split("-")[0] for name in libraries} == {"inference", "kernel"}
+    kinds = {"-".join(name.split("-")[:2]) for name in libraries if name.startswith("kernel")}
+    assert kinds == {"kernel-single", "kernel-double"}
+    assert len(libraries) == len(kinds) + 1
     assert files == libraries | {f"{name}.sha256" for name in libraries}
 
 
@@ -163,7 +167,7 @@ def test_kernels_are_built_for_other_machines_and_old_ones_removed(
     (tmp_path / "kernel-of-before.so").touch()
     main(["--targets", ARM, "--robots", DEFAULT_ROBOT, "--directory", str(tmp_path)])
     libraries = sorted(tmp_path.glob("*.so"))
-    assert [path.name.split("-")[0] for path in libraries] == ["inference", "kernel"]
+    assert [path.name.split("-")[0] for path in libraries] == ["inference", "kernel", "kernel"]
     for path in libraries:
         header = path.read_bytes()[:20]
         assert header[:4] == b"\x7fELF"

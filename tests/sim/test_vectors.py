@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import itertools
 import math
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Final
+from functools import cache
+from typing import Any, Final
 
 import numpy as np
 import pytest
@@ -14,33 +16,42 @@ from numpy.typing import NDArray
 
 from sim.compiler.compilation import load_library, vector_header
 from sim.compiler.target import X86, X86_TARGETS, Target, cpu_flags, host_architecture, target
+from sim.kernel.walk import Precision
 
 pytestmark = pytest.mark.slow
 
-Floats = NDArray[np.float64]
+Reals = NDArray[np.floating[Any]]
+
+PRECISIONS: Final[tuple[Precision, ...]] = ("double", "single")
+TYPES: Final[dict[str, Any]] = {"double": np.float64, "single": np.float32}
 
 INF, NAN = math.inf, math.nan
-SPECIAL: Final = (0.0, -0.0, 1.0, -1.0, 5e-324, -2.3e-308, 1.7e308, -1e300, 1e-300, INF, -INF, NAN)
+SPECIAL: Final[tuple[float | str, ...]] = (
+    *(0.0, -0.0, 1.0, -1.0),
+    *("tiny", "small", "huge"),
+    *(INF, -INF, NAN),
+)
+"""Numbers that rules have exceptions for; those in words are of each type's own."""
 
 HERE: Final = tuple(
-    {
-        *([t for t, needed in X86_TARGETS.items() if needed <= cpu_flags()]),
-        *([Target(2)] if host_architecture() == X86 else []),
-        target(),
-    }
+    dict.fromkeys(
+        [
+            *(aim for aim, needed in X86_TARGETS.items() if needed <= cpu_flags()),
+            *([Target(2, "", X86)] if host_architecture() == X86 else []),
+            target(),
+        ]
+    )
 )
 """Targets that this machine runs."""
 
-SOURCE: Final = (
-    vector_header()
-    + """
-static vec all(double x)
+FUNCTIONS: Final = """
+static vec all(real x)
 {
   vec r;
   for (int k = 0; k < LANES; k++) r[k] = x; /* SPLAT takes the sign of a zero */
   return r;
 }
-void gaitswarm_fused(const double *a, const double *b, const double *c, double *r, int64_t n)
+void gaitswarm_fused(const real *a, const real *b, const real *c, real *r, int64_t n)
 {
   for (int64_t k = 0; k < n; k++) {
     const vec x = all(a[k]), y = all(b[k]), z = all(c[k]);
@@ -49,7 +60,7 @@ void gaitswarm_fused(const double *a, const double *b, const double *c, double *
     r[3 * k + 2] = vec_fnma(x, y, z)[LANES / 2];
   }
 }
-void gaitswarm_others(const double *a, const double *b, double *r, int64_t n)
+void gaitswarm_others(const real *a, const real *b, real *r, int64_t n)
 {
   for (int64_t k = 0; k < n; k++) {
     const vec x = all(a[k]), y = all(b[k]);
@@ -61,94 +72,131 @@ void gaitswarm_others(const double *a, const double *b, double *r, int64_t n)
   }
 }
 """
-)
 
 
-def call(aim: Target, name: str, *inputs: Floats, results: int) -> Floats:
-    """What a function of `SOURCE` gives, (n, results), compiled for a target."""
-    library = load_library("vectors", SOURCE.encode(), lambda: SOURCE, wanted=aim)
+def source(precision: Precision) -> str:
+    """`FUNCTIONS` for doubles or floats."""
+    return "#define SINGLE\n" * (precision == "single") + vector_header() + FUNCTIONS
+
+
+def call(aim: Target, name: str, *inputs: Reals, results: int) -> Reals:
+    """What one of `FUNCTIONS` gives, (n, results), compiled for a target."""
+    kind = inputs[0].dtype
+    text = source("single" if kind == np.float32 else "double")
+    library = load_library("vectors", text.encode(), lambda: text, wanted=aim)
     assert library is not None
-    output = np.empty((len(inputs[0]), results))
+    output = np.empty((len(inputs[0]), results), dtype=kind)
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*inputs, output)]
     getattr(library, f"gaitswarm_{name}")(*pointers, ctypes.c_int64(len(output)))
     return output
 
 
-def bits(values: Floats) -> NDArray[np.int64]:
+def bits(values: Reals) -> NDArray[Any]:
     """Bit patterns; what sign a NaN has is the compiler's choice."""
-    return np.where(np.isnan(values), np.nan, values).view(np.int64)
+    positive = np.where(np.isnan(values), np.array(np.nan, values.dtype), values)
+    return positive.view(np.int64 if values.dtype == np.float64 else np.int32)
 
 
-def triples() -> tuple[Floats, Floats, Floats]:
+def specials(precision: Precision) -> list[float]:
+    info = np.finfo(TYPES[precision])
+    named = {
+        "tiny": float(info.smallest_subnormal),
+        "small": -float(info.smallest_normal),
+        "huge": 0.9 * float(info.max),
+    }
+    return [named[x] if isinstance(x, str) else x for x in SPECIAL]
+
+
+@cache
+def triples(precision: Precision) -> tuple[Reals, ...]:
     """Special values, numbers of all sizes, and sums that cancel or lie beside a tie."""
-    special = np.array(list(itertools.product(SPECIAL, repeat=3)))
+    info = np.finfo(TYPES[precision])
+    digits, largest = info.nmant + 1, info.maxexp
+    ulp, count = 2.0**-info.nmant, 3000
     generator = np.random.default_rng(7)
-    wild = generator.normal(size=(4000, 3)) * 2.0 ** generator.integers(-1060, 1020, (4000, 3))
-    near = generator.normal(size=(4000, 3))
-    near[:, 2] = -near[:, 0] * near[:, 1] * (1 + 2.0**-52 * generator.integers(-2, 3, 4000))
-    small = near * 2.0 ** generator.integers(-540, -500, (4000, 1))
-    short = generator.integers(1, 2**27, (4000, 3)) * 1.0
-    ties = np.column_stack(
-        [short[:, 0], short[:, 1], short[:, 2] * 2.0 ** generator.integers(-60, 70, 4000)]
-    )
+    powers = generator.integers(-largest + 2 - digits // 2, largest - 4, (count, 3))
+    wild = generator.normal(size=(count, 3)) * 2.0**powers
+    near = generator.normal(size=(count, 3)).astype(info.dtype).astype(float)
+    near[:, 2] = -near[:, 0] * near[:, 1] * (1 + ulp * generator.integers(-2, 3, count))
+    small = near * 2.0 ** -(largest // 2 + generator.integers(-10, 20, (count, 1)))
+    ties = generator.integers(1, 2 ** (digits // 2), (count, 3)) * 1.0
+    ties[:, 2] *= 2.0 ** generator.integers(-digits, digits, count)
+    nearly = ties * (1 + ulp * generator.integers(0, 2, ties.shape))
     # Products whose upper half ties with the addend's last bit, and whose lower half decides.
-    close = 2.0 ** -generator.integers(26, 40, 4000)
+    close = 2.0 ** -generator.integers(digits // 2, digits // 2 + 10, count)
     decided = np.column_stack(
         [
             1.0 + close,
-            (1.0 - close) * 2.0**-53 * generator.choice([-1.0, 1.0], 4000),
-            1.0 + 2.0**-52 * generator.integers(0, 2**52, 4000),
+            (1.0 - close) * 2.0**-digits * generator.choice([-1.0, 1.0], count),
+            1.0 + ulp * generator.integers(0, 2 ** (digits - 1), count),
         ]
     )
-    nearly = ties * (1 + 2.0**-52 * generator.integers(0, 2, ties.shape))
-    a, b, c = np.concatenate([special, wild, near, small, ties, nearly, decided]).T
-    return np.ascontiguousarray(a), np.ascontiguousarray(b), np.ascontiguousarray(c)
+    special = np.array(list(itertools.product(specials(precision), repeat=3)))
+    every = np.concatenate([special, wild, near, small, ties, nearly, decided]).astype(info.dtype)
+    return tuple(np.ascontiguousarray(column) for column in every.T)
 
 
-def rounded_once(a: float, b: float, c: float) -> float:
-    """The double nearest to a b + c, by rational numbers."""
+def rounded_once(a: float, b: float, c: float, info: Any) -> float:
+    """The number of a type nearest to a b + c, by rational numbers."""
     if not (math.isfinite(a) and math.isfinite(b)):
         return a * b + c
     if not math.isfinite(c):
         return c
     exact = Fraction(a) * Fraction(b) + Fraction(c)
+    sign = math.copysign(1.0, a) * math.copysign(1.0, b)
     if exact == 0:
-        sign = math.copysign(1.0, a) * math.copysign(1.0, b)
-        both = a * b == 0.0 and c == 0.0 and sign == math.copysign(1.0, c)
+        both = (a == 0 or b == 0) and c == 0 and sign == math.copysign(1.0, c)
         return math.copysign(0.0, sign) if both else 0.0
-    try:
-        return float(exact)
-    except OverflowError:
-        return INF if exact > 0 else -INF
+    size = abs(exact)
+    exponent = size.numerator.bit_length() - size.denominator.bit_length()
+    exponent -= Fraction(2) ** exponent > size
+    quantum = Fraction(2) ** max(exponent - info.nmant, info.minexp - info.nmant)
+    rounded = round(size / quantum) * quantum
+    value = INF if rounded >= Fraction(2) ** info.maxexp else float(rounded)
+    return value if exact > 0 else -value
 
 
-@pytest.mark.parametrize("aim", HERE, ids=str)
-def test_products_and_sums_are_rounded_once(aim: Target) -> None:
-    a, b, c = triples()
-    expected = np.array(
-        [
-            (rounded_once(x, y, z), rounded_once(x, y, -z), rounded_once(-x, y, z))
-            for x, y, z in zip(a.tolist(), b.tolist(), c.tolist(), strict=True)
-        ]
+def expected_of_fused(columns: Sequence[Reals]) -> Reals:
+    info = np.finfo(columns[0].dtype)
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return np.array(
+        [[rounded_once(a * s, b, c * t, info) for s, t in SIGNS] for a, b, c in rows],
+        dtype=info.dtype,
     )
-    found = call(aim, "fused", a, b, c, results=3)
-    wrong = np.flatnonzero((bits(found) != bits(expected)).any(axis=1))
-    assert [(a[k], b[k], c[k], found[k], expected[k]) for k in wrong[:3]] == []
 
 
+SIGNS: Final = ((1, 1), (1, -1), (-1, 1))
+"""Of product and addend in a b + c, a b - c and c - a b."""
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_products_and_sums_are_rounded_once(precision: Precision) -> None:
+    columns = triples(precision)
+    expected = expected_of_fused(columns)
+    for aim in HERE:
+        found = call(aim, "fused", *columns, results=3)
+        wrong = np.flatnonzero((bits(found) != bits(expected)).any(axis=1))
+        rows = [([float(x[k]) for x in columns], found[k], expected[k]) for k in wrong[:3]]
+        assert (aim, len(wrong), rows) == (aim, 0, [])
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("aim", HERE, ids=str)
 def test_of_a_nan_or_two_zeros_the_second_operand_is_the_larger_and_the_smaller(
-    aim: Target,
+    aim: Target, precision: Precision
 ) -> None:
-    a, b = (np.array(side) for side in zip(*itertools.product(SPECIAL, repeat=2), strict=True))
+    pairs = list(itertools.product(specials(precision), repeat=2))
+    a, b = (np.array(side, dtype=TYPES[precision]) for side in zip(*pairs, strict=True))
     larger, smaller = call(aim, "others", a, b, results=7)[:, :2].T
     np.testing.assert_array_equal(bits(larger), bits(np.where(a > b, a, b)))
     np.testing.assert_array_equal(bits(smaller), bits(np.where(a < b, a, b)))
 
 
-@pytest.mark.parametrize("aim", HERE, ids=str)
-def test_every_target_gives_the_bits_of_the_widest(aim: Target) -> None:
-    a, b, _ = triples()
-    assert np.array_equal(
-        bits(call(aim, "others", a, b, results=7)), bits(call(target(), "others", a, b, results=7))
-    )
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_every_target_gives_the_bits_of_the_widest(precision: Precision) -> None:
+    a, b, _ = triples(precision)
+    widest = bits(call(target(), "others", a, b, results=7))
+    for aim in HERE:
+        np.testing.assert_array_equal(
+            bits(call(aim, "others", a, b, results=7)), widest, err_msg=str(aim)
+        )

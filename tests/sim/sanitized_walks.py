@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import hashlib
+import itertools
 import os
 import struct
 from collections.abc import Sequence
@@ -17,15 +18,18 @@ from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
 from sim.controllers.mamdani import Shape
 from sim.controllers.native_inference import compiled_table
 from sim.kernel.native import NativeKernel
-from sim.kernel.walk import Coding
+from sim.kernel.walk import Coding, Precision
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS
 
 ROBOTS = {
     "plain": load_robot("szabadka2"),
+    "karnopp": load_robot(RobotVariant(contact_law="karnopp")),
+    "dead zone": load_robot(RobotVariant(contact_law="dead_zone")),
     "all internal state": load_robot(RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0))),
 }
+"""One of every law of friction, and one with backlash."""
 
 
 def digest_of_walks(
@@ -60,8 +64,48 @@ def digest_of_walks(
     return digest.hexdigest()
 
 
-def sanitized_walks(name: str) -> str:
-    return digest_of_walks(NativeKernel(ROBOTS[name], _sanitized_library()), ROBOTS[name])
+def digest_of_odd_batches(kernel: NativeKernel, robot: Robot) -> str:
+    """Every control law, and NaN in all that can hold one, in batches that leave lanes empty."""
+    substeps, timestep = control_steps(robot)
+    plan = plan_walk(robot, SCENARIOS[0].model_copy(update=BRIEFEST), timestep)
+    assert plan is not None
+    setups = [
+        plan(controller.compile(design))
+        for controller in CONTROLLERS.values()
+        for design in controller.published.values()
+    ]
+    usual = setups[0]
+    nowhere = np.full(usual.desired.shape, np.nan)
+    late = np.where(np.arange(usual.ticks)[:, np.newaxis] < usual.ticks // 2, 0.0, nowhere)
+    unknown = [
+        dataclasses.replace(usual, start=np.full_like(usual.start, np.nan)),
+        dataclasses.replace(usual, parameters=np.full_like(usual.parameters, np.nan)),
+        dataclasses.replace(usual, internal_state=np.full_like(usual.internal_state, np.nan)),
+        dataclasses.replace(usual, disturbance=late),
+        dataclasses.replace(usual, desired=np.full_like(usual.desired, np.iinfo(np.int32).min)),
+    ]
+    mixed = [setup for pair in zip(setups, unknown, strict=False) for setup in pair]
+    digest = hashlib.sha256()
+    for size in (0, 1, kernel.lanes - 1, kernel.lanes + 3):
+        batch = list(itertools.islice(itertools.cycle(mixed), size))
+        results = kernel.walk(batch, Coding.of(robot, substeps), log=size % 2 == 1)
+        assert len(results) == size
+        for result in results:
+            digest.update(bytes([result.status]))
+            digest.update(np.where(np.isnan(result.end), np.nan, result.end).tobytes())
+    statuses = [r.status for r in kernel.walk(unknown, Coding.of(robot, substeps), log=False)]
+    assert {statuses[0], statuses[1], statuses[3]} == {Status.DIVERGED}
+    return digest.hexdigest()
+
+
+BRIEFEST = {"cycles": 1.0, "cycle_time": 0.2}
+"""Changes of a scenario that leave a hundred control ticks."""
+
+
+def sanitized_walks(name: str, precision: Precision) -> str:
+    robot, kernel = ROBOTS[name], NativeKernel(ROBOTS[name], _sanitized_library())
+    assert kernel.precision == precision
+    return digest_of_walks(kernel, robot) + digest_of_odd_batches(kernel, robot)
 
 
 def digest_of_tables(library: ctypes.CDLL | None) -> str:
@@ -80,5 +124,5 @@ def sanitized_tables() -> str:
 
 
 def _sanitized_library() -> ctypes.CDLL:
-    assert hasattr(ctypes.CDLL(None), "__asan_init")
+    assert "LD_PRELOAD" not in os.environ or hasattr(ctypes.CDLL(None), "__asan_init")
     return ctypes.CDLL(os.environ["LIBRARY"])

@@ -1,97 +1,112 @@
 /* a b + c, a b - c and c - a b, rounded once: the bits of the instructions that AVX2, AVX-512 and
    NEON have. Processors without one (x86-64-v2) compute them from sums and products, exactly but
    with some fifty operations in place of one. */
-#if defined(__AVX512F__) && !defined(SINGLE) && LANES == 8
-#define FUSED(name, a, b, c) (vec)_mm512_##name##_pd((__m512d)(a), (__m512d)(b), (__m512d)(c))
-#elif defined(__AVX512F__) && defined(SINGLE) && LANES == 16
-#define FUSED(name, a, b, c) (vec)_mm512_##name##_ps((__m512)(a), (__m512)(b), (__m512)(c))
-#elif defined(__FMA__) && !defined(SINGLE) && LANES == 4
-#define FUSED(name, a, b, c) (vec)_mm256_##name##_pd((__m256d)(a), (__m256d)(b), (__m256d)(c))
-#elif defined(__FMA__) && defined(SINGLE) && LANES == 8
-#define FUSED(name, a, b, c) (vec)_mm256_##name##_ps((__m256)(a), (__m256)(b), (__m256)(c))
+#if defined(__AVX512F__) && DOUBLES == 8
+#define FUSED(op, a, b, c) (dvec)_mm512_##op##_pd((__m512d)(a), (__m512d)(b), (__m512d)(c))
+#define FUSED_FLOATS(op, a, b, c) (vec)_mm512_##op##_ps((__m512)(a), (__m512)(b), (__m512)(c))
+#elif defined(__FMA__) && DOUBLES == 4
+#define FUSED(op, a, b, c) (dvec)_mm256_##op##_pd((__m256d)(a), (__m256d)(b), (__m256d)(c))
+#define FUSED_FLOATS(op, a, b, c) (vec)_mm256_##op##_ps((__m256)(a), (__m256)(b), (__m256)(c))
 #endif
 
-#ifdef FUSED
-OPERATION vec vec_fma(vec a, vec b, vec c) { return FUSED(fmadd, a, b, c); }
-OPERATION vec vec_fms(vec a, vec b, vec c) { return FUSED(fmsub, a, b, c); }
-OPERATION vec vec_fnma(vec a, vec b, vec c) { return FUSED(fnmadd, a, b, c); }
-#else
+/* Not in line: a step has thousands of them, and would take minutes to compile. */
+#define CALLED static __attribute__((noinline, unused))
 
-#if defined(__aarch64__) && !defined(SINGLE) && LANES == 2
-OPERATION vec vec_fma(vec a, vec b, vec c)
+#ifdef FUSED
+OPERATION dvec dvec_fma(dvec a, dvec b, dvec c) { return FUSED(fmadd, a, b, c); }
+OPERATION dvec dvec_fms(dvec a, dvec b, dvec c) { return FUSED(fmsub, a, b, c); }
+OPERATION dvec dvec_fnma(dvec a, dvec b, dvec c) { return FUSED(fnmadd, a, b, c); }
+#else
+#if defined(__aarch64__) && DOUBLES == 2
+OPERATION dvec dvec_fma(dvec a, dvec b, dvec c)
 {
-  return (vec)vfmaq_f64((float64x2_t)c, (float64x2_t)a, (float64x2_t)b);
+  return (dvec)vfmaq_f64((float64x2_t)c, (float64x2_t)a, (float64x2_t)b);
 }
-#elif defined(__aarch64__) && defined(SINGLE) && LANES == 4
+#else
+/* The upper half of a, of 26 bits as the lower one (Veltkamp). */
+OPERATION dvec upper_half(dvec a)
+{
+  const dvec scaled = a * DSPLAT(134217729.0);
+  return scaled - (scaled - a);
+}
+
+/* What rounding took from sum = a + b (Knuth). */
+OPERATION dvec lost_of_sum(dvec a, dvec b, dvec sum)
+{
+  const dvec back = sum - a;
+  return (a - (sum - back)) + (b - back);
+}
+
+/* a + b rounded to odd: to the neighbour of odd last bit, unless it is exact. */
+OPERATION dvec sum_to_odd(dvec a, dvec b)
+{
+  const dvec sum = a + b, lost = lost_of_sum(a, b, sum), zero = DSPLAT(0.0);
+  const divec inexact = (lost > zero) | (lost < zero), outwards = (lost > zero) == (sum > zero);
+  const divec step = (outwards & 1) | (~outwards & -1);
+  return (dvec)((divec)sum + (inexact & (((divec)sum & 1) - 1) & step));
+}
+
+OPERATION divec is_below(dvec a, double limit)
+{
+  return (dvec)((divec)a & INT64_MAX) < DSPLAT(limit);
+}
+
+/* Boldo and Melquiond, "Emulation of a FMA and correctly rounded sums", 2008. Where parts of it
+   overflow or underflow, the fma of libm serves, which the standard says is exact, too. */
+CALLED dvec dvec_fma(dvec a, dvec b, dvec c)
+{
+  const dvec product = a * b, zero = DSPLAT(0.0);
+  const dvec a1 = upper_half(a), b1 = upper_half(b), a2 = a - a1, b2 = b - b1;
+  const dvec rest = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2;
+  const dvec low = c + rest, low_lost = lost_of_sum(c, rest, low);
+  const dvec high = product + low, high_lost = lost_of_sum(product, low, high);
+  /* An exact product: one sum, and the sign of a zero as it should be. */
+  dvec r = dvec_select(rest == zero, product + c, high + sum_to_odd(low_lost, high_lost));
+  const divec tiny = is_below(product, 0x1p-960) & (a != zero) & (b != zero);
+  const divec fit = is_below(a, 0x1p990) & is_below(b, 0x1p990) & is_below(product, 0x1p1000) &
+                    is_below(c, 0x1p1000) & ~tiny;
+  for (int k = 0; k < DOUBLES; k++)
+    if (!fit[k]) r[k] = __builtin_fma(a[k], b[k], c[k]);
+  return r;
+}
+#endif
+OPERATION dvec dvec_fms(dvec a, dvec b, dvec c) { return dvec_fma(a, b, -c); }
+OPERATION dvec dvec_fnma(dvec a, dvec b, dvec c) { return dvec_fma(-a, b, c); }
+#endif
+
+#ifndef SINGLE
+OPERATION vec vec_fma(vec a, vec b, vec c) { return dvec_fma(a, b, c); }
+OPERATION vec vec_fms(vec a, vec b, vec c) { return dvec_fms(a, b, c); }
+OPERATION vec vec_fnma(vec a, vec b, vec c) { return dvec_fnma(a, b, c); }
+#elif defined(FUSED_FLOATS)
+OPERATION vec vec_fma(vec a, vec b, vec c) { return FUSED_FLOATS(fmadd, a, b, c); }
+OPERATION vec vec_fms(vec a, vec b, vec c) { return FUSED_FLOATS(fmsub, a, b, c); }
+OPERATION vec vec_fnma(vec a, vec b, vec c) { return FUSED_FLOATS(fnmadd, a, b, c); }
+#else
+#if defined(__aarch64__) && DOUBLES == 2
 OPERATION vec vec_fma(vec a, vec b, vec c)
 {
   return (vec)vfmaq_f32((float32x4_t)c, (float32x4_t)a, (float32x4_t)b);
 }
-#elif defined(SINGLE)
+#else
 /* A product of floats is exact in doubles, and a sum that is rounded to odd there can be rounded
-   again without harm: doubles have more than twice the bits (Boldo and Melquiond, 2008). */
-OPERATION vec vec_fma(vec a, vec b, vec c)
+   again without harm: doubles have more than twice the bits. */
+CALLED vec vec_fma(vec a, vec b, vec c)
 {
   vec r;
   for (int k = 0; k < LANES; k++) {
     const double product = (double)a[k] * (double)b[k], addend = (double)c[k];
     double sum = product + addend;
-    const double back = sum - product;
-    const double error = (product - (sum - back)) + (addend - back);
+    const double back = sum - product, lost = (product - (sum - back)) + (addend - back);
     int64_t bits;
     memcpy(&bits, &sum, sizeof bits);
-    if ((error > 0.0 || error < 0.0) && !(bits & 1)) bits += (error > 0.0) == (sum > 0.0) ? 1 : -1;
+    if ((lost > 0.0 || lost < 0.0) && !(bits & 1)) bits += (lost > 0.0) == (sum > 0.0) ? 1 : -1;
     memcpy(&sum, &bits, sizeof sum);
     r[k] = (float)sum;
   }
   return r;
 }
-#else
-/* The halves of a, of 26 bits each (Veltkamp). */
-OPERATION vec vec_upper(vec a)
-{
-  const vec scaled = a * SPLAT(134217729.0);
-  return scaled - (scaled - a);
-}
-
-/* What rounding took from sum = a + b (Knuth). */
-OPERATION vec vec_lost(vec a, vec b, vec sum)
-{
-  const vec back = sum - a;
-  return (a - (sum - back)) + (b - back);
-}
-
-/* a + b rounded to odd: to the neighbour of odd last bit, unless it is exact. */
-OPERATION vec vec_sum_to_odd(vec a, vec b)
-{
-  const vec sum = a + b, lost = vec_lost(a, b, sum);
-  const ivec inexact = (lost > SPLAT(0.0)) | (lost < SPLAT(0.0));
-  const ivec outwards = (lost > SPLAT(0.0)) == (sum > SPLAT(0.0));
-  const ivec step = (outwards & 1) | (~outwards & -1);
-  return (vec)((ivec)sum + (inexact & (((ivec)sum & 1) - 1) & step));
-}
-
-/* Boldo and Melquiond, "Emulation of a FMA and correctly rounded sums", 2008. Where parts of it
-   overflow or underflow, the fma of libm serves, which the standard says is exact, too. */
-OPERATION vec vec_fma(vec a, vec b, vec c)
-{
-  const vec product = a * b;
-  const vec a1 = vec_upper(a), b1 = vec_upper(b), a2 = a - a1, b2 = b - b1;
-  const vec rest = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2;
-  const vec low = c + rest, low_lost = vec_lost(c, rest, low);
-  const vec high = product + low, high_lost = vec_lost(product, low, high);
-  vec r = high + vec_sum_to_odd(low_lost, high_lost);
-  /* An exact product: one sum, and the sign of a zero as it should be. */
-  r = vec_select(rest == SPLAT(0.0), product + c, r);
-  const ivec tiny = (vec_abs(product) < SPLAT(0x1p-960)) & (a != SPLAT(0.0)) & (b != SPLAT(0.0));
-  const ivec fit = (vec_abs(a) < SPLAT(0x1p990)) & (vec_abs(b) < SPLAT(0x1p990)) &
-                   (vec_abs(product) < SPLAT(0x1p1000)) & (vec_abs(c) < SPLAT(0x1p1000)) & ~tiny;
-  for (int k = 0; k < LANES; k++)
-    if (!fit[k]) r[k] = __builtin_fma(a[k], b[k], c[k]);
-  return r;
-}
 #endif
-
 OPERATION vec vec_fms(vec a, vec b, vec c) { return vec_fma(a, b, -c); }
 OPERATION vec vec_fnma(vec a, vec b, vec c) { return vec_fma(-a, b, c); }
 #endif

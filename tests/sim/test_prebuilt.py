@@ -54,7 +54,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ignored = shutil.ignore_patterns("__pycache__", "prebuilt", "page", "node_modules")
     for name in ("sim", "services", "gaitswarm", "api", "cli"):
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
-    for name in ("pyproject.toml", "README.md"):
+    # With what git ignores, so that a wheel brings it only because it is told to.
+    for name in ("pyproject.toml", "README.md", ".gitignore"):
         shutil.copy(ROOT / name, source)
     arguments = ["--targets", host_target(), "--robots", DEFAULT_ROBOT]
     main([*arguments, "--directory", str(source / "sim" / "compiler" / "prebuilt")])

@@ -170,22 +170,22 @@ def plan_walk(
     trajectory = trajectory or desired_angles(robot, scenario)
     if not trajectory.reachable:
         return None
-    ticks, n_joints = trajectory.angles.shape
+    codes = trajectory.codes(robot.description.sensors.angle_counts)
+    ticks, n_joints = codes.shape
     weight = (robot.mass + scenario.load) * -gravity_on(scenario.slope)[2]
-    joints = trajectory.angles[0]
+    joints = trajectory.start
     height = resting_height(robot, joints, weight) + scenario.drop
     base = [0.0, 0.0, height, 0.0, 0.0, 0.0, 1.0]
     internal_state = np.zeros(internal_state_size(robot))
     if robot.has_backlash:
         internal_state[:n_joints] = joints
     displaced = noise is not None and noise.kind == "angle"
-    codes = np.rint(trajectory.angles * robot.description.sensors.angle_counts)
     return partial(
         WalkSetup,
         np.concatenate([base, joints]),
         internal_state,
         pack_parameters(robot, scenario, timestep, start=joints, displaced=displaced),
-        codes.astype(np.int32),
+        codes,
         fall_height=0.5 * scenario.hip_height,
         energy=robot.description.supply.energy,
         direction=-1 if scenario.direction == "backward" else 1,

@@ -14,7 +14,7 @@ from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from sim.calibration.catalogue import robot_variables, varied_robot
 from sim.catalogue import design_catalogue
 from sim.controllers import CONTROLLERS, ControlLaw, ControllerName
-from sim.gait.trajectory import Trajectory, desired_angles
+from sim.gait.trajectory import desired_angles
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.walk import Coding, Precision, WalkSetup
 from sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
@@ -30,7 +30,7 @@ RESULTS: Final = (
 """All that a walk tells, f1 to f6 first: columns of what these walks come to."""
 
 _KEPT: Final = 128
-"""Control laws and trajectories that are kept, of all walks of this process."""
+"""Control laws that are kept, of all walks of this process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,14 +120,9 @@ class CalibrationWalk:
         gait = {name: value for name, value in drive.items() if name in GAIT_VARIABLE_NAMES}
         gains = tuple((name, v) for name, v in drive.items() if name not in GAIT_VARIABLE_NAMES)
         scenario = with_gait(self.scenario, gait)
-        trajectory = _trajectory(described, scenario)
+        trajectory = desired_angles(described, scenario)
         plan = plan_walk(robot, scenario, timestep, trajectory=trajectory)
         return None if plan is None else plan(_control_law(self.controller, gains))
-
-
-@lru_cache(maxsize=_KEPT)
-def _trajectory(robot: Robot, scenario: Scenario) -> Trajectory:
-    return desired_angles(robot, scenario)
 
 
 @lru_cache(maxsize=_KEPT)

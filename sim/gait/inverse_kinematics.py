@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
-
-from sim.robot.robot import LegGeometry
 
 Floats = NDArray[np.float64]
 
 
+class LinkLengths(Protocol):
+    """What the solution depends on of a leg."""
+
+    @property
+    def coxa(self) -> float:
+        """[m]."""
+
+    @property
+    def femur(self) -> float:
+        """[m]."""
+
+    @property
+    def tibia(self) -> float:
+        """[m]."""
+
+
 def leg_angles(
-    leg: LegGeometry, forward: Floats, lateral: Floats, vertical: Floats
+    leg: LinkLengths, forward: Floats, lateral: Floats, vertical: Floats
 ) -> tuple[Floats, Floats]:
     """Knee-up solution for a tibia end relative to the coxa axis.
 

@@ -10,7 +10,6 @@ import pytest
 
 from sim.calibration.catalogue import robot_variables
 from sim.calibration.walk import CalibrationWalk
-from sim.gait.trajectory import desired_angles
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
 from sim.robot.identifiable import with_parameters
@@ -67,18 +66,3 @@ def test_a_walk_in_single_precision_is_nearly_that_in_double() -> None:
 def test_a_gait_out_of_reach_fails_alone() -> None:
     statuses = case("stride").run(np.array([[0.5], [0.12]])).statuses
     assert statuses.tolist() == [Status.UNREACHABLE, Status.OK]
-
-
-def test_a_gait_is_planned_once_for_all_robots(monkeypatch: pytest.MonkeyPatch) -> None:
-    planned = []
-
-    def counted(robot: Any, scenario: Scenario) -> Any:
-        planned.append(scenario.stride)
-        return desired_angles(robot, scenario)
-
-    monkeypatch.setattr("sim.calibration.walk.desired_angles", counted)
-    scenario = short_walk(height=0.0123)
-    masses = np.array([[3.0, 0.12], [4.0, 0.12], [5.0, 0.13]])
-    for _ in range(2):
-        case("body_mass", "stride", scenario=scenario).run(masses)
-    assert planned == [0.12, 0.13]

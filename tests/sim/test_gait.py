@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -14,10 +16,11 @@ from sim.gait.driving_2011 import SPEEDS, driven_as_in_2011, scenario_2011
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import leg_angles
 from sim.gait.low_pass import FirWindow, fir_gains, low_pass
+from sim.gait.quadratic_spline import quadratic_spline
 from sim.gait.trajectory import desired_angles, n_ticks, require_reachable
 from sim.robot import Robot, load_robot
 from sim.robot.posture import feet_below_body, resting_height
-from sim.scenario import SCENARIOS
+from sim.scenario import SCENARIOS, Scenario
 
 
 def test_support_is_a_straight_line_at_constant_speed_and_swing_a_half_ellipse() -> None:
@@ -171,6 +174,75 @@ def test_slow_trajectories_are_held_between_updates(robot: Robot) -> None:
     angles = desired_angles(robot, slow).angles[:, 0]
     changes = np.flatnonzero(np.diff(angles)) + 1
     assert set(np.diff(changes)) == {25}
+
+
+@pytest.mark.parametrize("name", ["szabadka2", "szabadka2-identified"])
+def test_legs_that_move_alike_are_planned_once_and_have_the_angles_of_their_own(name: str) -> None:
+    described = load_robot(name).description
+    own = described.model_copy(update={"planned_soles": "own"})
+    for robot in (load_robot(name), replace(load_robot(name), description=own)):
+        for turn in (0.0, 0.5):
+            scenario = SCENARIOS[5].model_copy(
+                update={"turn": turn, "fir_ms": 0, "start_phase": 0.2}
+            )
+            planned = desired_angles(robot, scenario)
+            alone = [angles_of_one_leg(robot, scenario, leg) for leg in range(6)]
+            np.testing.assert_array_equal(planned.angles, np.concatenate(alone, axis=1))
+            np.testing.assert_array_equal(planned.start, planned.angles[0])
+            np.testing.assert_array_equal(planned.codes(1e4), np.rint(planned.angles * 1e4))
+
+
+def angles_of_one_leg(robot: Robot, scenario: Scenario, leg: int) -> np.ndarray:
+    geometry = robot.legs[leg]
+    phase = robot.description.legs[leg].phase + scenario.start_phase
+    time = np.arange(n_ticks(scenario)) * CONTROL_PERIOD
+    forward, lift = quadratic_spline(
+        np.mod(time / scenario.cycle_time + phase, 1.0),
+        stride=scenario.stride_of(geometry.side),
+        height=scenario.height,
+        duty_factor=scenario.support_share,
+    )
+    lateral = np.full_like(forward, scenario.radius - abs(geometry.hip[1]))
+    vertical = lift - (scenario.hip_height - robot.planned_soles()[leg])
+    return np.round(leg_angles(geometry, forward, lateral, vertical)[0], 12)
+
+
+def test_scenarios_and_robots_whose_legs_move_alike_share_a_trajectory(robot: Robot) -> None:
+    level = SCENARIOS[0]
+    steep = level.model_copy(update={"name": "steep", "load": 3.0, "slope": 15.0, "drop": 0.01})
+    assert desired_angles(robot, steep) is desired_angles(robot, level)
+    identified = load_robot("szabadka2-identified")
+    assert desired_angles(identified, level) is desired_angles(load_robot("szabadka2"), level)
+    assert not desired_angles(robot, level).columns.flags.writeable
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"cycle_time": 1.6},
+        {"radius": 0.17},
+        {"hip_height": 0.14},
+        {"direction": "backward"},
+        {"turn": 0.1},
+        {"stride": 0.05},
+        {"height": 0.03},
+        {"duty_factor": 0.5},
+        {"duty_phase": "swing"},
+        {"start_phase": 0.5},
+        {"fir_ms": 20},
+        {"fir_window": "hamming"},
+        {"trajectory_rate": 50.0},
+        {"curve": "half_ellipse"},
+        {"cycles": 2.0},
+    ],
+    ids=str,
+)
+def test_whatever_a_trajectory_depends_on_makes_it_another(
+    robot: Robot, change: dict[str, object]
+) -> None:
+    usual = desired_angles(robot, SCENARIOS[0])
+    other = desired_angles(robot, SCENARIOS[0].model_copy(update=change))
+    assert usual.columns.shape != other.columns.shape or (usual.columns != other.columns).any()
 
 
 @pytest.mark.parametrize("taps", [1, 6, 50])

@@ -48,8 +48,15 @@ def compiled_table(
     ):
         return None
     outer = reduce(_both_hold, firsts)
-    sizes = (outer.shape[1], inner.shape[1], len(system.rules), len(memberships), len(points))
     values = np.empty([len(own) for own in grid.values()], dtype=np.int8)
+    sizes = (
+        len(values),
+        outer.shape[1],
+        inner.shape[1],
+        len(system.rules),
+        len(memberships),
+        len(points),
+    )
     arrays = (
         np.ascontiguousarray(outer),
         inner,
@@ -57,7 +64,7 @@ def compiled_table(
         np.array(system.consequents(), dtype=np.int64),
         memberships,
         points,
-        np.empty(library.gaitswarm_scratch(*map(ctypes.c_int64, sizes[:3]))),
+        np.empty(library.gaitswarm_scratch(*map(ctypes.c_int64, sizes[1:4]))),
         values,
     )
     library.gaitswarm_table.restype = ctypes.c_double
@@ -78,8 +85,9 @@ def inference_source() -> str:
     Returns:
         C text that lacks the definition of DOUBLES only.
     """
-    code = (resources.files("sim.controllers") / "inference.c").read_text(encoding="utf-8")
-    return vector_header() + code
+    here = resources.files("sim.controllers")
+    parts = [(here / name).read_text(encoding="utf-8") for name in ("estimate.c", "inference.c")]
+    return "\n".join([vector_header(), *parts])
 
 
 @lru_cache(maxsize=1)

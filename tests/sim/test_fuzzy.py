@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import skfuzzy
@@ -156,6 +158,17 @@ def test_values_in_the_middle_between_two_are_rounded_alike() -> None:
     values = quantised(system, axes).values
     assert set(values[:128].ravel().tolist()) <= {63, 64}
     assert set(values[129:].ravel().tolist()) == {127}
+
+
+@pytest.mark.parametrize("changed", range(6))
+def test_a_system_that_is_odd_but_for_one_rule_has_the_same_bits(changed: int) -> None:
+    odd = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
+    rules = [
+        replace(rule, weight=0.9 * rule.weight) if k == changed else rule
+        for k, rule in enumerate(odd.rules)
+    ]
+    axes = {"error": Axis(7, True), "current": CURRENT}
+    assert_both_tables_agree(replace(odd, rules=rules), axes)
 
 
 @pytest.mark.parametrize("count", [5, 6, 32])

@@ -46,7 +46,7 @@ def test_all_modules_that_a_case_runs_through_are_in_the_digest_which_any_proces
     assert Provenance(**found) == provenance_of("szabadka2")
     covered = set(simulator_files())
     assert {Path(file) for file in loaded} - covered == {ROOT / "sim" / "provenance.py"}
-    for source in ("kernel/driver.c", "controllers/inference.c", "compiler/vec.h"):
+    for source in ("kernel/driver.c", "controllers/estimate.c", "compiler/vec.h"):
         assert ROOT / "sim" / source in covered
 
 

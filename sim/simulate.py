@@ -19,7 +19,7 @@ from sim.assembly import (
     plan_walk,
 )
 from sim.compiler.target import target
-from sim.controllers import CONTROLLERS, ControlLaw, names_of
+from sim.controllers import CONTROLLERS, ControlLaw, control_law, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles, require_reachable
@@ -162,7 +162,7 @@ def _simulating(
     for index, row in enumerate(designs.tolist()):
         design = dict(zip(variables, row, strict=True))
         gait = {name: design.pop(name) for name in variables if name in GAIT_VARIABLE_NAMES}
-        control_law = CONTROLLERS[controller].compile(design)  # type: ignore[index]
+        law = control_law(controller, tuple(design.items()))
         key = tuple(gait.values())
         if key not in plans:
             walked = with_gait(scenario, gait)
@@ -175,7 +175,7 @@ def _simulating(
             )
         plan = plans[key]
         if plan is not None:
-            setups[index] = plan(control_law)
+            setups[index] = plan(law)
     coding = Coding.of(machine, substeps)
     results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups.values()]
     logs: list[WalkLog | None] = [None] * len(designs)

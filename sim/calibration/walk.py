@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from sim.calibration.catalogue import robot_variables, varied_robot
 from sim.catalogue import design_catalogue
-from sim.controllers import CONTROLLERS, ControlLaw, ControllerName
+from sim.controllers import ControllerName, control_law
 from sim.gait.trajectory import desired_angles
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.walk import Coding, Precision, WalkSetup
@@ -28,9 +27,6 @@ RESULTS: Final = (
     *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS),
 )
 """All that a walk tells, f1 to f6 first: columns of what these walks come to."""
-
-_KEPT: Final = 128
-"""Control laws that are kept, of all walks of this process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +118,4 @@ class CalibrationWalk:
         scenario = with_gait(self.scenario, gait)
         trajectory = desired_angles(described, scenario)
         plan = plan_walk(robot, scenario, timestep, trajectory=trajectory)
-        return None if plan is None else plan(_control_law(self.controller, gains))
-
-
-@lru_cache(maxsize=_KEPT)
-def _control_law(controller: ControllerName, gains: tuple[tuple[str, float], ...]) -> ControlLaw:
-    return CONTROLLERS[controller].compile(dict(gains))
+        return None if plan is None else plan(control_law(self.controller, gains))

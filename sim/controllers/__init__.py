@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final, Literal
 
 from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, names_of
@@ -20,6 +21,24 @@ CONTROLLERS: Final[dict[ControllerName, Controller]] = {
 }
 """By name, as in job specs and on the command line."""
 
+
+@lru_cache(maxsize=256)
+def control_law(controller: ControllerName, gains: tuple[tuple[str, float], ...]) -> ControlLaw:
+    """A design as it runs on the robot, made once for all that it walks through.
+
+    Args:
+        controller: Name of the motor controller.
+        gains: Names and values of the design's variables and conventions.
+
+    Returns:
+        Integers for the kernel.
+
+    Raises:
+        SimulationInputError: A value is missing or cannot be represented; names the variable.
+    """
+    return CONTROLLERS[controller].compile(dict(gains))
+
+
 __all__ = [
     "CONTROLLERS",
     "ControlLaw",
@@ -27,5 +46,6 @@ __all__ = [
     "ControllerName",
     "Inference",
     "LookupTable",
+    "control_law",
     "names_of",
 ]

@@ -6,6 +6,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ class LegGeometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointActuators:
-    """Motors and gears in joint order, referred to the joint; arrays (J,).
+    """Motors and gears in joint order, referred to the joint; arrays (J,), read-only.
 
     Attributes:
         torque: r K_M [N m/A], also the back-EMF [V s/rad].
@@ -77,7 +78,7 @@ class JointActuators:
         return self.motor_friction + (1.0 - self.efficiency) * self.gear_friction
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Robot:
     """A robot description with its URDF; immutable, hence shared between threads.
 
@@ -146,6 +147,11 @@ class Robot:
 
     def actuators(self) -> JointActuators:
         """Motor and gear numbers by joint."""
+        return self._actuators
+
+    @cached_property
+    def _actuators(self) -> JointActuators:
+        """Made once: every walk asks for it several times."""
         d = self.description
         rows = []
         for leg in d.legs:
@@ -168,7 +174,9 @@ class Robot:
                         actuator.shaft_damping,
                     )
                 )
-        return JointActuators(*np.array(rows).T.copy())
+        columns = np.array(rows).T.copy()
+        columns.flags.writeable = False
+        return JointActuators(*columns)
 
 
 def with_shafts(robot: Robot) -> Robot:

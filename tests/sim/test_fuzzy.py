@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from sim.compiler.compilation import load_library
 from sim.compiler.target import Target, target
-from sim.controllers import CONTROLLERS
+from sim.controllers import CONTROLLERS, control_law
 from sim.controllers.base import LookupTable
 from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
 from sim.controllers.fuzzy_pi_3 import integral_system, voltage_system
@@ -259,6 +259,15 @@ def test_a_table_of_three_inputs_is_its_inference() -> None:
         }
         exact = system.infer(grid)[0, 0, 0]
         assert table.values[cell] == np.rint(127 / table.largest * exact)
+
+
+def test_a_design_is_compiled_once_for_all_that_it_walks_through() -> None:
+    gains = tuple(PUBLISHED_A.items())
+    law = control_law("fuzzy-pi", gains)
+    assert control_law("fuzzy-pi", gains) is law
+    stronger = control_law("fuzzy-pi", (*gains[:-1], (gains[-1][0], 0.5)))
+    assert isinstance(law.direct, LookupTable) and isinstance(stronger.direct, LookupTable)
+    assert (law.direct.values != stronger.direct.values).any()
 
 
 def test_chapter_3s_rules_follow_error_and_velocity_and_yield_to_current() -> None:

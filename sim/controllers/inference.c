@@ -108,11 +108,11 @@ static void quantise(const System *s, const double *crisp, double largest, int8_
     UNROLLED
     for (int b = 0; b < BLOCK; b++) {
       const vec share = block[b] * scale;
-      told &= vec_abs(share - ((share + SPLAT(ROUNDER)) - SPLAT(ROUNDER))) < clear;
+      told &= vec_abs(share - dvec_round(share)) < clear;
     }
     if (any(~told)) sum_block(s, cell / s->n_inner, cell % s->n_inner, block);
     for (int b = 0; b < BLOCK; b++) {
-      const bytes rounded = __builtin_convertvector(vec_round_int(block[b] * scale), bytes);
+      const bytes rounded = __builtin_convertvector(dvec_round(block[b] * scale), bytes);
       memcpy(values + cell + b * LANES, &rounded, sizeof rounded);
     }
   }

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sim.compiler.compilation import load_library
 from sim.compiler.target import Target
-from sim.controllers.base import LookupTable, Response
+from sim.controllers.base import ControlLaw, LookupTable, Response
 from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.lanes import plan_lanes
 from sim.kernel.parameters import Layout, internal_state_size
@@ -96,18 +96,42 @@ _STRUCTURES: Final = {
 """By their names in the library's functions that tell their sizes."""
 
 
+_CODED: Final = tuple(field.name for field in dataclasses.fields(Coding))
+
+
 class _Addresses:
-    """Addresses of arrays, which stay where they are as long as this object lives."""
+    """Addresses of arrays, which stay where they are as long as this object lives.
+
+    Walks share most of them: those of a scenario all but the law, those of a design the law.
+    """
 
     def __init__(self) -> None:
-        self._kept: list[NDArray[Any]] = []
+        self._arrays: dict[int, tuple[int, NDArray[Any], NDArray[Any]]] = {}
+        self._laws: dict[int, tuple[_Law, ControlLaw]] = {}
 
     def of(self, array: NDArray[Any], dtype: Any) -> int:
-        contiguous = np.ascontiguousarray(array, dtype=dtype)
-        self._kept.append(contiguous)
-        return int(contiguous.ctypes.data)
+        """An array is always asked for with the same dtype."""
+        known = self._arrays.get(id(array))
+        if known is None:
+            contiguous = np.ascontiguousarray(array, dtype=dtype)
+            known = int(contiguous.ctypes.data), contiguous, array
+            self._arrays[id(array)] = known
+        return known[0]
 
-    def table(self, table: Response | None) -> _Table:
+    def law(self, law: ControlLaw) -> _Law:
+        known = self._laws.get(id(law))
+        if known is None:
+            packed = _Law(
+                law.proportional_gain,
+                law.integral_gain,
+                law.derivative_gain,
+                self._table(law.direct),
+                self._table(law.integrated),
+            )
+            known = self._laws[id(law)] = packed, law
+        return known[0]
+
+    def _table(self, table: Response | None) -> _Table:
         if table is None:
             return _Table()
         if not isinstance(table, LookupTable):
@@ -201,10 +225,10 @@ class NativeKernel:
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
         walkers = (_Walker * n)()
         addresses = _Addresses()
+        sums_at, end_at = int(sums.ctypes.data), int(end.ctypes.data)
         order = plan_lanes([setup.ticks for setup in setups], self.lanes).order
         for walker, k in zip(walkers, order, strict=True):
             setup, record = setups[k], logs[k]
-            law = setup.control_law
             walker.q0 = addresses.of(setup.start, np.float64)
             walker.internal_state = addresses.of(setup.internal_state, np.float64)
             walker.parameters = addresses.of(setup.parameters, np.float64)
@@ -212,21 +236,15 @@ class NativeKernel:
             walker.disturbance = (
                 None if setup.disturbance is None else addresses.of(setup.disturbance, np.float64)
             )
-            walker.law = _Law(
-                law.proportional_gain,
-                law.integral_gain,
-                law.derivative_gain,
-                addresses.table(law.direct),
-                addresses.table(law.integrated),
-            )
+            walker.law = addresses.law(setup.control_law)
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height
             walker.fall_cosine = setup.fall_cosine
             walker.current_smoothing = setup.current_smoothing
-            walker.sums = sums[k].ctypes.data
-            walker.end = end[k].ctypes.data
+            walker.sums = sums_at + k * sums.strides[0]
+            walker.end = end_at + k * end.strides[0]
             walker.log = None if record is None else record.ctypes.data
-        packed, use = _Coding(*dataclasses.astuple(coding)), _LaneUse()
+        packed, use = _Coding(*(getattr(coding, name) for name in _CODED)), _LaneUse()
         self._library.gaitswarm_walk(walkers, n, ctypes.byref(packed), ctypes.byref(use))
         ended = sorted(zip(order, walkers, strict=True), key=lambda pair: pair[0])
         return WalkResults(

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from sim.assembly import PHYSICS_RATE, Backend
+from sim.assembly import PHYSICS_RATE, Backend, kernel_of
 from sim.controllers import CONTROLLERS
-from sim.robot import DEFAULT_ROBOT
-from sim.scenario import SCENARIOS
-from sim.simulate import lanes, prepare, simulate
+from sim.kernel.batch import KernelTime, walk_together
+from sim.kernel.native import NativeKernel
+from sim.kernel.walk import Precision
+from sim.robot import DEFAULT_ROBOT, load_robot
+from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import simulating
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +26,10 @@ class BenchmarkResult:
         us_per_step_per_walker: wall time of a physics step of one walker [us].
         real_time_factor_per_core: simulated over elapsed seconds [1].
         lanes: walkers that are stepped together.
+        lane_use: share of the lanes' time that was walked [1].
         backend: `native` or `reference`.
+        precision: of the physics' numbers.
+        bytes_of_code: machine code of the kernel [B]; None where it has none that can be measured.
         walkers: walks of every scenario.
         simulated_seconds: of all walks together [s].
         elapsed_seconds: wall time of the pass [s].
@@ -31,7 +38,10 @@ class BenchmarkResult:
     us_per_step_per_walker: float
     real_time_factor_per_core: float
     lanes: int
+    lane_use: float
     backend: str
+    precision: Precision
+    bytes_of_code: int | None
     walkers: int
     simulated_seconds: float
     elapsed_seconds: float
@@ -43,48 +53,108 @@ def measure(
     walkers: int = 24,
     backend: Backend = "auto",
     robot: str = DEFAULT_ROBOT,
+    precision: Precision = "double",
 ) -> BenchmarkResult:
     """Time whole walks (control, physics, objectives) of the six scenarios in this thread.
 
-    The walkers are the published optimum A; every scenario counts with its share of the job.
+    The walkers are the published optimum A; every scenario counts with its share of the job. All
+    walks are computed in one call of the kernel, as in a worker's task.
 
     Args:
         repeats: Passes, of which the fastest counts: anything slower is the machine's other work.
         walkers: Walks of every scenario; the reference kernel walks one, in one scenario.
         backend: Which kernel.
         robot: A shipped robot.
+        precision: Of the physics' numbers.
 
     Returns:
         The fastest pass.
+
+    Raises:
+        SimulationInputError: The backend or the precision cannot be had here.
     """
-    controller = CONTROLLERS["fuzzy-pi"]
-    design = controller.published["A"]
-    used = prepare(robot, backend=backend)
-    width = lanes() if used == "native" else 1
-    count = walkers if used == "native" else 1
-    designs = np.tile(np.array(list(design.values())), (count, 1))
-    scenarios = SCENARIOS if used == "native" else SCENARIOS[:1]
+    kernel = kernel_of(load_robot(robot), backend, precision=precision)
+    native = isinstance(kernel, NativeKernel)
+    count = walkers if native else 1
+    scenarios = SCENARIOS if native else SCENARIOS[:1]
+    passes = [
+        _walk(scenarios, count, backend=backend, robot=robot, precision=precision)
+        for _ in range(repeats)
+    ]
+    elapsed, spent = min(passes, key=lambda one: one[0])
     simulated = count * sum(scenario.duration for scenario in scenarios)
-    passes = []
+    return BenchmarkResult(
+        us_per_step_per_walker=elapsed / (simulated * PHYSICS_RATE) * 1e6,
+        real_time_factor_per_core=simulated / elapsed,
+        lanes=kernel.lanes,
+        lane_use=spent.lane_use.share,
+        backend=kernel.backend,
+        precision=precision,
+        bytes_of_code=kernel.code_size if isinstance(kernel, NativeKernel) else None,
+        walkers=count,
+        simulated_seconds=simulated,
+        elapsed_seconds=elapsed,
+    )
+
+
+def measure_control(
+    *, repeats: int = 3, robot: str = DEFAULT_ROBOT, precision: Precision = "double"
+) -> float:
+    """What control ticks take of the compiled kernel's time.
+
+    The same walks at twice the physics rate have twice the steps between as many ticks, so that a
+    kernel's time is t = control + physics, and t' = control + 2 physics.
+
+    Args:
+        repeats: Passes of both, in turns, of which the fastest of each count.
+        robot: A shipped robot.
+        precision: Of the physics' numbers.
+
+    Returns:
+        2 - t'/t [1], with the error of both times.
+
+    Raises:
+        SimulationInputError: There is no compiled kernel here.
+    """
+    seconds: dict[int, list[float]] = {PHYSICS_RATE: [], 2 * PHYSICS_RATE: []}
     for _ in range(repeats):
-        start = time.perf_counter()
-        for scenario in scenarios:
-            simulate(
+        for rate, measured in seconds.items():
+            _, spent = _walk(
+                SCENARIOS[:1], 32, backend="native", robot=robot, precision=precision, rate=rate
+            )
+            measured.append(spent.seconds)
+    usual, doubled = (min(measured) for measured in seconds.values())
+    return min(max(2.0 - doubled / usual, 0.0), 1.0)
+
+
+def _walk(
+    scenarios: Sequence[Scenario],
+    walkers: int,
+    *,
+    backend: Backend,
+    robot: str,
+    precision: Precision,
+    rate: int = PHYSICS_RATE,
+) -> tuple[float, KernelTime]:
+    """Wall time of a pass [s], and what of it the kernel took."""
+    design = CONTROLLERS["fuzzy-pi"].published["A"]
+    designs = np.tile(np.array(list(design.values())), (walkers, 1))
+    spent = KernelTime()
+    start = time.perf_counter()
+    walk_together(
+        [
+            simulating(
                 scenario,
                 "fuzzy-pi",
                 list(design),
                 designs,
                 robot=robot,
                 backend=backend,
+                physics_rate=rate,
+                precision=precision,
             )
-        passes.append(time.perf_counter() - start)
-    elapsed = min(passes)
-    return BenchmarkResult(
-        us_per_step_per_walker=elapsed / (simulated * PHYSICS_RATE) * 1e6,
-        real_time_factor_per_core=simulated / elapsed,
-        lanes=width,
-        backend=used,
-        walkers=count,
-        simulated_seconds=simulated,
-        elapsed_seconds=elapsed,
+            for scenario in scenarios
+        ],
+        spent,
     )
+    return time.perf_counter() - start, spent

@@ -115,6 +115,8 @@ def simulating(
     designs: NDArray[np.float64],
     *,
     robot: RobotChoice = DEFAULT_ROBOT,
+    backend: Backend = "auto",
+    physics_rate: int = PHYSICS_RATE,
     precision: Precision = "double",
 ) -> Walking[Simulation]:
     """What `simulate` does, for `walk_together` to run beside others.
@@ -125,12 +127,23 @@ def simulating(
         variables: Columns of the designs.
         designs: (n, len(variables)), in the variables' units.
         robot: A shipped robot by name, a variant of one, or a `Robot` of your own.
+        backend: Which kernel.
+        physics_rate: Physics steps a second [Hz].
         precision: Of the physics' numbers.
 
     Returns:
         The computation, which wants its walks once, and results in what `simulate` returns.
     """
-    return _simulating(scenario, controller, variables, designs, robot=robot, precision=precision)
+    return _simulating(
+        scenario,
+        controller,
+        variables,
+        designs,
+        robot=robot,
+        backend=backend,
+        physics_rate=physics_rate,
+        precision=precision,
+    )
 
 
 def _simulating(

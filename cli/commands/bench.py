@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from cli.options import Json
+from cli.options import Json, Precision
+
+if TYPE_CHECKING:
+    from services.profile import JobProfile
+
+_SHARES: Final = {
+    "physics": "in kernels, the steps",
+    "control": "in kernels, the control ticks",
+    "tables": "in tasks: fuzzy tables",
+    "preparation": "in tasks: desired angles, parameters, objectives",
+    "workers": "sending tasks and answers, and waiting for the last worker",
+    "search": "judging designs and asking for the next",
+    "store": "in the store",
+}
 
 
 def register(app: typer.Typer) -> None:
@@ -21,6 +34,16 @@ def bench(
     backend: Annotated[
         str, typer.Option(help="auto, native (compiled) or reference (interpreted).")
     ] = "auto",
+    precision: Precision = None,
+    profile: Annotated[
+        bool,
+        typer.Option(
+            "--profile", help="Run a whole job of chapter 4 on all cores, and say what takes time."
+        ),
+    ] = False,
+    evaluator: Annotated[
+        str, typer.Option(help="Where the profiled job's walks run: ray or in-process.")
+    ] = "ray",
     as_json: Json = False,
 ) -> None:
     """Measure the simulator on one core, with the physics of the main Fuzzy-PI job."""
@@ -29,22 +52,48 @@ def bench(
     from typing import get_args
 
     from cli.output import print_text
-    from services.optimizer.errors import InvalidRequest
+    from services.worker import EvaluatorKind
+    from sim import benchmark
     from sim.assembly import Backend
-    from sim.benchmark import measure
+    from sim.kernel import walk
 
-    for known in get_args(Backend):
-        if backend == known:
-            result = measure(repeats=repeats, backend=known)
-            break
-    else:
-        known = ", ".join(get_args(Backend))
-        raise InvalidRequest(f"{backend!r} is none of {known}", field="backend")
+    digits: walk.Precision = _one_of("precision", precision or "double", get_args(walk.Precision))
+    if profile:
+        from services.profile import profile_job
+
+        kind: EvaluatorKind = _one_of("evaluator", evaluator, get_args(EvaluatorKind))
+        found = profile_job(evaluator=kind, precision=digits)
+        print_text(json.dumps(asdict(found), indent=2) if as_json else _profile_text(found))
+        return
+    chosen: Backend = _one_of("backend", backend, get_args(Backend))
+    result = benchmark.measure(repeats=repeats, backend=chosen, precision=digits)
     if as_json:
         print_text(json.dumps(asdict(result), indent=2))
         return
-    print_text(
-        f"{result.backend} kernel, {result.lanes} walkers in lock-step:"
-        f" {result.us_per_step_per_walker:.3f} us per physics step and walker,"
-        f" {result.real_time_factor_per_core:.0f} x real time on one core"
+    size = (
+        "" if result.bytes_of_code is None else f", {result.bytes_of_code / 1024:.0f} KiB of code"
     )
+    print_text(
+        f"{result.backend} kernel in {result.precision} precision, {result.lanes} walkers in"
+        f" lock-step{size}: {result.us_per_step_per_walker:.3f} us per physics step and walker,"
+        f" {result.real_time_factor_per_core:.0f} x real time on one core,"
+        f" {result.lane_use:.1%} of its lanes used"
+    )
+
+
+def _one_of(field: str, value: str, known: tuple[Any, ...]) -> Any:
+    from services.optimizer.errors import InvalidRequest
+
+    if value not in known:
+        raise InvalidRequest(f"{value!r} is none of {', '.join(known)}", field=field)
+    return value
+
+
+def _profile_text(found: JobProfile) -> str:
+    heading = (
+        f"{found.walks} walks of a chapter-4 job, {found.slots} slots ({found.evaluator}),"
+        f" {found.precision} precision: {found.seconds:.2f} s, {found.walks_per_second:.0f} walks"
+        f" a second, {found.lane_use:.1%} of the kernel's lanes used"
+    )
+    lines = [f"  {name:12} {share:6.1%}  {_SHARES[name]}" for name, share in found.shares.items()]
+    return "\n".join([heading, "shares of the slots' time:", *lines])

@@ -15,7 +15,7 @@ from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStoppe
 from services.worker.cutting import Chunk, cut
 from services.worker.fair_queue import FairQueue
 from services.worker.pace import Pace, TaskTime
-from services.worker.tasks import Answer, Task
+from services.worker.tasks import Answer, Task, TaskTotals
 from sim.case import WalkingCase
 from sim.kernel.walk import Precision
 from sim.outcome import Outcome
@@ -102,10 +102,12 @@ class Dispatcher:
     Attributes:
         slots: Tasks that run at the same time.
         lanes: Tells how many designs the compiled kernel of a precision steps at once.
+        totals: Of all tasks whose answers were of use.
     """
 
     slots: int
     lanes: Callable[[Precision], int]
+    totals: TaskTotals = field(default_factory=TaskTotals)
     _queue: FairQueue[Work] = field(default_factory=FairQueue)
     _changed: threading.Condition = field(default_factory=threading.Condition)
     _closed: str | None = None
@@ -185,6 +187,7 @@ class Dispatcher:
                 into.statuses[part.start : part.stop] = outcome.statuses
             overhead = time.monotonic() - work.taken - answer.seconds
             batch.times.append(TaskTime(chunk.cost, answer.seconds, overhead))
+            self.totals = self.totals.plus(answer)
             batch.missing.remove(chunk)
             self._changed.notify_all()
 

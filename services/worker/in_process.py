@@ -9,6 +9,7 @@ from collections.abc import Callable
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.dispatch import Dispatcher
 from services.worker.preparation import KernelBuilder
+from services.worker.tasks import TaskTotals
 from sim import simulate
 from sim.outcome import Outcome
 
@@ -45,6 +46,11 @@ class InProcessEvaluator:
     def slots(self) -> int:
         """Number of threads."""
         return self._dispatcher.slots
+
+    @property
+    def totals(self) -> TaskTotals:
+        """Of all tasks so far."""
+        return self._dispatcher.totals
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]

@@ -14,7 +14,7 @@ from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStoppe
 from services.worker.dispatch import Dispatcher, Work
 from services.worker.preparation import KernelBuilder, awaited
 from services.worker.ray_session import RaySession, open_ray
-from services.worker.tasks import Failure, run_in_worker, warm_up
+from services.worker.tasks import Failure, TaskTotals, run_in_worker, warm_up
 from sim import simulate
 from sim.outcome import Outcome
 
@@ -68,6 +68,11 @@ class RayEvaluator:
     def slots(self) -> int:
         """CPUs of the cluster; waits until it is open."""
         return self._link.opened.result().slots
+
+    @property
+    def totals(self) -> TaskTotals:
+        """Of all tasks since the cluster was opened; waits until it is."""
+        return self._link.opened.result().totals
 
     @property
     def lost(self) -> bool:

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from services.worker.cutting import Part
 from sim.case import Case, run_together
+from sim.controllers.quantisation import timing_tables
 from sim.errors import SimulationError
 from sim.kernel.batch import KernelTime
+from sim.kernel.walk import LaneUse
 from sim.outcome import Outcome
 from sim.provenance import Provenance, provenance_of, simulator_digest
 
@@ -78,13 +80,16 @@ class Task:
             if here != self.provenance:
                 return Answer(here, None, platform.node())
         kernel_time = KernelTime()
-        outcomes = run_together(
-            [self.cases[part.case] for part in self.parts],
-            [self.designs[part.start : part.stop] for part in self.parts],
-            kernel_time,
-        )
+        with timing_tables() as table_time:
+            outcomes = run_together(
+                [self.cases[part.case] for part in self.parts],
+                [self.designs[part.start : part.stop] for part in self.parts],
+                kernel_time,
+            )
         seconds = time.perf_counter() - begun
-        return Answer(self.provenance, outcomes, platform.node(), seconds, kernel_time)
+        return Answer(
+            self.provenance, outcomes, platform.node(), seconds, kernel_time, table_time.seconds
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +103,7 @@ class Answer:
         host: Name of the machine.
         seconds: That the task took there [s].
         kernel_time: Of these, and how the kernels' lanes were used.
+        table_seconds: Of these, that fuzzy tables took [s].
     """
 
     provenance: Provenance
@@ -105,6 +111,59 @@ class Answer:
     host: str
     seconds: float = 0.0
     kernel_time: KernelTime = field(default_factory=KernelTime)
+    table_seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TaskTotals:
+    """What tasks took in their workers, all together.
+
+    Attributes:
+        seconds: In tasks [s].
+        kernel_seconds: Of these, in kernels [s].
+        table_seconds: Of these, for fuzzy tables [s].
+        lane_use: Of the kernels.
+    """
+
+    seconds: float = 0.0
+    kernel_seconds: float = 0.0
+    table_seconds: float = 0.0
+    lane_use: LaneUse = field(default_factory=LaneUse)
+
+    def plus(self, answer: Answer) -> TaskTotals:
+        """With another task.
+
+        Args:
+            answer: What it came to.
+
+        Returns:
+            The totals.
+        """
+        return TaskTotals(
+            self.seconds + answer.seconds,
+            self.kernel_seconds + answer.kernel_time.seconds,
+            self.table_seconds + answer.table_seconds,
+            self.lane_use + answer.kernel_time.lane_use,
+        )
+
+    def since(self, earlier: TaskTotals) -> TaskTotals:
+        """Without those before.
+
+        Args:
+            earlier: Totals of before.
+
+        Returns:
+            The totals of what came since.
+        """
+        return TaskTotals(
+            self.seconds - earlier.seconds,
+            self.kernel_seconds - earlier.kernel_seconds,
+            self.table_seconds - earlier.table_seconds,
+            LaneUse(
+                self.lane_use.walked - earlier.lane_use.walked,
+                self.lane_use.computed - earlier.lane_use.computed,
+            ),
+        )
 
 
 @dataclass(frozen=True, slots=True)

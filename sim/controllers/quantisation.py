@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Final
 
@@ -117,6 +120,37 @@ class Quantised:
         return self.largest / OUTPUT_SCALE
 
 
+@dataclass(slots=True)
+class TableTime:
+    """What making tables took, of those who ask for it.
+
+    Attributes:
+        seconds: wall time, added to [s].
+        made: tables, added to.
+    """
+
+    seconds: float = 0.0
+    made: int = 0
+
+
+_table_time: Final[ContextVar[TableTime | None]] = ContextVar("table_time", default=None)
+
+
+@contextmanager
+def timing_tables() -> Iterator[TableTime]:
+    """Time the tables that this thread makes inside the block.
+
+    Yields:
+        What is added to.
+    """
+    spent = TableTime()
+    before = _table_time.set(spent)
+    try:
+        yield spent
+    finally:
+        _table_time.reset(before)
+
+
 def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
     """An inference on the axes' grid.
 
@@ -130,9 +164,14 @@ def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
     Returns:
         Its values, and the largest output, which they are shares of.
     """
+    begun = time.perf_counter()
     grid = {name: axis.grid() for name, axis in axes.items()}
     values, largest = compiled_table(system, grid) or reference_table(system, grid)
     values.flags.writeable = False
+    spent = _table_time.get()
+    if spent is not None:
+        spent.seconds += time.perf_counter() - begun
+        spent.made += 1
     return Quantised(values, largest)
 
 

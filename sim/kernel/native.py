@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import struct
 import threading
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -199,6 +201,11 @@ class NativeKernel:
                     " compiled kernels, and it will be built again"
                 )
 
+    @property
+    def code_size(self) -> int | None:
+        """Machine code of the library [B]; None where libraries are not in the ELF format."""
+        return text_size(Path(self._library._name).read_bytes())  # noqa: SLF001 - documented
+
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """All walks, `lanes` at a time: where one ends, the next one of `plan_lanes` begins.
 
@@ -254,6 +261,26 @@ class NativeKernel:
             ),
             LaneUse(walked=int(use.walked), computed=int(use.computed)),
         )
+
+
+def text_size(library: bytes) -> int | None:
+    """Size of the section `.text` of a 64-bit little-endian ELF file.
+
+    Args:
+        library: Content of the file.
+
+    Returns:
+        [B]; None for another format.
+    """
+    if library[:6] != b"\x7fELF\x02\x01":
+        return None
+    (table,) = struct.unpack_from("<Q", library, 0x28)
+    size, count, names = struct.unpack_from("<HHH", library, 0x3A)
+    headers = [struct.unpack_from("<IIQQQQ", library, table + size * k) for k in range(count)]
+    for name, _, _, _, _, length in headers:
+        if library.startswith(b".text\0", headers[names][4] + name):
+            return int(length)
+    return None
 
 
 _loaded: Final[dict[bytes, NativeKernel | None]] = {}

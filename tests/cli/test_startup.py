@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 import pytest
 
 from cli.exit_codes import ExitCode
+from services.profile import profile_job
+from sim.assembly import PHYSICS_RATE
+from sim.kernel.native import native_kernel
+from sim.kernel.walk import Precision
+from sim.robot import DEFAULT_ROBOT, load_robot
 from sim.simulate import lanes, prepare
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.processes import COMMAND_LINE, loaded_by, output, start_python
@@ -66,11 +72,42 @@ def test_a_reader_that_goes_away_is_no_error(finished: Finished, command: str) -
 
 
 @pytest.mark.slow
-def test_bench_tells_speed_lanes_and_backend(gaitswarm: Gaitswarm) -> None:
-    result = gaitswarm("bench", "--repeats", "1", "--json")
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_bench_tells_speed_lanes_and_backend(gaitswarm: Gaitswarm, precision: Precision) -> None:
+    result = gaitswarm("bench", "--repeats", "1", "--precision", precision, "--json")
     assert result.code == 0, result.err
     measured = result.json
-    assert (measured["backend"], measured["lanes"]) == (prepare(), lanes())
+    assert (measured["backend"], measured["lanes"]) == (prepare(), lanes(precision))
+    assert measured["precision"] == precision
+    assert 0.9 < measured["lane_use"] <= 1.0
+    kernel = native_kernel(load_robot(DEFAULT_ROBOT), precision)
+    assert kernel is not None and measured["bytes_of_code"] == kernel.code_size
     step = measured["us_per_step_per_walker"]
-    assert measured["real_time_factor_per_core"] == pytest.approx(1e6 / (step * 5000))
-    assert gaitswarm("bench", "--backend", "abacus").code == 2
+    assert measured["real_time_factor_per_core"] == pytest.approx(1e6 / (step * PHYSICS_RATE))
+
+
+@pytest.mark.parametrize("option", ["--backend", "--precision"])
+def test_bench_names_what_it_does_not_know(gaitswarm: Gaitswarm, option: str) -> None:
+    result = gaitswarm("bench", option, "abacus")
+    assert result.code == 2
+    assert option.removeprefix("--") in result.err
+
+
+@pytest.mark.slow
+def test_a_profile_says_what_each_part_takes_of_the_slots_time(
+    gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    brief = partial(profile_job, particles=2, iterations=2, cpus=1)
+    monkeypatch.setattr("services.profile.profile_job", brief)
+    result = gaitswarm("bench", "--profile", "--evaluator", "in-process", "--json")
+    assert result.code == 0, result.err
+    found = result.json
+    assert (found["slots"], found["walks"]) == (1, 12)
+    assert found["walks_per_second"] == pytest.approx(12 / found["seconds"])
+    assert 0.0 < found["lane_use"] <= 1.0
+    shares = found["shares"]
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert min(shares.values()) >= 0.0
+    assert all(shares[name] > 0.0 for name in ("physics", "tables", "preparation", "store"))
+    printed = gaitswarm("bench", "--profile", "--evaluator", "in-process").out
+    assert all(f"\n  {name} " in printed for name in shares)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,13 @@ from sim.controllers.fuzzy_pi_3 import integral_system, voltage_system
 from sim.controllers.fuzzy_sets import MembershipSets
 from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
 from sim.controllers.native_inference import compiled_table, inference_source
-from sim.controllers.quantisation import Axis, quantised, reference_table, table_bytes
+from sim.controllers.quantisation import (
+    Axis,
+    quantised,
+    reference_table,
+    table_bytes,
+    timing_tables,
+)
 from tests.examples.walks import PUBLISHED_A
 
 WEIGHTS = st.floats(0.1, 1.0)
@@ -268,6 +275,20 @@ def test_a_design_is_compiled_once_for_all_that_it_walks_through() -> None:
     stronger = control_law("fuzzy-pi", (*gains[:-1], (gains[-1][0], 0.5)))
     assert isinstance(law.direct, LookupTable) and isinstance(stronger.direct, LookupTable)
     assert (law.direct.values != stronger.direct.values).any()
+
+
+def test_tables_are_timed_in_the_thread_that_asks_and_once_each() -> None:
+    system = inference_system(0.3, 0.4, 0.5, 0.6, Shape.PI)
+    axes = {"error": ERROR, "current": CURRENT}
+    with timing_tables() as spent:
+        quantised(system, axes)
+        elsewhere = threading.Thread(target=quantised, args=(system, axes))
+        elsewhere.start()
+        elsewhere.join()
+    once = spent.seconds
+    quantised(system, axes)
+    assert spent.made == 1
+    assert spent.seconds == once > 0.0
 
 
 def test_chapter_3s_rules_follow_error_and_velocity_and_yield_to_current() -> None:

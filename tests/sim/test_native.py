@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.compiler.compilation import load_library, vector_header
+from sim.compiler.compilation import build_library, load_library, vector_header
 from sim.errors import KernelBuildError, SimulationInputError
-from sim.kernel.native import NativeKernel, native_kernel
+from sim.kernel.native import NativeKernel, native_kernel, text_size
 from sim.kernel.parameters import Layout
 from sim.robot import Robot, RobotFiles, load_robot
 from sim.simulate import prepare
@@ -340,3 +340,19 @@ def test_a_library_whose_structures_differ_is_refused_with_its_name(robot: Robot
     for name in right.keys() - {"lanes", "single", "integrands"}:
         with pytest.raises(KernelBuildError, match=rf"szabadka2 .* its {name} is 7, not"):
             made_of(right | {name: 7})
+
+
+def test_the_size_of_code_is_that_of_the_text_section(robot: Robot) -> None:
+    readelf = shutil.which("readelf")
+    if readelf is None:
+        pytest.skip("there is no readelf")
+    source = "int twice(int x) { return 2 * x; }"
+    library = build_library("size", source.encode(), lambda: source)
+    assert library is not None
+    listed = subprocess.run([readelf, "-SW", library], capture_output=True, text=True, check=True)
+    [text] = [line for line in listed.stdout.splitlines() if " .text " in line]
+    size = text_size(library.read_bytes())
+    assert size == int(text.split("PROGBITS")[1].split()[2], 16)
+    assert text_size(b"MZ, not of this format") is None
+    kernel = native_kernel(robot)
+    assert kernel is not None and kernel.code_size is not None and kernel.code_size > size

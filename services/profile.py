@@ -1,0 +1,180 @@
+"""What the time of a job goes into: physics, control, tables, workers."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.run.embedded import run_embedded
+from services.optimizer.search.pso import PsoSettings
+from services.optimizer.store.base import Store
+from services.optimizer.store.sql_store import open_store
+from services.worker import EvaluatorKind
+from services.worker.in_process import InProcessEvaluator
+from services.worker.ray_evaluator import RayEvaluator
+from services.worker.tasks import TaskTotals
+from sim.benchmark import measure_control
+from sim.kernel.walk import Precision
+
+
+@dataclass(frozen=True, slots=True)
+class JobProfile:
+    """What a job's time went into, from its first committed iteration to its last.
+
+    Attributes:
+        evaluator: Where its walks ran.
+        slots: Tasks that ran at the same time.
+        precision: Of the physics' numbers.
+        walks: Designs times scenarios.
+        seconds: Wall time [s].
+        walks_per_second: Of all slots together.
+        lane_use: Share of the kernel's lanes' time that was walked [1].
+        shares: Of the slots' time, by what it went into [1]; they add up to 1.
+    """
+
+    evaluator: EvaluatorKind
+    slots: int
+    precision: Precision
+    walks: int
+    seconds: float
+    walks_per_second: float
+    lane_use: float
+    shares: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """All clocks at a commit [s]. evaluated, stored: since the job began."""
+
+    at: float
+    evaluated: float
+    stored: float
+    tasks: TaskTotals
+
+
+def profile_job(
+    *,
+    evaluator: EvaluatorKind = "ray",
+    precision: Precision = "double",
+    particles: int = 25,
+    iterations: int = 25,
+    cpus: int | None = None,
+) -> JobProfile:
+    """Run the job of chapter 4 in a database of its own, and say what its time goes into.
+
+    Workers time their tasks, and in them kernels and tables; this process times evaluations and the
+    store. The kernel's time is divided into physics and control as `measure_control` finds it.
+
+    Args:
+        evaluator: Threads of this process; or a Ray cluster of its own, from the first task on.
+        precision: Of the physics' numbers.
+        particles: Of the swarm.
+        iterations: Of the job, 2 at least; the first one, with the start of all, is not counted.
+        cpus: Walks to compute at once; all cores by default.
+
+    Returns:
+        The profile.
+
+    Raises:
+        EvaluatorUnavailable: Ray cannot be started.
+        SimulationInputError: There is no compiled kernel on this machine.
+    """
+    control = measure_control(precision=precision)
+    spec = JobSpec(
+        optimizer=PsoSettings(particles=particles),
+        iterations=iterations,
+        precision=precision,
+        seed=1,
+    )
+    workers = _open(evaluator, cpus)
+    readings: list[_Reading] = []
+    with tempfile.TemporaryDirectory() as folder:
+        store = open_store(f"sqlite:///{Path(folder, 'jobs.db')}")
+        timed = _TimedStore(store)
+
+        def read(done: CompletedIteration, _state: JobState) -> None:
+            before = readings[-1].evaluated if readings else 0.0
+            evaluated = before + done.evaluate_seconds
+            readings.append(_Reading(time.perf_counter(), evaluated, timed.seconds, workers.totals))
+
+        try:
+            job, _ = store.create_job(spec)
+            run_embedded(cast("Store", timed), workers, job.id, on_commit=read)
+            slots = workers.slots
+        finally:
+            workers.close()
+            store.close()
+    walks = particles * len(spec.cases({})) * (len(readings) - 1)
+    return _profile(evaluator, precision, slots, walks, control, readings[0], readings[-1])
+
+
+def _profile(
+    evaluator: EvaluatorKind,
+    precision: Precision,
+    slots: int,
+    walks: int,
+    control: float,
+    first: _Reading,
+    last: _Reading,
+) -> JobProfile:
+    """control: share of the kernel's time."""
+    wall = last.at - first.at
+    evaluated, stored = last.evaluated - first.evaluated, last.stored - first.stored
+    tasks = last.tasks.since(first.tasks)
+    seconds = {
+        "physics": (1.0 - control) * tasks.kernel_seconds,
+        "control": control * tasks.kernel_seconds,
+        "tables": tasks.table_seconds,
+        "preparation": tasks.seconds - tasks.kernel_seconds - tasks.table_seconds,
+        "workers": slots * evaluated - tasks.seconds,
+        "search": slots * (wall - evaluated - stored),
+        "store": slots * stored,
+    }
+    return JobProfile(
+        evaluator=evaluator,
+        slots=slots,
+        precision=precision,
+        walks=walks,
+        seconds=wall,
+        walks_per_second=walks / wall,
+        lane_use=tasks.lane_use.share,
+        shares={name: spent / (slots * wall) for name, spent in seconds.items()},
+    )
+
+
+def _open(evaluator: EvaluatorKind, cpus: int | None) -> InProcessEvaluator | RayEvaluator:
+    if evaluator == "in-process":
+        return InProcessEvaluator(cpus)
+    cluster = RayEvaluator(cpus=cpus)
+    cluster.wait_until_open(lambda: False)
+    return cluster
+
+
+class _TimedStore:
+    """A store that times what is asked of it by the thread that made it: not the heartbeat's."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._thread = threading.get_ident()
+        self.seconds = 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        member = getattr(self._store, name)
+        if not callable(member) or threading.get_ident() != self._thread:
+            return member
+
+        def timed(*arguments: Any, **options: Any) -> Any:
+            begun = time.perf_counter()
+            try:
+                return member(*arguments, **options)
+            finally:
+                self.seconds += time.perf_counter() - begun
+
+        return timed

@@ -2,10 +2,16 @@
 
     python -m benchmarks.engines [--rounds 5] [--json]
 
-One thread each, the same step of 0.2 ms. The contestants take turns, so that a busy machine slows
-all of them alike; medians are compared. What they do is not the same: the kernel walks, with
-control, battery, ground and objectives; MuJoCo rolls out the logged motor voltages, with its own
-contacts or in free flight; Pinocchio computes accelerations only.
+One thread each, and each at the physics rate of our kernel. The contestants take turns, so that a
+busy machine slows all of them alike; medians are compared. Two figures are not one:
+
+    throughput   many walks at once: wall time over all walkers' steps. What a search needs.
+    latency      one walk alone: wall time over its steps. What somebody who waits for one needs.
+
+What they compute is not the same either, and each row says it: the kernel walks, with control,
+battery, ground and objectives; MuJoCo rolls out logged motor voltages, with its own contacts or in
+free flight; Pinocchio computes accelerations only. MuJoCo and Pinocchio step one robot at a time,
+so that on one core both figures are the same.
 """
 
 from __future__ import annotations
@@ -15,14 +21,20 @@ import json
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
 
 import mujoco
 import numpy as np
 from mujoco.rollout import Rollout
 
-from benchmarks.physics import ROBOT, native, pinocchio_aba
-from sim.assembly import PHYSICS_RATE
+from benchmarks.physics import ROBOT, pinocchio_aba
+from sim.assembly import PHYSICS_RATE, control_steps, plan_walk
+from sim.compiler.compilation import Target, target
+from sim.controllers import CONTROLLERS
+from sim.kernel.native import load_kernel
 from sim.kernel.observation import WalkLog
+from sim.kernel.walk import Coding, Precision
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
 from sim.simulate import simulate
@@ -31,6 +43,10 @@ from tests.mujoco.walker import CONTROL_PERIOD, drag_of
 
 SCENARIO = SCENARIOS[0]
 SUBSTEPS = round(CONTROL_PERIOD * PHYSICS_RATE)
+PRECISIONS: Final[tuple[Precision, ...]] = ("double", "single")
+AVX2: Final = Target(4, "x86-64-v3")
+WALKERS: Final = 64
+"""Walks at once: lanes of every kernel are full."""
 
 
 def stiff_walk() -> WalkLog:
@@ -71,43 +87,99 @@ def mujoco_rollout(log: WalkLog, *, contacts: bool) -> Callable[[], float]:
     return run
 
 
+@dataclass(frozen=True)
+class Contestant:
+    """What is timed: us a step and walker; figure is throughput or latency."""
+
+    name: str
+    figure: str
+    computes: str
+    run: Callable[[], float]
+
+
+def kernel(precision: Precision, wanted: Target | None, walkers: int) -> Callable[[], float]:
+    """Whole walks in our kernel, as compiled for a target; us a step and walker."""
+    robot = load_robot(ROBOT)
+    substeps, timestep = control_steps(robot)
+    plan = plan_walk(robot, SCENARIO, timestep)
+    compiled = load_kernel(robot, precision, wanted=wanted)
+    assert plan is not None
+    assert compiled is not None
+    law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    setups = [plan(law)] * walkers
+    steps = walkers * setups[0].ticks * substeps
+
+    def run() -> float:
+        before = time.perf_counter()
+        compiled.walk(setups, Coding.of(robot, substeps), log=False)
+        return (time.perf_counter() - before) / steps * 1e6
+
+    return run
+
+
+def contestants() -> list[Contestant]:
+    """All that this machine can run; the first is what ratios are of."""
+    log = stiff_walk()
+    walk = "whole walks: control, motors, ground, objectives"
+    targets: dict[str, Target] = {target().level or "plain": target()}
+    if target().lanes > AVX2.lanes:
+        targets[AVX2.level] = AVX2
+    kernels = [
+        Contestant(
+            f"kernel, {level}, {precision}",
+            figure,
+            walk,
+            kernel(precision, wanted, 1 if figure == "latency" else WALKERS),
+        )
+        for level, wanted in targets.items()
+        for precision in PRECISIONS
+        for figure in ("throughput", "latency")
+    ]
+    rollouts = [
+        Contestant(
+            f"mujoco.rollout, {name}",
+            "both",
+            f"dynamics under logged voltages, {name}",
+            mujoco_rollout(log, contacts=contacts),
+        )
+        for name, contacts in {"its own contacts": True, "free flight": False}.items()
+    ]
+    aba = Contestant("pinocchio.aba, from Python", "both", "accelerations only", pinocchio_aba())
+    return [*kernels, *rollouts, aba]
+
+
 def main() -> None:
     """Print a table, or JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    log = stiff_walk()
-    contestants = {
-        "compiled kernel, whole walk": native,
-        "mujoco.rollout, own contacts": mujoco_rollout(log, contacts=True),
-        "mujoco.rollout, free flight": mujoco_rollout(log, contacts=False),
-        "pinocchio.aba from Python, dynamics only": pinocchio_aba(),
-    }
-    seen: dict[str, list[float]] = {name: [] for name in contestants}
+    runs = contestants()
+    seen: dict[int, list[float]] = {k: [] for k in range(len(runs))}
     for _ in range(options.rounds):
-        for name, run in contestants.items():
-            seen[name].append(run())
-    medians = {name: statistics.median(values) for name, values in seen.items()}
-    base = next(iter(medians.values()))
+        for k, contestant in enumerate(runs):
+            seen[k].append(contestant.run())
+    medians = [statistics.median(values) for values in seen.values()]
     rows = [
         {
-            "what": name,
+            "what": contestant.name,
+            "figure": contestant.figure,
+            "computes": contestant.computes,
             "us_per_step": median,
-            "fastest": min(seen[name]),
-            "times_the_kernel": median / base,
+            "fastest": min(seen[k]),
+            "times_the_kernel": median / medians[0],
             "real_time_factor": 1e6 / PHYSICS_RATE / median,
         }
-        for name, median in medians.items()
+        for k, (contestant, median) in enumerate(zip(runs, medians, strict=True))
     ]
     if options.json:
         print(json.dumps({"mujoco": mujoco.__version__, "rows": rows}, indent=2))
         return
-    print(f"{'':42} {'us/step':>8} {'fastest':>8} {'ratio':>7} {'x real time':>12}")
+    print(f"{'':34} {'figure':10} {'us/step':>8} {'fastest':>8} {'ratio':>7} {'x real time':>12}")
     for row in rows:
         print(
-            f"{row['what']:42} {row['us_per_step']:8.3f} {row['fastest']:8.3f}"
-            f" {row['times_the_kernel']:7.1f} {row['real_time_factor']:12.1f}"
+            f"{row['what']:34} {row['figure']:10} {row['us_per_step']:8.3f} {row['fastest']:8.3f}"
+            f" {row['times_the_kernel']:7.1f} {row['real_time_factor']:12.1f}  {row['computes']}"
         )
 
 

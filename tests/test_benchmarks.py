@@ -24,6 +24,19 @@ def test_the_physics_benchmark_tells_ratios() -> None:
 
 
 @pytest.mark.slow
+def test_the_engines_benchmark_says_what_each_contestant_computes_and_what_is_timed() -> None:
+    done = python("-m", "benchmarks.engines", "--rounds", "1", "--json")
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)["rows"]
+    assert {row["figure"] for row in rows} == {"throughput", "latency", "both"}
+    assert all(row["computes"] and 0.0 < row["fastest"] <= row["us_per_step"] for row in rows)
+    speed = {(row["what"], row["figure"]): row["us_per_step"] for row in rows}
+    for what, figure in speed:
+        if figure == "throughput":
+            assert speed[what, "throughput"] < speed[what, "latency"]
+
+
+@pytest.mark.slow
 def test_the_history_benchmark_reads_a_store_of_its_own() -> None:
     options = ["--jobs", "8", "--iterations", "20", "--repeats", "1", "--json"]
     done = python("-m", "benchmarks.history", *options)

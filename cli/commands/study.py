@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cli.commands.study_controllers import controllers
+from cli.commands.study_precision import precision
 from cli.options import Json, RobotOption
 
 if TYPE_CHECKING:
@@ -26,11 +27,12 @@ Scenario = Annotated[str, typer.Option(help="Name or number, several separated b
 def register(app: typer.Typer) -> None:
     """Add the group of commands."""
     studies = typer.Typer(
-        help="Measure what tables, steps, noise and the kind of controller do to the objectives."
+        help="Measure what tables, steps, noise, precision and the controller do to the objectives."
     )
     studies.command()(tables)
     studies.command()(steps)
     studies.command()(noise)
+    studies.command()(precision)
     studies.command()(controllers)
     app.add_typer(studies, name="study")
 

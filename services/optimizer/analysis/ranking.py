@@ -91,7 +91,7 @@ def rank(columns: EvaluationColumns, preference: Preference, *, top: int) -> Ran
         ),
         present_best=float(fitness[present[0]]) if len(present) else None,
         best_so_far=best_so_far(columns.iteration, fitness),
-        correlation=_correlation(fitness, before),
+        correlation=rank_correlation(fitness, before),
     )
 
 
@@ -129,8 +129,16 @@ def _place(row: int, fitness: Floats, ordered: Floats) -> int | None:
     return int(np.searchsorted(ordered, own) + np.count_nonzero(fitness[:row] == own)) + 1
 
 
-def _correlation(now: Floats, before: Floats) -> float | None:
-    """Spearman's, over the rows that are finite in both; None where it is undefined."""
+def rank_correlation(now: Floats, before: Floats) -> float | None:
+    """Spearman's rank correlation, over the rows that are finite in both.
+
+    Args:
+        now: (r,) numbers.
+        before: (r,) those that they are compared with.
+
+    Returns:
+        The correlation [1]; None where it is undefined.
+    """
     # It takes most of a second to import, and few questions need it.
     from scipy.stats import spearmanr  # noqa: PLC0415
 

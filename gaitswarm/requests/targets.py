@@ -11,6 +11,7 @@ from services.optimizer.analysis.targets import LeaveOut, target_results
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import Job
 
 
@@ -29,6 +30,13 @@ class Histories(Protocol):
 
         Args:
             job: as it was read.
+        """
+
+    def best(self, job_id: str) -> Evaluation | None:
+        """The best design of a job.
+
+        Args:
+            job_id: identifier of the job.
         """
 
 
@@ -57,5 +65,9 @@ def run_targets(
         )
     check_comparable(jobs)
     runs = [histories.columns(job) for job in jobs]
-    results = target_results(spec, runs, leave_out)
+    bests = None
+    if spec.precision != "double":
+        found = [histories.best(job.id) for job in jobs]
+        bests = [best for best in found if best is not None]
+    results = target_results(spec, runs, leave_out, bests=bests)
     return TargetsView.from_results([job.id for job in jobs], spec, results)

@@ -12,6 +12,7 @@ from services.optimizer.analysis.identifiability import Trust, identifiability
 from services.optimizer.analysis.targets import target_results
 from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from sim.calibration.walk import RESULTS
 from sim.variables import Variable
 from tests.calibration.conftest import spec
@@ -50,6 +51,29 @@ def test_the_best_design_of_all_runs_is_compared_with_every_target() -> None:
     np.testing.assert_allclose([t.best.difference for t in found.targets[:3]], 1.0)
     assert found.fitness == pytest.approx(1.0)
     assert all(t.left_out is None for t in found.targets)
+
+
+def test_runs_in_single_precision_are_compared_by_their_bests_in_double() -> None:
+    runs = [made_up(WANTED, FAIR), made_up(WANTED, ALL_BUT_TORQUE)]
+    bests = [
+        Evaluation(
+            iteration=0,
+            particle=0,
+            design=run.designs[0],
+            objectives=run.objectives[0],
+            statuses=run.statuses[0],
+            fitness=float(run.fitness[0]),
+            reevaluation=Reevaluation(0, share * run.objectives[0], run.statuses[0], fitness),
+        )
+        for run, share, fitness in zip(runs, (1.01, 1.0), (2.5, 2.4), strict=True)
+    ]
+    assert target_results(WANTED, runs).run == 0
+    found = target_results(WANTED, runs, bests=bests)
+    assert (found.run, found.fitness) == (1, 2.4)
+    assert [t.best.simulated for t in found.targets] == [13.0, 50.0, 20.0, 1.0]
+    alone = target_results(WANTED, runs[:1], bests=bests[:1])
+    assert alone.fitness == 2.5
+    assert alone.targets[0].best.simulated == pytest.approx(1.01 * 11.0)
 
 
 def test_a_target_that_is_left_out_is_predicted_by_what_is_best_without_it() -> None:

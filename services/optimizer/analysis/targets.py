@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.iteration import Evaluation
 from sim.calibration.targets import Target
+from sim.outcome import Status
 
 Floats = NDArray[np.float64]
 
@@ -72,7 +74,11 @@ class TargetResults:
 
 
 def target_results(
-    spec: CalibrationSpec, runs: Sequence[EvaluationColumns], leave_out: LeaveOut | None = None
+    spec: CalibrationSpec,
+    runs: Sequence[EvaluationColumns],
+    leave_out: LeaveOut | None = None,
+    *,
+    bests: Sequence[Evaluation] | None = None,
 ) -> TargetResults:
     """Compare the best design of all runs with the targets.
 
@@ -83,6 +89,8 @@ def target_results(
         spec: of the runs, which differ in their seed alone.
         runs: all evaluations of each run.
         leave_out: what to leave out, each in its turn; None for nothing.
+        bests: the best design of each run with its reevaluation, of runs in single precision: what
+            the best comes to is then told in double, and only what is left out is of the search.
 
     Returns:
         What the best design comes to in every target.
@@ -93,10 +101,11 @@ def target_results(
     fitness = np.concatenate([run.fitness for run in runs])
     if not np.isfinite(fitness).any():
         raise ValueError("there is no design that did not fail")
-    best = int(np.argmin(fitness))
-    run, row = _place(runs, best)
     simulated = np.concatenate([spec.simulated(r.objectives, r.failed) for r in runs])
     differences = spec.differences(simulated)
+    best = _best_of_all(runs) if bests is None else _best_in_double(bests)
+    of_best = spec.simulated(best.objectives[None], (best.statuses != Status.OK)[None])
+    off = spec.differences(of_best)
     results = []
     for index, target in enumerate(spec.targets):
         left_out = None
@@ -105,27 +114,59 @@ def target_results(
             chosen = _best_by(differences[:, kept]) if kept.any() else None
             if chosen is not None:
                 left_out = _reached(simulated, differences, chosen, index)
-        results.append(
-            TargetResult(target, _reached(simulated, differences, best, index), left_out)
-        )
-    found = runs[run]
+        results.append(TargetResult(target, _reached(of_best, off, 0, index), left_out))
     return TargetResults(
-        run=run,
-        iteration=int(found.iteration[row]),
-        particle=int(found.particle[row]),
-        design=found.designs[row],
-        fitness=float(fitness[best]),
+        run=best.run,
+        iteration=best.iteration,
+        particle=best.particle,
+        design=best.design,
+        fitness=best.fitness,
         targets=tuple(results),
     )
 
 
-def _place(runs: Sequence[EvaluationColumns], index: int) -> tuple[int, int]:
-    """Run and row of an index into all evaluations."""
-    for number, run in enumerate(runs):
-        if index < len(run):
-            return number, index
-        index -= len(run)
-    raise IndexError(index)
+@dataclass(frozen=True, slots=True)
+class _Best:
+    """The best design of all runs; as in `Evaluation`."""
+
+    run: int
+    iteration: int
+    particle: int
+    design: Floats
+    objectives: Floats
+    statuses: NDArray[np.uint8]
+    fitness: float
+
+
+def _best_of_all(runs: Sequence[EvaluationColumns]) -> _Best:
+    run = int(np.argmin([columns.fitness.min(initial=math.inf) for columns in runs]))
+    found = runs[run]
+    row = int(np.argmin(found.fitness))
+    return _Best(
+        run,
+        int(found.iteration[row]),
+        int(found.particle[row]),
+        found.designs[row],
+        found.objectives[row],
+        found.statuses[row],
+        float(found.fitness[row]),
+    )
+
+
+def _best_in_double(bests: Sequence[Evaluation]) -> _Best:
+    anew = [best.reevaluation for best in bests]
+    judged = [(a.fitness, run, a) for run, a in enumerate(anew) if a is not None]
+    fitness, run, found = min(judged, key=lambda entry: entry[:2])
+    best = bests[run]
+    return _Best(
+        run,
+        best.iteration,
+        best.particle,
+        best.design,
+        found.objectives,
+        found.statuses,
+        fitness,
+    )
 
 
 def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut) -> NDArray[np.bool_]:

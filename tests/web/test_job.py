@@ -159,6 +159,27 @@ def test_a_job_is_extended_and_cloned(server: ServerProcess, visit: Callable[...
     expect(page.locator("[data-own]")).to_have_count(2)
 
 
+def test_a_job_in_single_precision_shows_its_best_in_double_and_the_difference(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/jobs/new")
+    expect(page.get_by_label("Precision")).to_have_value("double")
+    fill_in(page, "in single", iterations=2)
+    page.get_by_label("Precision").select_option("single")
+    page.get_by_role("button", name="Submit the job").click()
+
+    job_id = submitted(page)
+    best = server.wait_for(job_id, "succeeded")["best"]
+    expect_state(page, "succeeded")
+    expect(page.get_by_text("single precision")).to_be_visible()
+    figures = page.locator(".job-header dl")
+    expect(figures).to_contain_text("Best fitness, in double")
+    expect(figures).to_contain_text(f"{best['fitness']:.7g}")
+    searched = figures.locator("div", has_text="Its fitness in the search, in single")
+    expect(searched).to_contain_text(f"{best['search']['fitness']:.7g}")
+    expect(searched).to_contain_text("%")
+
+
 def test_a_clone_asks_for_the_same(server: ServerProcess, visit: Callable[..., Visit]) -> None:
     window = {"name": "fir_window", "kind": "categorical", "choices": ["hamming", "moving_average"]}
     job_id = server.submit(
@@ -173,6 +194,7 @@ def test_a_clone_asks_for_the_same(server: ServerProcess, visit: Callable[..., V
             "preference": "chapter-3",
             "optimizer": "pso-thesis",
             "iterations": 1,
+            "precision": "single",
         }
     )
     page = visit(server.url).go(f"/jobs/new?clone={job_id}")

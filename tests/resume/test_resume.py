@@ -19,6 +19,7 @@ from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
 from services.optimizer.store.base import Store
 from services.runtime import open_evaluator, run_embedded
+from sim.kernel.walk import Precision
 from tests.examples.jobs import history
 from tests.examples.processes import output, start_python
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
@@ -62,6 +63,15 @@ def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
     return job_id
 
 
+def best_in_double(store: Store, job_id: str) -> tuple[bytes, float] | None:
+    """What the best design was evaluated anew to; None for a search in double precision."""
+    best = store.best(job_id)
+    assert best is not None
+    anew = best.reevaluation
+    assert (anew is None) == (store.job(job_id).spec.precision == "double")
+    return None if anew is None else (anew.objectives.tobytes(), anew.fitness)
+
+
 def start(url: str, job_id: str, kind: str = "in-process") -> subprocess.Popen[str]:
     arguments = ("-m", "tests.resume.job_process", url, job_id, kind)
     return start_python(*arguments, stderr=None, start_new_session=True)
@@ -73,12 +83,16 @@ def kill_group(process: subprocess.Popen[str]) -> None:
     output(process.stdout).close()
 
 
-def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: Evaluator) -> None:
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_resumed_job_equals_one_never_killed(
+    store: Store, url: str, evaluator: Evaluator, precision: Precision
+) -> None:
+    spec = SPEC.model_copy(update={"precision": precision})
     begun = time.monotonic()
-    whole = run_alone(store, evaluator)
+    whole = run_alone(store, evaluator, spec)
     one_iteration = (time.monotonic() - begun) / SPEC.iterations
 
-    job_id = queue(store)
+    job_id = queue(store, spec)
     chance = random.Random(7)
     progress: list[int] = []
     # Five lives, or fewer where the machine becomes so fast that they would reach the end.
@@ -96,6 +110,7 @@ def test_resumed_job_equals_one_never_killed(store: Store, url: str, evaluator: 
     assert store.job(job_id).state is JobState.SUCCEEDED
     assert len(progress) >= 2 and progress[0] >= 1 and progress == sorted(progress)
     assert history(store, job_id) == history(store, whole)
+    assert best_in_double(store, job_id) == best_in_double(store, whole)
 
 
 def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(

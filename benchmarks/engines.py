@@ -30,7 +30,7 @@ from mujoco.rollout import Rollout
 
 from benchmarks.physics import ROBOT, pinocchio_aba
 from sim.assembly import PHYSICS_RATE, control_steps, plan_walk
-from sim.compiler.compilation import Target, target
+from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import load_kernel
 from sim.kernel.observation import WalkLog

@@ -110,11 +110,6 @@ OPERATION vec vec_sqrt(vec a)
 #define ROUNDER DOUBLE_ROUNDER
 #endif
 
-OPERATION ivec vec_round_int(vec a)
-{
-  return (ivec)(a + SPLAT(ROUNDER)) - (ivec)SPLAT(ROUNDER);
-}
-
 /* Both below 2^51 in size. */
 OPERATION dvec dvec_round(dvec a) { return (a + DSPLAT(DOUBLE_ROUNDER)) - DSPLAT(DOUBLE_ROUNDER); }
 

@@ -34,7 +34,7 @@ from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import load_kernel
 from sim.kernel.observation import WalkLog
-from sim.kernel.walk import Coding, Precision
+from sim.kernel.walk import Precision
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
 from sim.simulate import simulate
@@ -61,7 +61,7 @@ def mujoco_rollout(log: WalkLog, *, contacts: bool) -> Callable[[], float]:
     """A whole walk in `mujoco.rollout`, motors as affine actuators; us a step."""
     robot = load_robot(ROBOT)
     feet = Feet(drag_of(robot, SCENARIO)) if contacts else None
-    m = model(robot, scenario=SCENARIO, feet=feet, motor_voltage=True)
+    m = model(robot, scenario=SCENARIO, timestep=1.0 / PHYSICS_RATE, feet=feet, motor_voltage=True)
     m.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
     d = mujoco.MjData(m)
     d.qpos[:] = np.concatenate(
@@ -100,18 +100,18 @@ class Contestant:
 def kernel(precision: Precision, wanted: Target | None, walkers: int) -> Callable[[], float]:
     """Whole walks in our kernel, as compiled for a target; us a step and walker."""
     robot = load_robot(ROBOT)
-    substeps, timestep = control_steps(robot)
+    coding, timestep = control_steps(robot)
     plan = plan_walk(robot, SCENARIO, timestep)
     compiled = load_kernel(robot, precision, wanted=wanted)
     assert plan is not None
     assert compiled is not None
     law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
     setups = [plan(law)] * walkers
-    steps = walkers * setups[0].ticks * substeps
+    steps = walkers * setups[0].ticks * coding.substeps
 
     def run() -> float:
         before = time.perf_counter()
-        compiled.walk(setups, Coding.of(robot, substeps), log=False)
+        compiled.walk(setups, coding, log=False)
         return (time.perf_counter() - before) / steps * 1e6
 
     return run

@@ -40,12 +40,16 @@ def interpreter() -> Callable[[], float]:
     plan = plan_walk(robot, SCENARIOS[0], 1.0 / PHYSICS_RATE)
     assert plan is not None
     setup = plan(CONTROLLERS["p"].compile({"P": 0.25}))
-    stepper = Stepper(physics_model(robot).step, setup)
+    stepper = Stepper(physics_model(robot), setup)
+
+    def step() -> None:
+        stepper.kick()
+        stepper.drift(1.0)
 
     def run() -> float:
         stepper.q[:] = setup.start
         stepper.v[:] = 0.0
-        return per_call(stepper.advance, 5000)
+        return per_call(step, 5000)
 
     return run
 
@@ -89,7 +93,7 @@ def main() -> None:
             "us_per_step": median,
             "fastest": min(seen[name]),
             "times_the_kernel": median / base,
-            "real_time_factor": 1e6 / 5000 / median,
+            "real_time_factor": 1e6 / PHYSICS_RATE / median,
         }
         for name, median in medians.items()
     ]

@@ -39,7 +39,7 @@ NativeKernel.walk = first
 {COMMAND}
 """
 
-HELP = ([], ["optimize"], ["serve"], ["study", "noise"])
+HELP: tuple[list[str], ...] = ([], ["optimize"], ["serve"], ["study", "noise"])
 
 
 def shown(arguments: Sequence[str]) -> float:

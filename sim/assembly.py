@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -17,7 +18,7 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import Trajectory, desired_angles
 from sim.kernel.native import native_kernel
 from sim.kernel.parameters import gravity_on, internal_state_size, pack_parameters
-from sim.kernel.walk import Kernel, Precision, WalkResult, WalkSetup, current_smoothing
+from sim.kernel.walk import Coding, Kernel, Precision, WalkResult, WalkSetup, current_smoothing
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
 from sim.robot import Robot
@@ -28,8 +29,14 @@ Backend = Literal["auto", "native", "reference"]
 """`native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first that works
 here."""
 
-PHYSICS_RATE: Final = 5000
+PHYSICS_RATE: Final = 2500
 """Physics steps a second [Hz]; the control rate is 500 Hz."""
+
+LANDING_RATE: Final = 40_000
+"""Physics steps a second [Hz] at least in control ticks in which a foot may come down."""
+
+KARNOPP_PHYSICS_RATE: Final = 5000
+"""Rate [Hz] for robots whose friction jumps at v_d: steps decide when it does."""
 
 BACKLASH_PHYSICS_RATE: Final = 40_000
 """Rate [Hz] for robots with backlash: without their rotors, tibias answer the ground too fast for
@@ -109,19 +116,23 @@ def check_precision(robot: Robot, precision: Precision) -> None:
         )
 
 
-def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[int, float]:
+def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Coding, float]:
     """How a control tick is divided.
 
     Args:
-        robot: With backlash it is simulated at `BACKLASH_PHYSICS_RATE` at least.
+        robot: With backlash, or with friction that jumps, it is simulated at a higher rate.
         physics_rate: Physics steps a second [Hz].
 
     Returns:
-        Physics steps a control tick, and their length [s].
+        What a kernel wants to know of sensors, PWM and rates, and the length of a step [s].
     """
     if robot.has_backlash:
         physics_rate = max(physics_rate, BACKLASH_PHYSICS_RATE)
-    return round(physics_rate * CONTROL_PERIOD), 1.0 / physics_rate
+    if robot.description.contact_law == "karnopp":
+        physics_rate = max(physics_rate, KARNOPP_PHYSICS_RATE)
+    substeps = round(physics_rate * CONTROL_PERIOD)
+    refinement = max(1, math.ceil(LANDING_RATE / physics_rate))
+    return Coding.of(robot, substeps, refinement), 1.0 / physics_rate
 
 
 def check_stuck_leg(robot: Robot, scenario: Scenario) -> None:

@@ -94,7 +94,7 @@ class Scenario(BaseModel):
         description="Length of a foot's stroke on the ground [m].",
     )
     height: float = Field(
-        default=0.035,
+        default=0.04,
         ge=0.0,
         le=0.5,
         description="Height of the swing [m].",

@@ -25,7 +25,7 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.walk import Coding, Precision, WalkSetup
+from sim.kernel.walk import Precision, WalkSetup
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
@@ -166,7 +166,7 @@ def _simulating(
     if noise is not None and noise.kind == "angle":
         machine = with_shafts(machine)
     kernel = kernel_of(machine, backend, precision=precision)
-    substeps, timestep = control_steps(machine, physics_rate)
+    coding, timestep = control_steps(machine, physics_rate)
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
     measured = np.full((len(designs), N_MEASUREMENTS), np.nan)
@@ -189,12 +189,11 @@ def _simulating(
         plan = plans[key]
         if plan is not None:
             setups[index] = plan(law)
-    coding = Coding.of(machine, substeps)
     results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups.values()]
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
-        statuses[index], objectives[index] = judge(setup, result, substeps, timestep)
-        measured[index] = measure(setup, result, substeps)
+        statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
+        measured[index] = measure(setup, result, coding.substeps)
         if result.states is not None:
             logs[index] = walk_log(machine, setup, result.states)
     return Simulation(

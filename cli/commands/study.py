@@ -62,7 +62,7 @@ def steps(
     robot: RobotOption = None,
     as_json: Json = False,
 ) -> None:
-    """Compare physics at 5, 10 and 20 kHz with 40 kHz."""
+    """Compare physics at 2.5, 5, 10 and 20 kHz with 40 kHz."""
     from cli.design_file import read_design
     from cli.robots import chosen_robot, chosen_scenarios
     from sim.studies.accuracy import step_halving

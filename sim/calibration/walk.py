@@ -15,7 +15,7 @@ from sim.catalogue import design_catalogue
 from sim.controllers import ControllerName, control_law
 from sim.gait.trajectory import desired_angles
 from sim.kernel.batch import Walking, WantedWalk, walk_together
-from sim.kernel.walk import Coding, Precision, WalkSetup
+from sim.kernel.walk import Precision, WalkSetup
 from sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
 from sim.robot import Robot, RobotSource
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
@@ -82,12 +82,12 @@ class CalibrationWalk:
             described, robot = varied_robot(
                 self.robots, {name: v for name, v in values.items() if name in of_robot}
             )
-            substeps, timestep = control_steps(robot)
+            coding, timestep = control_steps(robot)
             setup = self._setup(described, robot, self.drive(values), timestep)
             if setup is not None:
                 timesteps[index] = timestep
                 kernel = kernel_of(robot, precision=self.precision)
-                wanted.append(WantedWalk(kernel, Coding.of(robot, substeps), setup))
+                wanted.append(WantedWalk(kernel, coding, setup))
         results = yield wanted
         for (index, timestep), walk, result in zip(timesteps.items(), wanted, results, strict=True):
             substeps = walk.coding.substeps

@@ -19,7 +19,14 @@ from typing import Final
 
 from sim.compiler import cache
 from sim.compiler.target import Target, target
-from sim.compiler.toolchain import FLAGS, Compiler, find_compiler, run_compiler, without_compiler
+from sim.compiler.toolchain import (
+    FLAGS,
+    SCHEDULING,
+    Compiler,
+    find_compiler,
+    run_compiler,
+    without_compiler,
+)
 from sim.errors import KernelBuildError
 
 TIME_LIMIT: Final = 300.0
@@ -110,7 +117,9 @@ def build_library(
             stored, or it is damaged and there is no compiler to build it again.
     """
     aim = (wanted or target()).resolved()
-    hashed = hashlib.sha256(repr((FLAGS, *extra_flags, aim, platform.system())).encode())
+    hashed = hashlib.sha256(
+        repr((FLAGS, SCHEDULING, *extra_flags, aim, platform.system())).encode()
+    )
     hashed.update(identity)
     digest = hashed.hexdigest()[:24]
     stem = f"{_safe(name)}-{digest}"

@@ -95,7 +95,7 @@ OPERATION vec vec_sqrt(vec a)
 #elif defined(__AVX__) && DOUBLES == 4
   return (vec)_mm256_sqrt_pd((__m256d)a);
 #else
-  vec r;
+  vec r = a;
   for (int k = 0; k < LANES; k++) r[k] = (real)__builtin_sqrt(a[k]);
   return r;
 #endif
@@ -149,39 +149,39 @@ OPERATION void vec_narrow(vec *x, int h, dvec value)
 
 OPERATION void vec_sincos(vec x, vec *sine, vec *cosine)
 {
-  const vec rounded = x * SPLAT(0x1.45f306dc9c883p-1) + SPLAT(ROUNDER);
+  const vec rounded = vec_fma(x, SPLAT(0x1.45f306dc9c883p-1), SPLAT(ROUNDER));
   const ivec quadrant = (ivec)rounded;
   const vec n = rounded - SPLAT(ROUNDER);
-  vec y = x - n * SPLAT(HALF_PI_1);
-  y = y - n * SPLAT(HALF_PI_2);
-  y = y - n * SPLAT(HALF_PI_3);
+  vec y = vec_fnma(n, SPLAT(HALF_PI_1), x);
+  y = vec_fnma(n, SPLAT(HALF_PI_2), y);
+  y = vec_fnma(n, SPLAT(HALF_PI_3), y);
   const vec z = y * y;
 #ifdef SINGLE
   vec s = SPLAT(1.0 / 362880.0);
 #else
   vec s = SPLAT(1.0 / 355687428096000.0);
-  s = s * z + SPLAT(-1.0 / 1307674368000.0);
-  s = s * z + SPLAT(1.0 / 6227020800.0);
-  s = s * z + SPLAT(-1.0 / 39916800.0);
-  s = s * z + SPLAT(1.0 / 362880.0);
+  s = vec_fma(s, z, SPLAT(-1.0 / 1307674368000.0));
+  s = vec_fma(s, z, SPLAT(1.0 / 6227020800.0));
+  s = vec_fma(s, z, SPLAT(-1.0 / 39916800.0));
+  s = vec_fma(s, z, SPLAT(1.0 / 362880.0));
 #endif
-  s = s * z + SPLAT(-1.0 / 5040.0);
-  s = s * z + SPLAT(1.0 / 120.0);
-  s = s * z + SPLAT(-1.0 / 6.0);
-  s = y + y * (z * s);
+  s = vec_fma(s, z, SPLAT(-1.0 / 5040.0));
+  s = vec_fma(s, z, SPLAT(1.0 / 120.0));
+  s = vec_fma(s, z, SPLAT(-1.0 / 6.0));
+  s = vec_fma(y, z * s, y);
 #ifdef SINGLE
   vec c = SPLAT(-1.0 / 3628800.0);
 #else
   vec c = SPLAT(-1.0 / 6402373705728000.0);
-  c = c * z + SPLAT(1.0 / 20922789888000.0);
-  c = c * z + SPLAT(-1.0 / 87178291200.0);
-  c = c * z + SPLAT(1.0 / 479001600.0);
-  c = c * z + SPLAT(-1.0 / 3628800.0);
+  c = vec_fma(c, z, SPLAT(1.0 / 20922789888000.0));
+  c = vec_fma(c, z, SPLAT(-1.0 / 87178291200.0));
+  c = vec_fma(c, z, SPLAT(1.0 / 479001600.0));
+  c = vec_fma(c, z, SPLAT(-1.0 / 3628800.0));
 #endif
-  c = c * z + SPLAT(1.0 / 40320.0);
-  c = c * z + SPLAT(-1.0 / 720.0);
-  c = c * z + SPLAT(1.0 / 24.0);
-  c = SPLAT(1.0) - z * (SPLAT(0.5) - z * c);
+  c = vec_fma(c, z, SPLAT(1.0 / 40320.0));
+  c = vec_fma(c, z, SPLAT(-1.0 / 720.0));
+  c = vec_fma(c, z, SPLAT(1.0 / 24.0));
+  c = vec_fnma(z, vec_fnma(z, c, SPLAT(0.5)), SPLAT(1.0));
   const ivec odd = -(quadrant & 1);
   const ivec sign_s = (quadrant & 2) << (8 * sizeof(real) - 2);
   const ivec sign_c = ((quadrant + 1) & 2) << (8 * sizeof(real) - 2);

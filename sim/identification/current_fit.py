@@ -13,9 +13,9 @@ from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.motor import electrical
+from sim.kernel.electrical import supply_voltage
 from sim.kernel.observation import sensed_currents
-from sim.kernel.walk import Coding, Precision
+from sim.kernel.walk import Precision
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
 from sim.robot.description import JOINTS_PER_LEG
@@ -80,7 +80,7 @@ class CurrentFit:
         scenario = with_gait(self.walk.scenario, self.walk.gait)
         control_law = CONTROLLERS[self.walk.controller].compile(self.walk.gains)
         kernel = kernel_of(described, precision=self.precision)
-        substeps, timestep = control_steps(described)
+        coding, timestep = control_steps(described)
         robots = [
             with_parameters(described, dict(zip(self.variables, row, strict=True)))
             for row in designs.tolist()
@@ -92,7 +92,7 @@ class CurrentFit:
             if plan is None:
                 raise SimulationInputError(f"{self.name}: the gait leaves the legs' reach")
             setups.append(plan(control_law))
-        results = kernel.walk(setups, Coding.of(described, substeps), log=True)
+        results = kernel.walk(setups, coding, log=True)
         errors = np.full((len(designs), JOINTS_PER_LEG), np.nan)
         statuses = np.full(len(designs), Status.OK, dtype=np.uint8)
         for index, (robot, result) in enumerate(zip(robots, results, strict=True)):
@@ -127,7 +127,15 @@ def recorded_currents(robot: Robot, states: Floats) -> Floats:
     if robot.has_backlash:
         rates = states[:, first + 2 * n : first + 3 * n]
     actuators, supply = robot.actuators(), robot.description.supply
-    columns = list(duty.T), list(rates.T), actuators.viscous.tolist()
-    seen = electrical(actuators, *columns, supply.voltage, supply.resistance)
-    current, voltage = (np.stack(part, axis=1) for part in (seen.currents, seen.voltages))
+    conductance = 1.0 / actuators.resistance
+    battery = supply_voltage(
+        list(duty.T),
+        list(rates.T),
+        actuators.torque.tolist(),
+        conductance.tolist(),
+        supply.voltage,
+        supply.resistance,
+    )
+    voltage = duty * battery[:, np.newaxis]
+    current = (voltage - actuators.torque * rates) * conductance
     return sensed_currents(robot, current, voltage)

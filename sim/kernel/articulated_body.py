@@ -1,19 +1,16 @@
 """Articulated-body algorithm of a floating-base robot, as symbols.
 
-Walks a `pinocchio.Model` and writes Featherstone's algorithm (Rigid Body Dynamics Algorithms,
-2008, table 9.4) for the tree it finds. Spatial quantities are pairs (linear, angular) in the
-frame of their own link, as in Pinocchio, which stays the oracle that this is tested against.
+Featherstone's algorithm (Rigid Body Dynamics Algorithms, 2008, table 9.4), a limb at a time: what
+a limb passes to the body, the body's acceleration, and what that makes of the limb. Spatial
+quantities are pairs (linear, angular) in the frame of their own link, as in Pinocchio, which is the
+oracle that this is tested against.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-
-from sim.errors import RobotFileError
 from sim.kernel.inertia import Force, Inertia, Motion
 from sim.kernel.spatial import (
     Matrix,
@@ -23,38 +20,30 @@ from sim.kernel.spatial import (
     apply,
     cross,
     dot,
-    matrix,
     multiply,
     rotation_about,
     scale,
-    subtract,
     transpose,
-    vector,
 )
-
-BASE = 1
-"""Index of the free-flyer joint in a Pinocchio model."""
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """One link and the revolute joint before it.
+    """One link of a chain and the revolute joint before it.
 
     Attributes:
-        joint: its name.
-        parent: index of the parent link, 0 is the base.
-        axis: constant unit axis in the link's frame.
-        rotation: of the joint in the parent's frame, at rest.
-        offset: of the joint in the parent's frame [m].
+        axis: unit axis in the link's frame.
+        rotation: to the frame before it, at the joint's angle.
+        offset: of the joint in the frame before it [m].
         inertia: in the link's frame.
+        rate: of the joint [rad/s].
     """
 
-    joint: str
-    parent: int
     axis: Vector
     rotation: Matrix
     offset: Vector
     inertia: Inertia
+    rate: Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,214 +62,167 @@ class LinkState:
     ahead: Vector
     height: Scalar
 
+    def carries(self, link: Link) -> LinkState:
+        """State of a link that hangs on this one.
+
+        Args:
+            link: The link.
+
+        Returns:
+            Its state.
+        """
+        inverse = transpose(link.rotation)
+        v, w = self.velocity.linear, self.velocity.angular
+        return LinkState(
+            velocity=Motion(
+                apply(inverse, add(v, cross(w, link.offset))),
+                add(apply(inverse, w), scale(link.rate, link.axis)),
+            ),
+            up=apply(inverse, self.up),
+            ahead=apply(inverse, self.ahead),
+            height=self.height + dot(self.up, link.offset),
+        )
+
 
 @dataclass(frozen=True, slots=True)
-class Acceleration:
-    """Accelerations of a tree.
+class Passed:
+    """What a joint's acceleration depends on, beside that of the frame before it.
 
     Attributes:
-        base: in the base's frame.
-        joints: (J,) [rad/s2].
+        column: articulated inertia times the joint's axis.
+        pivot: inverse of the inertia about the joint [1/(kg m2)].
+        free: acceleration of the joint while the frame before it does not accelerate [rad/s2].
+        coriolis: acceleration of the link that comes with its velocity.
     """
 
-    base: Motion
-    joints: tuple[Scalar, ...]
+    column: Force
+    pivot: Scalar
+    free: Scalar
+    coriolis: Motion
 
 
-def links_of(model: Any, joint_order: Sequence[str]) -> tuple[Link, ...]:
-    """The links of a Pinocchio model with a free-flyer base.
+def bias_force(inertia: Inertia, velocity: Motion) -> Force:
+    """Force that keeps a body's velocity in its own frame.
 
     Args:
-        model: `pinocchio.Model`.
-        joint_order: Names of all its joints but the free-flyer.
+        inertia: Of the body.
+        velocity: In its frame.
 
     Returns:
-        The links in the order of the joints.
-
-    Raises:
-        RobotFileError: A joint is not revolute, or the order misses one or has a child before its
-            parent.
+        v x* I v.
     """
-    if sorted(joint_order) != sorted(list(model.names)[BASE + 1 :]):
-        raise RobotFileError(
-            "robot.urdf: its movable joints are not the legs' joints of robot.toml:"
-            f" {', '.join(sorted(set(joint_order) ^ set(list(model.names)[BASE + 1 :])))}"
-        )
-    index_of = {model.getJointId(name): k for k, name in enumerate(joint_order, start=1)}
-    index_of[BASE] = 0
-    links = []
-    for name in joint_order:
-        j = model.getJointId(name)
-        if model.joints[j].nq != 1 or "Revolute" not in _kind(model.joints[j]):
-            raise RobotFileError(f"robot.urdf: joint {name!r} is not revolute")
-        if index_of[model.parents[j]] >= index_of[j]:
-            raise RobotFileError(f"robot.urdf: joint {name!r} comes before its parent")
-        subspace = np.asarray(model.joints[j].createData().S).reshape(-1)
-        placement = model.jointPlacements[j]
-        links.append(
-            Link(
-                joint=name,
-                parent=index_of[model.parents[j]],
-                axis=vector(subspace[3:]),
-                rotation=matrix(placement.rotation),
-                offset=vector(placement.translation),
-                inertia=_body_inertia(model.inertias[j]),
-            )
-        )
-    return tuple(links)
+    momentum = inertia.times(velocity)
+    v, w = velocity.linear, velocity.angular
+    return Force(
+        cross(w, momentum.linear),
+        add(cross(v, momentum.linear), cross(w, momentum.angular)),
+    )
 
 
-def kinematics(
+def inward(
     links: Sequence[Link],
-    base: LinkState,
-    sines: Sequence[Scalar],
-    cosines: Sequence[Scalar],
-    rates: Sequence[Scalar],
-) -> tuple[list[LinkState], list[Matrix]]:
-    """First pass: where every link is and how it moves.
-
-    Args:
-        links: Of the robot.
-        base: State of the base.
-        sines: Of the joint angles, (J,).
-        cosines: Of the joint angles, (J,).
-        rates: Joint velocities, (J,) [rad/s].
-
-    Returns:
-        State of every link (the base first), and each joint's rotation to its parent.
-    """
-    states, rotations = [base], []
-    for link, sine, cosine, rate in zip(links, sines, cosines, rates, strict=True):
-        parent = states[link.parent]
-        rotation = multiply(link.rotation, rotation_about(link.axis, sine, cosine))
-        inverse = transpose(rotation)
-        v, w = parent.velocity.linear, parent.velocity.angular
-        states.append(
-            LinkState(
-                velocity=Motion(
-                    apply(inverse, add(v, cross(w, link.offset))),
-                    add(apply(inverse, w), scale(rate, link.axis)),
-                ),
-                up=apply(inverse, parent.up),
-                ahead=apply(inverse, parent.ahead),
-                height=parent.height + dot(parent.up, link.offset),
-            )
-        )
-        rotations.append(rotation)
-    return states, rotations
-
-
-def articulated_body(
-    links: Sequence[Link],
-    base_inertia: Inertia,
     states: Sequence[LinkState],
-    rotations: Sequence[Matrix],
-    rates: Sequence[Scalar],
     torques: Sequence[Scalar],
-    armature: Sequence[float],
-    external: Mapping[int, Force],
-    gravity: Vector,
-) -> Acceleration:
-    """Second and third pass: accelerations under torques, external forces and gravity.
+    armature: Sequence[Scalar],
+    resistance: Inertia,
+    external: Force,
+) -> tuple[Inertia, Force, tuple[Passed, ...]]:
+    """Second pass over a chain: from its last link to the frame that carries it.
 
     Args:
-        links: Of the robot.
-        base_inertia: In the base's frame.
-        states: Of `kinematics`.
-        rotations: Of `kinematics`.
-        rates: Joint velocities, (J,) [rad/s].
-        torques: At the joints, (J,) [N m].
-        armature: Reflected rotor inertia, (J,) [kg m2].
-        external: Force on a link in its own frame, by the link's index as in `states`.
-        gravity: In the base's frame [m/s2].
+        links: Of the chain, from that frame on.
+        states: Of the links.
+        torques: At the joints [N m].
+        armature: What resists each joint's acceleration beside the links [kg m2].
+        resistance: What resists the last link's acceleration beside its inertia.
+        external: Force on the last link in its frame.
 
     Returns:
-        Accelerations of base and joints.
+        Articulated inertia and bias force that the carrying frame feels, and what `outward` needs.
     """
-    inertias = [base_inertia, *(link.inertia for link in links)]
-    forces = []
-    for k, (inertia, state) in enumerate(zip(inertias, states, strict=True)):
-        momentum = inertia.times(state.velocity)
-        v, w = state.velocity.linear, state.velocity.angular
-        bias = Force(
-            cross(w, momentum.linear),
-            add(cross(v, momentum.linear), cross(w, momentum.angular)),
-        )
-        if k in external:
-            applied = external[k]
-            bias = Force(
-                subtract(bias.linear, applied.linear),
-                subtract(bias.angular, applied.angular),
-            )
-        forces.append(bias)
-
-    passed: list[tuple[Force, Scalar, Scalar]] = []
-    coriolises: list[Motion] = []
-    for k in range(len(links), 0, -1):
-        link, rotation, rate = links[k - 1], rotations[k - 1], rates[k - 1]
-        inertia, state = inertias[k], states[k]
-        turning = scale(rate, link.axis)
+    inertia, force, passed = None, None, []
+    for link, state, torque, rotor in reversed(
+        list(zip(links, states, torques, armature, strict=True))
+    ):
+        bias = bias_force(link.inertia, state.velocity)
+        if inertia is None or force is None:
+            inertia, force = link.inertia.plus(resistance), bias.less(external)
+        else:
+            inertia, force = link.inertia.plus(inertia), bias.plus(force)
+        turning = scale(link.rate, link.axis)
         coriolis = Motion(
             cross(state.velocity.linear, turning),
             cross(state.velocity.angular, turning),
         )
         column = Force(apply(inertia.coupling, link.axis), apply(inertia.angular, link.axis))
-        pivot = 1.0 / (dot(link.axis, column.angular) + armature[k - 1])
-        force = forces[k].plus(inertia.times(coriolis))
-        free = pivot * (torques[k - 1] - dot(link.axis, force.angular))
-        passed.append((column, pivot, free))
-        # What the joint passes on, put together in the parent's frame: a link without children
-        # is still a rigid body there.
-        above = column.in_parent(rotation, link.offset)
+        pivot = 1.0 / (dot(link.axis, column.angular) + rotor)
+        force = force.plus(inertia.times(coriolis))
+        free = pivot * (torque - dot(link.axis, force.angular))
+        passed.append(Passed(column, pivot, free, coriolis))
+        # What the joint passes on, put together in the frame before it.
+        above = column.in_parent(link.rotation, link.offset)
         scaled = Force(scale(pivot, above.linear), scale(pivot, above.angular))
-        inertias[link.parent] = inertias[link.parent].plus(
-            inertia.in_parent(rotation, link.offset).less_outer(scaled, above)
-        )
+        inertia = inertia.in_parent(link.rotation, link.offset).less_outer(scaled, above)
         driven = Force(scale(free, above.linear), scale(free, above.angular))
-        forces[link.parent] = (
-            forces[link.parent].plus(force.in_parent(rotation, link.offset)).plus(driven)
-        )
-        coriolises.append(coriolis)
-    passed.reverse()
-    coriolises.reverse()
+        force = force.in_parent(link.rotation, link.offset).plus(driven)
+    assert inertia is not None  # noqa: S101 - a chain has links
+    assert force is not None  # noqa: S101
+    return inertia, force, tuple(reversed(passed))
 
-    # Accelerations are relative to free fall until gravity is put back at the end.
-    accelerations = [_solve(inertias[0], forces[0])]
+
+def outward(links: Sequence[Link], passed: Sequence[Passed], carrier: Motion) -> tuple[Scalar, ...]:
+    """Third pass over a chain: accelerations of its joints.
+
+    Args:
+        links: As for `inward`.
+        passed: By `inward`.
+        carrier: Acceleration of the frame that carries the chain, relative to free fall.
+
+    Returns:
+        By joint [rad/s2].
+    """
     joints = []
-    for k, link in enumerate(links, start=1):
-        (column, pivot, free), coriolis = passed[k - 1], coriolises[k - 1]
-        parent, inverse = accelerations[link.parent], transpose(rotations[k - 1])
-        linear = apply(inverse, add(parent.linear, cross(parent.angular, link.offset)))
-        angular = apply(inverse, parent.angular)
-        joint = free - pivot * (dot(column.linear, linear) + dot(column.angular, angular))
-        accelerations.append(
-            Motion(
-                add(linear, coriolis.linear),
-                add(angular, coriolis.angular, scale(joint, link.axis)),
-            )
+    acceleration = carrier
+    for link, by in zip(links, passed, strict=True):
+        inverse = transpose(link.rotation)
+        linear = apply(inverse, add(acceleration.linear, cross(acceleration.angular, link.offset)))
+        angular = apply(inverse, acceleration.angular)
+        joint = by.free - by.pivot * (
+            dot(by.column.linear, linear) + dot(by.column.angular, angular)
+        )
+        acceleration = Motion(
+            add(linear, by.coriolis.linear),
+            add(angular, by.coriolis.angular, scale(joint, link.axis)),
         )
         joints.append(joint)
-    falling = accelerations[0]
-    return Acceleration(Motion(add(falling.linear, gravity), falling.angular), tuple(joints))
+    return tuple(joints)
 
 
-def _kind(joint: Any) -> str:
-    name = str(joint.shortname())
-    return "Revolute" if name in ("JointModelRX", "JointModelRY", "JointModelRZ") else name
+def rotation_at(rest: Matrix, axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
+    """Rotation of a link to the frame before it.
+
+    Args:
+        rest: At angle zero.
+        axis: Constant unit axis.
+        sine: Of the angle.
+        cosine: Of the angle.
+
+    Returns:
+        At the angle.
+    """
+    return multiply(rest, rotation_about(axis, sine, cosine))
 
 
-def _body_inertia(inertia: Any) -> Inertia:
-    lever, mass = np.asarray(inertia.lever), float(inertia.mass)
-    about_origin = np.asarray(inertia.inertia) + mass * (
-        float(lever @ lever) * np.eye(3) - np.outer(lever, lever)
-    )
-    x, y, z = (float(value) for value in mass * lever)
-    rows = [tuple(float(value) for value in row) for row in about_origin]
-    return Inertia.of_body(mass, (x, y, z), (rows[0], rows[1], rows[2]))  # type: ignore[arg-type]
+def free_acceleration(inertia: Inertia, force: Force) -> Motion:
+    """Motion a with inertia a = -force, by an unrolled LDL^T factorisation.
 
+    Args:
+        inertia: Articulated inertia of the whole robot as its body feels it.
+        force: Bias force, likewise.
 
-def _solve(inertia: Inertia, force: Force) -> Motion:
-    """Motion a with inertia a = -force, by an unrolled LDL^T factorisation."""
+    Returns:
+        Acceleration of the body, relative to free fall.
+    """
     rows: list[list[Scalar]] = [[*inertia.linear[i], *inertia.coupling[i]] for i in range(3)] + [
         [*transpose(inertia.coupling)[i], *inertia.angular[i]] for i in range(3)
     ]

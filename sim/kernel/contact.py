@@ -13,8 +13,19 @@ from typing import Final
 import casadi as ca
 
 from sim.kernel.articulated_body import LinkState
-from sim.kernel.inertia import Force
-from sim.kernel.spatial import Scalar, Vector, add, cross, dot, scale
+from sim.kernel.spatial import (
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    dot,
+    mirrored,
+    outer,
+    plus,
+    scale,
+    subtract,
+)
 from sim.robot.description import ContactLaw
 
 InternalState = tuple[Scalar, ...]
@@ -34,6 +45,9 @@ class Foot:
         rising: part of the velocity along `up` [m/s].
         normal: force of the ground's spring [N].
         touching: 1 on the ground, 0 in the air.
+        damping: of the normal force, while it is not held at zero [N s/m].
+        penetration: of the sole into the ground, negative in the air [m].
+        mobility: upper bound of the foot's acceleration under a force [1/kg].
     """
 
     at: Vector
@@ -44,27 +58,79 @@ class Foot:
     rising: Scalar
     normal: Scalar
     touching: Scalar
+    damping: Scalar
+    penetration: Scalar
+    mobility: Scalar
 
-    def on_link(self, force: Vector) -> Force:
-        """A force at the foot as a spatial force on its link.
+    def lands_within(self, time: float) -> Scalar:
+        """Whether the foot may come down.
 
         Args:
-            force: In the link's frame [N].
+            time: [s].
 
         Returns:
-            The same about the link's origin.
+            1 if it is in the air and, at this speed, on the ground by then; else 0.
         """
-        return Force(force, cross(self.at, force))
+        return (1.0 - self.touching) * (self.penetration > self.rising * time)
+
+    def sliding(self, limit: Scalar, slip: Scalar, timestep: Scalar) -> Scalar:
+        """How sure it is that a sliding foot still slides after a step.
+
+        A friction that does not depend on the speed must not be taken as constant over a step in
+        which it may bring the foot to rest: the step would turn the foot round.
+
+        Args:
+            limit: The friction [N].
+            slip: Speed [m/s].
+            timestep: [s].
+
+        Returns:
+            1 for sure, 0 if the friction may stop the foot.
+        """
+        return ca.fmax(1.0 - limit * timestep * self.mobility / slip, 0.0)
+
+    def resisting(self, sideways: Scalar, further: Scalar = 0.0) -> Matrix:
+        """How a force at the foot falls as the foot moves faster.
+
+        Args:
+            sideways: Along the ground, in every direction [N s/m].
+            further: What is added along the slip, over the slip's square [N s3/m3].
+
+        Returns:
+            -dF/dv in the link's frame, with the damping along `up`, symmetric [N s/m].
+        """
+        resistance = outer(scale(self.damping - sideways, self.up), self.up)
+        even = ((sideways, 0.0, 0.0), (0.0, sideways, 0.0), (0.0, 0.0, sideways))
+        resistance = plus(resistance, even)
+        if not isinstance(further, float):
+            slip = subtract(self.velocity, scale(self.rising, self.up))
+            resistance = plus(resistance, outer(scale(further, slip), slip))
+        return mirrored(resistance)
 
 
-Friction = Callable[
-    [Foot, Mapping[str, Scalar], InternalState, Scalar], tuple[Force, InternalState]
-]
-"""A law of friction: (foot, ground, internal state, timestep) -> (force on the link, internal state
-after the step)."""
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """The ground's answer to a foot, in the link's frame.
+
+    Attributes:
+        force: on the foot [N].
+        resistance: -dF/dv, symmetric [N s/m].
+        internal_state: after the step.
+    """
+
+    force: Vector
+    resistance: Matrix
+    internal_state: InternalState = ()
 
 
-def foot_on_ground(link: LinkState, at: Vector, ground: Mapping[str, Scalar]) -> Foot:
+Friction = Callable[[Foot, Mapping[str, Scalar], InternalState, Scalar], Reaction]
+"""A law of friction: (foot, ground, internal state, timestep) -> reaction. Its resistance leaves
+out how friction follows the normal force, which is not symmetric."""
+
+
+def foot_on_ground(
+    link: LinkState, at: Vector, ground: Mapping[str, Scalar], mobility: Scalar
+) -> Foot:
     """F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling.
 
     The sole's spring hangs below the tibia's end along the ground's normal.
@@ -73,6 +139,7 @@ def foot_on_ground(link: LinkState, at: Vector, ground: Mapping[str, Scalar]) ->
         link: State of the tibia.
         at: The tibia's end in its frame [m].
         ground: Parameters of the foot by the names of `sim.robot.description.Contact`.
+        mobility: Upper bound of the tibia's end's acceleration under a force [1/kg].
 
     Returns:
         The foot.
@@ -91,36 +158,42 @@ def foot_on_ground(link: LinkState, at: Vector, ground: Mapping[str, Scalar]) ->
         rising=rising,
         normal=ca.fmax(elastic, 0.0) * touching,
         touching=touching,
+        damping=ground["damping"] * ((elastic > 0.0) * touching),
+        penetration=penetration,
+        mobility=mobility,
     )
 
 
 def linear_zone(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
-) -> tuple[Force, InternalState]:
+) -> Reaction:
     """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6).
 
     Args:
         foot: The foot.
         ground: Its `friction` and `slip_velocity`.
         internal_state: Nothing.
-        timestep: Not needed.
+        timestep: Of the physics [s].
 
     Returns:
-        Force on the link; nothing.
+        The reaction.
     """
-    del internal_state, timestep
+    del internal_state
     zone = ground["slip_velocity"]
     # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
     squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
     slip = ca.sqrt(ca.fmax(squared, zone * zone))
-    drag = ground["friction"] * foot.normal / slip
+    limit = ground["friction"] * foot.normal
+    drag = limit / slip
     force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
-    return foot.on_link(force), ()
+    constant = (squared > zone * zone) * foot.sliding(limit, slip, timestep)
+    further = -constant * drag / (slip * slip)
+    return Reaction(force, foot.resisting(drag, further))
 
 
 def karnopp(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
-) -> tuple[Force, InternalState]:
+) -> Reaction:
     """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14).
 
     Args:
@@ -130,7 +203,7 @@ def karnopp(
         timestep: Not needed.
 
     Returns:
-        Force on the link; nothing.
+        The reaction.
     """
     del internal_state, timestep
     threshold, limit = ground["stick_velocity"], ground["friction"] * foot.normal
@@ -139,12 +212,12 @@ def karnopp(
         speed = dot(axis, foot.velocity)
         sign = (threshold < speed) - (speed < -threshold)
         force = add(force, scale(-limit * sign, axis))
-    return foot.on_link(force), ()
+    return Reaction(force, foot.resisting(0.0))
 
 
 def stick(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
-) -> tuple[Force, InternalState]:
+) -> Reaction:
     """Spring and damper along the ground from where the foot came down, saturated at mu F_z.
 
     Args:
@@ -154,7 +227,7 @@ def stick(
         timestep: Of the physics [s].
 
     Returns:
-        Force on the link; the elongation after the step, which shrinks when the foot slips, and is
+        The reaction, with the elongation after the step, which shrinks when the foot slips, and is
         gone when it lifts off.
     """
     k, c = ground["stick_stiffness"], ground["stick_damping"]
@@ -171,33 +244,38 @@ def stick(
     force = scale(foot.normal, foot.up)
     for axis, component in zip((foot.ahead, foot.left), wanted, strict=True):
         force = add(force, scale(share * component, axis))
-    return foot.on_link(force), tuple(share * longer for longer in stretched)
+    after = tuple(share * longer for longer in stretched)
+    return Reaction(force, foot.resisting(share * c * foot.touching), after)
 
 
 def dead_zone(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
-) -> tuple[Force, InternalState]:
+) -> Reaction:
     """F_t = -mu F_z min(1, (|v| - v_d) / (v_lin - v_d)) v / |v|, none below v_d (table 2.6).
 
     Args:
         foot: The foot.
         ground: Its `friction`, `stick_velocity` v_d and `slip_velocity` v_lin.
         internal_state: Nothing.
-        timestep: Not needed.
+        timestep: Of the physics [s].
 
     Returns:
-        Force on the link; nothing.
+        The reaction.
     """
-    del internal_state, timestep
+    del internal_state
     threshold = ground["stick_velocity"]
     # Identified speeds may cross: the friction then jumps at v_d.
     width = ca.fmax(ground["slip_velocity"] - threshold, 1e-9)
     squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
     slip = ca.sqrt(ca.fmax(squared, threshold * threshold))
     share = ca.fmin((slip - threshold) / width, 1.0)
-    drag = ground["friction"] * foot.normal * share / slip
+    limit = ground["friction"] * foot.normal
+    drag = limit * share / slip
     force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
-    return foot.on_link(force), ()
+    steep = (squared > threshold * threshold) * (slip < threshold + width)
+    slope = limit * steep / width - drag
+    further = foot.sliding(limit, slip, timestep) * slope / (slip * slip)
+    return Reaction(force, foot.resisting(drag, further))
 
 
 FRICTION: Final[Mapping[ContactLaw, Friction]] = MappingProxyType(

@@ -8,7 +8,10 @@
 /* Sensors and PWM in coded integers, and the rates; one for a whole batch. */
 typedef struct {
   double angle_counts, current_counts, duty_per_count;
-  int64_t angle_step, current_step, pwm_step, pwm_counts, substeps;
+  int64_t angle_step, current_step, pwm_step, pwm_counts;
+  int64_t substeps;   /* physics steps in a round */
+  int64_t refinement; /* rounds in a control tick in which a foot may come down; else one */
+  const double *robot; /* NR, its constants */
 } Coding;
 
 /* sim.controllers.base.LookupTable; values is NULL where there is none. */
@@ -133,8 +136,9 @@ static void read_joint(Readings *r, const Control *s, const Coding *c, int j, in
   r->current[j][h] = code_of(current, c->current_counts, 0, CODE_LIMIT, c->current_step);
 }
 
-/* PWM counts of all joints (thesis 5.3). */
-static void control(Control *s, const Coding *c, const Readings *r, wide *counts)
+/* PWM counts of all joints (thesis 5.3); lanes in the midst of a tick keep what they remember. */
+static void control(Control *s, const Coding *c, const Readings *r, const divec *begins,
+                    wide *counts)
 {
   const dvec full = DSPLAT(c->pwm_counts);
   wide direct[NJ], integrated[NJ];
@@ -148,10 +152,11 @@ static void control(Control *s, const Coding *c, const Readings *r, wide *counts
       const dvec now = error * s->proportional_gain[h] +
                        r->change[j][h] * s->derivative_gain[h] + direct[j][h];
       const dvec grown = s->integral[j][h] + error * s->integral_gain[h] + integrated[j][h];
-      s->error[j][h] = error;
-      s->integral[j][h] = clamp(grown, -full, full);
-      const dvec output = clamp(half_up(now) + half_up(s->integral[j][h]), -full, full);
+      const dvec integral = clamp(grown, -full, full);
+      s->error[j][h] = dvec_select(begins[h], error, s->error[j][h]);
+      s->integral[j][h] = dvec_select(begins[h], integral, s->integral[j][h]);
+      const dvec output = clamp(half_up(now) + half_up(integral), -full, full);
       counts[j][h] = clamp(coarsen(output, c->pwm_step), -full, full);
     }
-  memset(s->begun, -1, sizeof s->begun);
+  for (int h = 0; h < HALVES; h++) s->begun[h] |= begins[h];
 }

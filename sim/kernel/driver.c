@@ -22,7 +22,7 @@ typedef struct {
   int64_t ticks;
   double fall_height;  /* of the body over the ground [m] */
   double fall_cosine;  /* of the tilt */
-  double current_smoothing; /* of the current's analog low-pass, a step; 1 for none */
+  double smoothing[2]; /* of the current's analog low-pass, by a step and by one of a landing; 1 for none */
   double *sums;        /* N_INTEGRANDS, summed over physics steps */
   double *end;         /* NQ, final position */
   double *log;         /* ticks x NLOG: q, v, internal state, duty; or NULL */
@@ -31,23 +31,26 @@ typedef struct {
 } Walker;
 
 /* The lanes: whom each of them walks and how far, and their states. A lane whose walk has ended,
-   and to which no other came, computes on; its walker has its results. */
+   and to which no other came, computes on; its walker has its results. A lane's control tick takes
+   one round of physics steps; one in which a foot may come down takes several rounds of short ones,
+   while other lanes are ahead. */
 typedef struct {
   Walker *walker[LANES];
   int walking[LANES];
-  int64_t tick[LANES];
-  int now; /* of the two states */
-  dvec q[2][HALVES][NQ];
-  vec v[2][NV], internal[2][NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ];
-  dvec timestep[HALVES], motor[HALVES][NJ]; /* motors' angles, where reals do not keep their small increments */
+  int64_t tick[LANES], rounds_left[LANES];
+  divec begins[HALVES]; /* lanes at the beginning of a control tick */
+  wide q[NQ];
+  wide motor[NJ]; /* motors' angles, with backlash */
+  vec v[NV], internal[NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ], landing;
+  wide timestep, weight; /* of a physics step [s], and per one of those without a landing */
   Control control;
-  int filtered; /* whether any lane's current has been */
+  int filtered, disturbed; /* whether any lane's current or links are */
   vec sensed[NJ], smoothing;
   wide sums[N_INTEGRANDS];
   vec peak;
 } Lanes;
 
-/* Lane-ticks that were walked for a walker, and all that were computed. */
+/* Rounds of physics steps that were walked for a walker, and all that were computed. */
 typedef struct {
   int64_t walked, computed;
 } LaneUse;
@@ -58,20 +61,20 @@ static void enter(Lanes *s, int k, Walker *w)
   s->walker[k] = w;
   s->walking[k] = 1;
   s->tick[k] = 0;
-  for (int i = 0; i < NQ; i++) s->q[s->now][k / DOUBLES][i][k % DOUBLES] = w->q0[i];
-  for (int i = 0; i < NV; i++) s->v[s->now][i][k] = 0;
-  for (int i = 0; i < NI; i++) s->internal[s->now][i][k] = (real)w->internal_state[i];
+  for (int i = 0; i < NQ; i++) OF_LANE(s->q[i], k) = w->q0[i];
+  for (int i = 0; i < NV; i++) s->v[i][k] = 0;
+  for (int i = 0; i < NI; i++) s->internal[i][k] = (real)w->internal_state[i];
   for (int i = 0; i < NP; i++) s->p[i][k] = (real)w->parameters[i];
   for (int i = 0; i < N_INTEGRANDS; i++) OF_LANE(s->sums[i], k) = 0.0;
   for (int j = 0; j < NJ; j++) {
     s->current[j][k] = s->sensed[j][k] = s->disturbance[j][k] = 0;
-    s->motor[k / DOUBLES][j][k % DOUBLES] = BACKLASH ? w->internal_state[j] : 0.0;
+    OF_LANE(s->motor[j], k) = BACKLASH ? w->internal_state[j] : 0.0;
   }
-  s->peak[k] = 0;
-  s->smoothing[k] = (real)w->current_smoothing;
-  OF_LANE(s->timestep, k) = w->parameters[TIMESTEP];
+  s->peak[k] = s->landing[k] = 0;
+  s->rounds_left[k] = 0;
   set_control(&s->control, k, &w->law);
-  if (w->current_smoothing < 1.0) s->filtered = 1;
+  if (w->smoothing[0] < 1.0) s->filtered = 1;
+  if (w->disturbance) s->disturbed = 1;
 }
 
 static void leave(Lanes *s, int k, int64_t status)
@@ -79,20 +82,27 @@ static void leave(Lanes *s, int k, int64_t status)
   Walker *w = s->walker[k];
   w->status = status;
   for (int i = 0; i < N_INTEGRANDS; i++) w->sums[i] = OF_LANE(s->sums[i], k);
-  for (int i = 0; i < NQ; i++) w->end[i] = s->q[s->now][k / DOUBLES][i][k % DOUBLES];
+  for (int i = 0; i < NQ; i++) w->end[i] = OF_LANE(s->q[i], k);
   w->peak_current = s->peak[k];
   s->walking[k] = 0;
 }
 
-static dvec encoder(const Lanes *s, int j, int h)
+static dvec encoder(const Lanes *s, int j, int h) { return BACKLASH ? s->motor[j][h] : s->q[7 + j][h]; }
+
+/* Lanes that are done with their control ticks begin the next one. */
+static void begin_ticks(Lanes *s, const Coding *c)
 {
-#if !BACKLASH
-  return s->q[s->now][h][7 + j];
-#elif defined(SINGLE)
-  return s->motor[h][j];
-#else
-  return vec_widened(&s->internal[s->now][j], h);
-#endif
+  for (int k = 0; k < LANES; k++) {
+    const Walker *w = s->walker[k];
+    OF_LANE(s->begins, k) = s->rounds_left[k] ? 0 : -1;
+    if (s->rounds_left[k]) continue;
+    const int landing = s->landing[k] > 0;
+    s->rounds_left[k] = landing ? c->refinement : 1;
+    OF_LANE(s->weight, k) = 1.0 / (double)s->rounds_left[k];
+    OF_LANE(s->timestep, k) = w->parameters[TIMESTEP] / (double)s->rounds_left[k];
+    s->p[TIMESTEP][k] = (real)OF_LANE(s->timestep, k);
+    s->smoothing[k] = (real)w->smoothing[landing];
+  }
 }
 
 static void control_tick(Lanes *s, const Coding *c)
@@ -104,7 +114,7 @@ static void control_tick(Lanes *s, const Coding *c)
     const Walker *w = s->walker[k];
     const int64_t row = (s->tick[k] < w->ticks ? s->tick[k] : w->ticks - 1) * NJ;
     for (int j = 0; j < NJ; j++) OF_LANE(desired[j], k) = w->desired[row + j];
-    if (w->disturbance)
+    if (s->disturbed && w->disturbance)
       for (int j = 0; j < NJ; j++) s->disturbance[j][k] = (real)w->disturbance[row + j];
   }
   for (int j = 0; j < NJ; j++) {
@@ -113,20 +123,22 @@ static void control_tick(Lanes *s, const Coding *c)
       read_joint(&readings, &s->control, c, j, h, encoder(s, j, h), vec_widened(&absolute, h),
                  desired[j][h]);
   }
-  control(&s->control, c, &readings, counts);
+  control(&s->control, c, &readings, s->begins, counts);
   for (int j = 0; j < NJ; j++)
-    for (int h = 0; h < HALVES; h++)
-      vec_narrow(&s->duty[j], h, counts[j][h] * DSPLAT(c->duty_per_count));
+    for (int h = 0; h < HALVES; h++) {
+      const dvec duty = counts[j][h] * DSPLAT(c->duty_per_count);
+      vec_narrow(&s->duty[j], h, dvec_select(s->begins[h], duty, vec_widened(&s->duty[j], h)));
+    }
 }
 
 static void write_log(const Lanes *s)
 {
   for (int k = 0; k < LANES; k++) {
-    if (!s->walker[k]->log || !s->walking[k]) continue;
+    if (!s->walker[k]->log || !s->walking[k] || !OF_LANE(s->begins, k)) continue;
     double *row = s->walker[k]->log + s->tick[k] * NLOG;
-    for (int i = 0; i < NQ; i++) *row++ = s->q[s->now][k / DOUBLES][i][k % DOUBLES];
-    for (int i = 0; i < NV; i++) *row++ = s->v[s->now][i][k];
-    for (int i = 0; i < NI; i++) *row++ = s->internal[s->now][i][k];
+    for (int i = 0; i < NQ; i++) *row++ = OF_LANE(s->q[i], k);
+    for (int i = 0; i < NV; i++) *row++ = s->v[i][k];
+    for (int i = 0; i < NI; i++) *row++ = s->internal[i][k];
     for (int i = 0; i < NJ; i++) *row++ = s->duty[i][k];
   }
 }
@@ -149,99 +161,81 @@ static void unfiltered(vec *sensed, const vec *current, vec smoothing)
 /* Lanes whose state is finite; x - x is zero for a finite x only. */
 static divec all_finite(const Lanes *s, int h)
 {
-  const dvec *q = s->q[s->now][h];
-  const vec *v = s->v[s->now], *internal = s->internal[s->now];
   dvec precise = DSPLAT(0.0);
   vec residue = SPLAT(0.0);
-  for (int i = 0; i < NQ; i++) precise += q[i] - q[i];
-  for (int i = 0; i < NV; i++) residue += v[i] - v[i];
-  for (int i = 0; i < NI; i++) residue += internal[i] - internal[i];
+  for (int i = 0; i < NQ; i++) precise += s->q[i][h] - s->q[i][h];
+  for (int i = 0; i < NV; i++) residue += s->v[i] - s->v[i];
+  for (int i = 0; i < NI; i++) residue += s->internal[i] - s->internal[i];
   return precise + vec_widened(&residue, h) == DSPLAT(0.0);
 }
 
-#ifdef SINGLE
-/* Positions with the velocities after the step, as integration.py has it. Their increments are too
-   small for floats, so they are kept, and grow, in doubles. */
-static void drift(Lanes *s, int h)
+/* Positions after some steps at these velocities, as body.py has it. The increments are too small
+   for floats. */
+static void drift(Lanes *s, int h, double steps)
 {
-  const dvec *q = s->q[s->now][h];
-  dvec *after = s->q[1 - s->now][h];
-  const vec *v = s->v[1 - s->now];
-  const dvec dt = s->timestep[h], half = DSPLAT(0.5) * dt, one = DSPLAT(1.0);
-  const dvec x = q[3], y = q[4], z = q[5], w = q[6];
-  const dvec vx = vec_widened(&v[0], h), vy = vec_widened(&v[1], h), vz = vec_widened(&v[2], h);
+  const dvec one = DSPLAT(1.0), half = DSPLAT(0.5), t = DSPLAT(steps) * s->timestep[h];
+  wide *const q = s->q;
+  const dvec x = q[3][h], y = q[4][h], z = q[5][h], w = q[6][h];
+  dvec a = half * t * vec_widened(&s->v[3], h), b = half * t * vec_widened(&s->v[4], h),
+       c = half * t * vec_widened(&s->v[5], h);
+  const dvec lx = t * vec_widened(&s->v[0], h), ly = t * vec_widened(&s->v[1], h),
+             lz = t * vec_widened(&s->v[2], h);
+  const dvec vx = lx + (b * lz - c * ly), vy = ly + (c * lx - a * lz), vz = lz + (a * ly - b * lx);
   const dvec tx = DSPLAT(2.0) * (y * vz - z * vy), ty = DSPLAT(2.0) * (z * vx - x * vz),
              tz = DSPLAT(2.0) * (x * vy - y * vx);
-  after[0] = q[0] + dt * (vx + w * tx + (y * tz - z * ty));
-  after[1] = q[1] + dt * (vy + w * ty + (z * tx - x * tz));
-  after[2] = q[2] + dt * (vz + w * tz + (x * ty - y * tx));
-  dvec a = half * vec_widened(&v[3], h), b = half * vec_widened(&v[4], h),
-       c = half * vec_widened(&v[5], h);
+  q[0][h] += vx + w * tx + (y * tz - z * ty);
+  q[1][h] += vy + w * ty + (z * tx - x * tz);
+  q[2][h] += vz + w * tz + (x * ty - y * tx);
   const dvec square = a * a + b * b + c * c;
-  const dvec e = one - square * (DSPLAT(0.5) - square * DSPLAT(1.0 / 24.0));
+  const dvec e = one - square * (half - square * DSPLAT(1.0 / 24.0));
   const dvec shorter = one - square * DSPLAT(1.0 / 6.0);
   a *= shorter, b *= shorter, c *= shorter;
   const dvec turned[4] = {w * a + x * e + y * c - z * b, w * b - x * c + y * e + z * a,
                           w * c + x * b - y * a + z * e, w * e - x * a - y * b - z * c};
   const dvec length = turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] +
                       turned[3] * turned[3];
-  const dvec correction = DSPLAT(1.5) - DSPLAT(0.5) * length;
-  for (int i = 0; i < 4; i++) after[3 + i] = turned[i] * correction;
-  for (int j = 0; j < NJ; j++) after[7 + j] = q[7 + j] + dt * vec_widened(&v[6 + j], h);
+  const dvec correction = DSPLAT(1.5) - half * length;
+  for (int i = 0; i < 4; i++) q[3 + i][h] = turned[i] * correction;
+  for (int j = 0; j < NJ; j++) q[7 + j][h] += t * vec_widened(&s->v[6 + j], h);
 #if BACKLASH
-  vec *internal = s->internal[1 - s->now];
   for (int j = 0; j < NJ; j++) {
-    s->motor[h][j] += dt * vec_widened(&internal[NJ + j], h);
-    vec_narrow(&internal[j], h, s->motor[h][j]);
+    s->motor[j][h] += t * vec_widened(&s->internal[NJ + j], h);
+    vec_narrow(&s->internal[j], h, s->motor[j][h]);
   }
 #endif
 }
-#endif
 
-/* One physics step: the emitted one. */
-static void advance(Lanes *s, vec *integrands, vec *largest)
+static void round_of_steps(Lanes *s, const Coding *c)
 {
-  const int now = s->now, next = 1 - s->now;
-#ifdef SINGLE
-  vec q[NQ], unused[NQ];
-  for (int i = 0; i < NQ; i++)
-    for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[now][h][i]);
-  step(q, s->v[now], s->internal[now], s->duty, s->disturbance, s->p, unused, s->v[next],
-       s->internal[next], s->current, integrands, largest);
-  for (int h = 0; h < HALVES; h++) drift(s, h);
-#else
-  step(s->q[now][0], s->v[now], s->internal[now], s->duty, s->disturbance, s->p, s->q[next][0],
-       s->v[next], s->internal[next], s->current, integrands, largest);
-#endif
-  s->now = next;
-}
-
-static void physics_steps(Lanes *s, int64_t substeps)
-{
-  vec integrands[N_INTEGRANDS], largest;
-  for (int64_t n = 0; n < substeps; n++) {
-    advance(s, integrands, &largest);
+  vec q[NQ], integrands[N_INTEGRANDS], largest;
+  for (int h = 0; h < HALVES; h++) drift(s, h, 0.5);
+  for (int64_t left = c->substeps; left-- > 0;) {
+    for (int i = 0; i < NQ; i++)
+      for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[i][h]);
+    kick(q, s->v, s->internal, s->duty, s->disturbance, s->p, c->robot, s->current, integrands,
+         &largest, &s->landing);
+    for (int h = 0; h < HALVES; h++) drift(s, h, left ? 1.0 : 0.5);
     for (int i = 0; i < N_INTEGRANDS; i++)
-      for (int h = 0; h < HALVES; h++) s->sums[i][h] += vec_widened(&integrands[i], h);
+      for (int h = 0; h < HALVES; h++)
+        s->sums[i][h] += s->weight[h] * vec_widened(&integrands[i], h);
     s->peak = vec_max(s->peak, largest);
     if (s->filtered) low_pass(s->sensed, s->current, s->smoothing);
   }
 }
 
 /* Walks that have come to an end by now leave their lanes; returns how many were walked. */
-static int end_tick(Lanes *s)
+static int end_round(Lanes *s)
 {
   int walked = 0;
   for (int h = 0; h < HALVES; h++) {
-    const dvec *q = s->q[s->now][h];
-    const dvec qx = q[3], qy = q[4], height = q[2];
+    const dvec qx = s->q[3][h], qy = s->q[4][h], height = s->q[2][h];
     const dvec upright = DSPLAT(1.0) - DSPLAT(2.0) * (qx * qx + qy * qy);
     const divec sound = all_finite(s, h);
     for (int n = 0; n < DOUBLES; n++) {
       const int k = h * DOUBLES + n;
       const Walker *w = s->walker[k];
-      if (!s->walking[k]) continue;
-      walked++;
+      walked += s->walking[k];
+      if (--s->rounds_left[k] || !s->walking[k]) continue;
       s->tick[k]++;
       if (!sound[n]) leave(s, k, DIVERGED);
       else if (height[n] < w->fall_height || upright[n] < w->fall_cosine) leave(s, k, FELL);
@@ -265,11 +259,12 @@ void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding, LaneUse *u
     s.walking[k] = k < n;
   }
   while (walking) {
+    begin_ticks(&s, coding);
     if (s.filtered) unfiltered(s.sensed, s.current, s.smoothing);
     control_tick(&s, coding);
     write_log(&s);
-    physics_steps(&s, coding->substeps);
-    use->walked += end_tick(&s);
+    round_of_steps(&s, coding);
+    use->walked += end_round(&s);
     use->computed += LANES;
     walking = 0;
     for (int k = 0; k < LANES; k++) {
@@ -284,6 +279,7 @@ int64_t gaitswarm_single(void) { return sizeof(real) == sizeof(float); }
 int64_t gaitswarm_joints(void) { return NJ; }
 int64_t gaitswarm_internal_state_size(void) { return NI; }
 int64_t gaitswarm_parameters(void) { return NP; }
+int64_t gaitswarm_constants(void) { return NR; }
 int64_t gaitswarm_integrands(void) { return N_INTEGRANDS; }
 int64_t gaitswarm_log_width(void) { return NLOG; }
 int64_t gaitswarm_size_of_coding(void) { return sizeof(Coding); }

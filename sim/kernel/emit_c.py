@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Container
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import casadi
@@ -11,8 +12,6 @@ import casadi
 from sim.errors import SimulationError
 
 _BINARY: Final[dict[str, str]] = {
-    "OP_ADD": "{0} + {1}",
-    "OP_SUB": "{0} - {1}",
     "OP_MUL": "{0} * {1}",
     "OP_FMAX": "vec_max({0}, {1})",
     "OP_FMIN": "vec_min({0}, {1})",
@@ -28,15 +27,20 @@ _UNARY: Final[dict[str, str]] = {
 }
 
 
-def emit_c(function: Any, name: str) -> str:
+def emit_c(
+    function: Any, name: str, uniform: Container[str] = (), *, in_place: bool = False
+) -> str:
     """C source of `static void <name>(const vec *i0, ..., vec *o0, ...)`.
 
-    Inputs and outputs must not overlap. The sine and cosine of one angle share their range
-    reduction, and a divisor used more than once is inverted once.
+    Inputs and outputs must not overlap, unless it is to work in place. The sine and cosine of one
+    angle share their range reduction, a divisor used more than once is inverted once, and a
+    product that is only a term of sums is rounded with each of them (fused multiply-add).
 
     Args:
         function: A CasADi function of scalars (`SX`).
         name: Of the C function.
+        uniform: Names of inputs that all walkers share: `const double *` in place of `const vec *`.
+        in_place: Whether outputs are written when all inputs have been read.
 
     Returns:
         C text that needs `vec.h`.
@@ -44,12 +48,49 @@ def emit_c(function: Any, name: str) -> str:
     Raises:
         SimulationError: An operation of the function has no rule.
     """
-    return _Emitter(function).source(name)
+    return _Emitter(function, uniform, in_place=in_place).source(name)
+
+
+@dataclass(frozen=True, slots=True)
+class _Uses:
+    """How often each value is an operand, a divisor, a term of a sum; factors of the products."""
+
+    operands: Counter[str] = field(default_factory=Counter)
+    divisors: Counter[str] = field(default_factory=Counter)
+    terms: Counter[str] = field(default_factory=Counter)
+    products: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    def fused(self, value: str) -> bool:
+        """Whether a value is a product that is only ever a term of sums."""
+        return value in self.products and self.operands[value] == self.terms[value] > 0
+
+
+def _sum(op: str, operands: list[str], uses: _Uses) -> str:
+    a, b = operands
+    if uses.fused(b):
+        operation = "vec_fma" if op == "OP_ADD" else "vec_fnma"
+        return _fused(operation, b, _value(a, uses), uses)
+    if uses.fused(a):
+        return _fused("vec_fma" if op == "OP_ADD" else "vec_fms", a, b, uses)
+    return f"{a} {'+' if op == 'OP_ADD' else '-'} {b}"
+
+
+def _fused(operation: str, product: str, term: str, uses: _Uses) -> str:
+    x, y = uses.products[product]
+    return f"{operation}({x}, {y}, {term})"
+
+
+def _value(name: str, uses: _Uses) -> str:
+    """Where both terms of a sum are products, the first one is rounded."""
+    return " * ".join(uses.products[name]) if uses.fused(name) else name
 
 
 class _Emitter:
-    def __init__(self, function: Any) -> None:
+    def __init__(self, function: Any, uniform: Container[str], *, in_place: bool) -> None:
+        self._in_place = in_place
+        self._outputs: list[str] = []
         self._function = function
+        self._uniform = [function.name_in(k) in uniform for k in range(function.n_in())]
         self._names = {
             getattr(casadi, n): n
             for n in dir(casadi)
@@ -62,20 +103,39 @@ class _Emitter:
 
     def source(self, name: str) -> str:
         f = self._function
-        arguments = [f"const vec *restrict i{k}" for k in range(f.n_in())]
-        arguments += [f"vec *restrict o{k}" for k in range(f.n_out())]
-        divisors = Counter(self._replay(lambda *_: None))
-        self._work.clear()
-        self._replay(lambda k, op, operands: self._emit(k, op, operands, divisors))
+        restrict = "" if self._in_place else "restrict "
+        arguments = [
+            f"const {'double' if uniform else 'vec'} *{restrict}i{k}"
+            for k, uniform in enumerate(self._uniform)
+        ]
+        arguments += [f"vec *{restrict}o{k}" for k in range(f.n_out())]
+        uses = self._uses()
+        self._replay(lambda k, op, operands: self._emit(k, op, operands, uses))
         names = [*(f"i{k}" for k in range(f.n_in())), *(f"o{k}" for k in range(f.n_out()))]
         sizes = [*map(f.nnz_in, range(f.n_in())), *map(f.nnz_out, range(f.n_out()))]
         empty = [f"(void){name};" for name, size in zip(names, sizes, strict=True) if not size]
-        body = "\n".join(f"  {line}" for line in [*empty, *self._lines])
+        body = "\n".join(f"  {line}" for line in [*empty, *self._lines, *self._outputs])
         return f"static void {name}({', '.join(arguments)})\n{{\n{body}\n}}\n"
 
-    def _replay(self, visit: Callable[[int, str, list[str]], None]) -> list[str]:
-        """Walk the instructions, naming each value once; returns the divisors."""
-        f, divisors = self._function, []
+    def _uses(self) -> _Uses:
+        uses = _Uses()
+
+        def count(k: int, op: str, operands: list[str]) -> None:
+            uses.operands.update(operands)
+            if op == "OP_DIV":
+                uses.divisors[operands[1]] += 1
+            if op in ("OP_ADD", "OP_SUB"):
+                uses.terms.update(operands)
+            if op in ("OP_MUL", "OP_SQ"):
+                uses.products[f"t{k}"] = (operands[0], operands[-1])
+
+        self._replay(count)
+        self._work.clear()
+        return uses
+
+    def _replay(self, visit: Callable[[int, str, list[str]], None]) -> None:
+        """Walk the instructions, naming each value once."""
+        f = self._function
         for k in range(f.n_instructions()):
             op = self._names[f.instruction_id(k)]
             if op in ("OP_CONST", "OP_INPUT"):
@@ -83,35 +143,40 @@ class _Emitter:
             else:
                 operands = [self._work[index] for index in f.instruction_input(k)]
             visit(k, op, operands)
-            if op == "OP_DIV":
-                divisors.append(operands[1])
             if op != "OP_OUTPUT":
                 (target,) = f.instruction_output(k)
                 self._work[target] = f"t{k}"
-        return divisors
 
-    def _emit(self, k: int, op: str, operands: list[str], divisors: Counter[str]) -> None:
-        f = self._function
+    def _emit(self, k: int, op: str, operands: list[str], uses: _Uses) -> None:
         if op == "OP_OUTPUT":
-            output, element = f.instruction_output(k)
-            self._lines.append(f"o{output}[{element}] = {operands[0]};")
-            return
+            output, element = self._function.instruction_output(k)
+            lines = self._outputs if self._in_place else self._lines
+            lines.append(f"o{output}[{element}] = {operands[0]};")
+        elif not uses.fused(f"t{k}"):
+            self._lines.append(f"const vec t{k} = {self._result(k, op, operands, uses)};")
+
+    def _result(self, k: int, op: str, operands: list[str], uses: _Uses) -> str:
+        f = self._function
         if op == "OP_CONST":
             value = f"SPLAT({float(f.instruction_constant(k)).hex()})"
         elif op == "OP_INPUT":
             argument, element = f.instruction_input(k)
             value = f"i{argument}[{element}]"
+            if self._uniform[argument]:
+                value = f"SPLAT({value})"
         elif op in ("OP_SIN", "OP_COS"):
             value = self._circular_function(op, operands[0])
         elif op == "OP_DIV":
-            value = self._quotient(operands, divisors)
+            value = self._quotient(operands, uses.divisors)
+        elif op in ("OP_ADD", "OP_SUB"):
+            value = _sum(op, operands, uses)
         elif op in _BINARY:
             value = _BINARY[op].format(*operands)
         elif op in _UNARY:
             value = _UNARY[op].format(*operands)
         else:
             raise SimulationError(f"the C emitter has no rule for CasADi's {op}")
-        self._lines.append(f"const vec t{k} = {value};")
+        return value
 
     def _circular_function(self, op: str, angle: str) -> str:
         if angle not in self._circular:

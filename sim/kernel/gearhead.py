@@ -50,3 +50,16 @@ def static_friction(rate: Scalar, friction: Scalar) -> Scalar:
         Torque [N m].
     """
     return -friction * ca.fmin(ca.fmax(rate * (1.0 / STATIC_FRICTION_RATE), -1.0), 1.0)
+
+
+def static_friction_slope(rate: Scalar, friction: Scalar) -> Scalar:
+    """How `static_friction` grows with the rate, where it does.
+
+    Args:
+        rate: Of the gearhead's output, at the joint [rad/s].
+        friction: From `STATIC_FRICTION_RATE` on [N m].
+
+    Returns:
+        -d torque / d rate [N m s/rad].
+    """
+    return friction * (ca.fabs(rate) < STATIC_FRICTION_RATE) * (1.0 / STATIC_FRICTION_RATE)

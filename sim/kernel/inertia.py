@@ -21,6 +21,7 @@ from sim.kernel.spatial import (
     plus,
     scale,
     skew,
+    subtract,
     transpose,
 )
 
@@ -89,6 +90,21 @@ class Inertia:
             plus(self.coupling, other.coupling),
             mirrored(plus(self.angular, other.angular)),
         )
+
+    @classmethod
+    def at_point(cls, at: Vector, resistance: Matrix) -> Inertia:
+        """What resists the acceleration of one point of a link.
+
+        Args:
+            at: The point [m].
+            resistance: Force per acceleration of the point, symmetric [kg].
+
+        Returns:
+            The same as a spatial inertia: force = resistance (a + alpha x at).
+        """
+        lever = skew(at)
+        coupling = minus(((0.0,) * 3,) * 3, multiply(resistance, lever))
+        return cls(resistance, coupling, mirrored(multiply(lever, coupling)))
 
     def less_outer(self, scaled: Force, column: Force) -> Inertia:
         """Difference to the product scaled column^T, which is symmetric.
@@ -168,6 +184,17 @@ class Force:
             The sum.
         """
         return Force(add(self.linear, other.linear), add(self.angular, other.angular))
+
+    def less(self, other: Force) -> Force:
+        """Difference.
+
+        Args:
+            other: In the same frame.
+
+        Returns:
+            The difference.
+        """
+        return Force(subtract(self.linear, other.linear), subtract(self.angular, other.angular))
 
     def in_parent(self, rotation: Matrix, offset: Vector) -> Force:
         """The same seen from the parent's frame.

@@ -17,6 +17,7 @@ from sim.compiler.compilation import load_library
 from sim.compiler.target import Target
 from sim.controllers.base import ControlLaw, LookupTable, Response
 from sim.errors import KernelBuildError, SimulationInputError
+from sim.kernel.kinds import robot_constants
 from sim.kernel.lanes import plan_lanes
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.source import kernel_identity, kernel_source
@@ -39,6 +40,8 @@ class _Coding(ctypes.Structure):
         ("pwm_step", ctypes.c_int64),
         ("pwm_counts", ctypes.c_int64),
         ("substeps", ctypes.c_int64),
+        ("refinement", ctypes.c_int64),
+        ("robot", ctypes.c_void_p),
     ]
 
 
@@ -76,7 +79,7 @@ class _Walker(ctypes.Structure):
         ("ticks", ctypes.c_int64),
         ("fall_height", ctypes.c_double),
         ("fall_cosine", ctypes.c_double),
-        ("current_smoothing", ctypes.c_double),
+        ("smoothing", 2 * ctypes.c_double),
         ("sums", ctypes.c_void_p),
         ("end", ctypes.c_void_p),
         ("log", ctypes.c_void_p),
@@ -166,6 +169,7 @@ class NativeKernel:
     def __init__(self, robot: Robot, library: ctypes.CDLL) -> None:
         self._library = library
         self.layout = Layout(robot)
+        self._constants = robot_constants(robot)
         self.lanes = int(library.gaitswarm_lanes())
         self.precision: Precision = "single" if library.gaitswarm_single() else "double"
         self.internal_state_size = internal_state_size(robot)
@@ -189,6 +193,7 @@ class NativeKernel:
         sizes |= {
             "joints": self._joints,
             "parameters": self.layout.size,
+            "constants": len(self._constants),
             "internal_state_size": self.internal_state_size,
             "log_width": self._log_width,
         }
@@ -247,11 +252,12 @@ class NativeKernel:
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height
             walker.fall_cosine = setup.fall_cosine
-            walker.current_smoothing = setup.current_smoothing
+            walker.smoothing[:] = setup.smoothing(1), setup.smoothing(coding.refinement)
             walker.sums = sums_at + k * sums.strides[0]
             walker.end = end_at + k * end.strides[0]
             walker.log = None if record is None else record.ctypes.data
-        packed, use = _Coding(*(getattr(coding, name) for name in _CODED)), _LaneUse()
+        coded = (getattr(coding, name) for name in _CODED)
+        packed, use = _Coding(*coded, self._constants.ctypes.data), _LaneUse()
         self._library.gaitswarm_walk(walkers, n, ctypes.byref(packed), ctypes.byref(use))
         ended = sorted(zip(order, walkers, strict=True), key=lambda pair: pair[0])
         return WalkResults(
@@ -283,7 +289,10 @@ def text_size(library: bytes) -> int | None:
     return None
 
 
-_loaded: Final[dict[bytes, NativeKernel | None]] = {}
+_libraries: Final[dict[bytes, ctypes.CDLL | None]] = {}
+_kernels: Final[dict[tuple[bytes, bytes], NativeKernel]] = {}
+"""By library and constants, those used last at the end."""
+_KEPT: Final = 64
 _loading: Final[dict[bytes, threading.Lock]] = {}
 _registering: Final = threading.Lock()
 
@@ -308,9 +317,19 @@ def native_kernel(robot: Robot, precision: Precision = "double") -> NativeKernel
     with _registering:
         loading = _loading.setdefault(identity, threading.Lock())
     with loading:
-        if identity not in _loaded:
-            _loaded[identity] = load_kernel(robot, precision)
-        return _loaded[identity]
+        if identity not in _libraries:
+            _libraries[identity] = _load(robot, precision, None, ())
+        library = _libraries[identity]
+    if library is None:
+        return None
+    key = identity, robot_constants(robot).tobytes()
+    with _registering:
+        kernel = _kernels.pop(key, None) or NativeKernel(robot, library)
+        # Kernels are small, but a calibration may have one for every design.
+        _kernels[key] = kernel
+        if len(_kernels) > _KEPT:
+            del _kernels[next(iter(_kernels))]
+    return kernel
 
 
 def load_kernel(
@@ -334,12 +353,17 @@ def load_kernel(
     Raises:
         KernelBuildError: It cannot be compiled, stored or loaded.
     """
-    double = precision == "double"
-    library = load_library(
-        f"kernel-{robot.description.name}" if double else f"kernel-single-{robot.description.name}",
+    library = _load(robot, precision, wanted, extra_flags)
+    return None if library is None else NativeKernel(robot, library)
+
+
+def _load(
+    robot: Robot, precision: Precision, wanted: Target | None, extra_flags: Sequence[str]
+) -> ctypes.CDLL | None:
+    return load_library(
+        "kernel" if precision == "double" else "kernel-single",
         kernel_identity(robot, precision),
         lambda: kernel_source(robot, precision),
         wanted=wanted,
         extra_flags=extra_flags,
     )
-    return None if library is None else NativeKernel(robot, library)

@@ -70,6 +70,15 @@ def internal_state_size(robot: Robot) -> int:
     return motors + law.internal_state_size * len(robot.legs)
 
 
+_OF_THE_BODY: Final = (
+    "base_mass",
+    "base_moment",
+    "base_inertia",
+    "supply_voltage",
+    "supply_resistance",
+)
+
+
 class Layout:
     """Where each parameter lies in the kernel's flat parameter vector.
 
@@ -85,6 +94,7 @@ class Layout:
 
     Attributes:
         slices: by field.
+        by_limb: fields that each limb has numbers of its own in, and how many.
         size: P, length of the vector.
     """
 
@@ -107,6 +117,11 @@ class Layout:
             "displaced": 1 if robot.has_backlash else 0,
             "static_friction": n_joints if robot.has_static_friction else 0,
             **dict.fromkeys(law.parameters, n_feet),
+        }
+        limb = {n_joints: JOINTS_PER_LEG, n_feet: 1}
+        whole = ("timestep", "gravity", "displaced", *_OF_THE_BODY)
+        self.by_limb: Mapping[str, int] = {
+            name: limb.get(length, 0) for name, length in lengths.items() if name not in whole
         }
         self.slices: dict[str, slice] = {}
         start = 0

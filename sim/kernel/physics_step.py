@@ -1,42 +1,30 @@
-"""One physics step of a whole robot as a CasADi function."""
+"""A physics step of a whole robot as CasADi functions, derived from Pinocchio's model of it.
+
+The readable form: the reference kernel steps with it, logs are observed through it, and it is what
+the tests hold against Pinocchio and MuJoCo. The compiled kernel has the same formulas limb by limb
+(`sim.kernel.pieces`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from typing import Any, Final
 
 import casadi as ca
+import numpy as np
 import pinocchio as pin
 
-from sim.kernel.articulated_body import (
-    Acceleration,
-    Link,
-    LinkState,
-    articulated_body,
-    kinematics,
-    links_of,
-)
-from sim.kernel.contact import FRICTION, Foot, InternalState, foot_on_ground
-from sim.kernel.gearhead import shaft_torque, static_friction
-from sim.kernel.inertia import Inertia, Motion
-from sim.kernel.integration import integrated
-from sim.kernel.motor import Electrical, electrical
-from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
-from sim.kernel.spatial import (
-    Matrix,
-    Scalar,
-    Vector,
-    add,
-    apply,
-    cross,
-    dot,
-    rotation_of,
-    transpose,
-    vector,
-)
+from sim.kernel.body import body_integrands, body_state, drifted, solved
+from sim.kernel.electrical import supply_voltage
+from sim.kernel.limb import After, Before, Environment, LimbState, after, before
+from sim.kernel.parameters import Layout, internal_state_size
+from sim.kernel.spatial import Scalar
 from sim.robot import Robot
+from sim.robot.description import JOINTS_PER_LEG
+from sim.robot.inertia import BodyInertia
+from sim.robot.limbs import Limb, Placement, limb_of, limbs_of
 
 INTEGRANDS: Final = (
     "torque",
@@ -48,9 +36,10 @@ INTEGRANDS: Final = (
     "absolute_current",
     "heat",
 )
-"""Rates that the driver accumulates: squared gear torque sum [N2 m2], squared accelerations
-[m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over the motors, the sums
-of the absolute electrical power [W], of the absolute current [A], and of the heat R I^2 [W]."""
+"""Rates that the driver accumulates, at the middle of every step: squared gear torque sum [N2 m2],
+squared accelerations [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over
+the motors, the sums of the absolute electrical power [W], of the absolute current [A], and of the
+heat R I^2 [W]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,14 +53,17 @@ class PhysicsModel:
     as `parameters.Layout` says.
 
     Attributes:
-        step: to q, v and internal state after the step, current (J), integrands (8) and largest
-            absolute current (1).
+        kick: to v and internal state after a step at these positions, current (J), integrands (8)
+            and largest absolute current (1) at its middle; landing (1), 1 if a foot may come down
+            within `limb.LANDING_HORIZON`.
+        drift: from q, v, internal state and time (1) [s] to q and internal state then.
         observe: to current (J), voltage (J), load torque (J), foot force in the world (3 L), supply
-            (1) and acceleration (6+J) as `pinocchio.aba` gives it.
+            (1) and acceleration (6+J) as `pinocchio.aba` gives it, all at this instant.
         layout: of the parameters.
     """
 
-    step: Any
+    kick: Any
+    drift: Any
     observe: Any
     layout: Layout
 
@@ -87,18 +79,6 @@ class _Symbols:
     inputs: tuple[Any, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Dynamics:
-    """loads: torque that each gearhead passes to its link (J); internal_state: after the step."""
-
-    attitude: Matrix
-    electrical: Electrical
-    loads: Sequence[Scalar]
-    foot_forces: Sequence[Scalar]
-    acceleration: Acceleration
-    internal_state: Sequence[Scalar]
-
-
 @lru_cache(maxsize=8)
 def physics_model(robot: Robot) -> PhysicsModel:
     """Derive the step from a robot's URDF.
@@ -112,35 +92,154 @@ def physics_model(robot: Robot) -> PhysicsModel:
     Raises:
         RobotFileError: The tree is not one that can be simulated.
     """
-    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
+    limbs = _limbs_by_pinocchio(robot)
     layout = Layout(robot)
     s = _symbols(robot, layout)
-    d = _dynamics(robot, model, s)
-    rates = [
-        *d.acceleration.base.linear,
-        *d.acceleration.base.angular,
-        *d.acceleration.joints,
-    ]
-    step = [
-        *integrated(s.q, s.v, rates, d.attitude, s.p["timestep"][0]),
-        list(d.internal_state),
-        list(d.electrical.currents),
-        _integrands(robot, s, d),
-        [_largest([ca.fabs(current) for current in d.electrical.currents])],
-    ]
-    observe = [
-        list(d.electrical.currents),
-        list(d.electrical.voltages),
-        list(d.loads),
-        list(d.foot_forces),
-        [d.electrical.supply],
-        rates,
-    ]
+    kick = _step(robot, limbs, layout, s, s.p["timestep"][0])
+    # At an instant: forces that depend on velocity are those of the velocities given.
+    still = _step(robot, limbs, layout, s, 0.0)
+    n = robot.n_joints
+    time = ca.SX.sym("time")
+    motors = s.internal_state[: 2 * n] if robot.has_backlash else []
+    angles = [angle + time * rate for angle, rate in zip(motors[:n], motors[n:], strict=True)]
     return PhysicsModel(
-        step=_function("step", s, step),
-        observe=_function("observe", s, observe),
+        kick=_function(
+            "kick",
+            s.inputs,
+            [
+                kick.velocity,
+                kick.internal_state,
+                kick.by_joint("currents"),
+                kick.integrands(),
+                [kick.tallies()[-2]],
+                [kick.tallies()[-1]],
+            ],
+        ),
+        drift=_function(
+            "drift",
+            (*s.inputs[:3], time),
+            [drifted(s.q, s.v, time), [*angles, *s.internal_state[len(angles) :]]],
+        ),
+        observe=_function(
+            "observe",
+            s.inputs,
+            [
+                still.by_joint("currents"),
+                [drive.voltage for limb in still.before for drive in limb.held.drives],
+                still.by_joint("loads"),
+                [component for limb in still.before for component in limb.foot_force],
+                [still.supply],
+                [*still.acceleration, *still.by_joint("accelerations")],
+            ],
+        ),
         layout=layout,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A step of the whole robot."""
+
+    supply: Scalar
+    before: Sequence[Before]
+    after: Sequence[After]
+    acceleration: Sequence[Scalar]
+    velocity: Sequence[Scalar]
+    internal_state: Sequence[Scalar]
+    of_body: Sequence[Scalar]
+
+    def by_joint(self, name: str) -> list[Scalar]:
+        return [value for limb in self.after for value in getattr(limb, name)]
+
+    def tallies(self) -> list[Scalar]:
+        *sums, currents, landing = zip(*(limb.tallies for limb in self.after), strict=True)
+        return [*map(sum, sums), reduce(ca.fmax, currents), reduce(ca.fmax, landing)]
+
+    def integrands(self) -> list[Scalar]:
+        load, power, absolute_power, current, heat, _, _ = self.tallies()
+        acceleration, angular, forward = self.of_body
+        return [
+            load * load,
+            acceleration,
+            angular,
+            power,
+            forward,
+            absolute_power,
+            current,
+            heat,
+        ]
+
+
+def _step(
+    robot: Robot, limbs: Sequence[Limb], layout: Layout, s: _Symbols, timestep: Scalar
+) -> _Step:
+    n, law = robot.n_joints, robot.description.contact_law
+    motors = s.internal_state[: 2 * n] if robot.has_backlash else []
+    carried = s.internal_state[len(motors) :]
+    joints = [joint for limb in limbs for joint in limb.joints]
+    supply = supply_voltage(
+        s.duty,
+        motors[n:] or s.v[6:],
+        [joint.torque for joint in joints],
+        [joint.conductance for joint in joints],
+        s.p["supply_voltage"][0],
+        s.p["supply_resistance"][0],
+    )
+    x, y, z = s.p["gravity"]
+    environment = Environment(timestep, (x, y, z), supply, *s.p["displaced"])
+    body = body_state(s.q, s.v)
+    befores = [
+        before(
+            limb,
+            law,
+            body,
+            LimbState(
+                *(
+                    _of_limb(values, k, len(limbs))
+                    for values in (
+                        s.q[7:],
+                        s.v[6:],
+                        s.duty,
+                        s.disturbance,
+                        motors[:n],
+                        motors[n:],
+                        carried,
+                    )
+                )
+            ),
+            environment,
+            {name: _of_limb(s.p[name], k, len(limbs)) for name in layout.by_limb},
+        )
+        for k, limb in enumerate(limbs)
+    ]
+    inertia, force = befores[0].inertia, befores[0].force
+    for limb in befores[1:]:
+        inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
+    falling, true = solved(body, inertia, force, s.p)
+    afters = [
+        after(limb, found.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
+        for k, (limb, found) in enumerate(zip(limbs, befores, strict=True))
+    ]
+    twist = [*true.linear, *true.angular]
+    faster = [old + timestep * rate for old, rate in zip(s.v[:6], twist, strict=True)]
+    return _Step(
+        supply=supply,
+        before=befores,
+        after=afters,
+        acceleration=twist,
+        velocity=[*faster, *(rate for limb in afters for rate in limb.rates)],
+        internal_state=[
+            *motors[:n],
+            *(rate for limb in befores for rate in limb.motor_rates),
+            *(value for limb in befores for value in limb.carried),
+        ],
+        of_body=body_integrands(body, true, timestep),
+    )
+
+
+def _of_limb(values: Sequence[Scalar], k: int, n_limbs: int) -> tuple[Scalar, ...]:
+    size = len(values) // n_limbs
+    return tuple(values[k * size : (k + 1) * size])
 
 
 def _symbols(robot: Robot, layout: Layout) -> _Symbols:
@@ -159,220 +258,33 @@ def _symbols(robot: Robot, layout: Layout) -> _Symbols:
     return _Symbols(q, v, internal_state, duty, disturbance, fields, inputs)
 
 
-def _dynamics(robot: Robot, model: Any, s: _Symbols) -> _Dynamics:
-    """Kinematics, then the forces of actuators and ground, then accelerations."""
-    links = links_of(model, robot.joint_names)
-    attitude = rotation_of(s.q[3:7])
-    states, rotations = link_states(links, s.q, s.v, attitude)
-    actuation = _actuate(robot, s)
-    feet, ground_forces, internal_state = _feet(robot, model, s, states)
-    acceleration = articulated_body(
-        links,
-        base_inertia(s.p),
-        states,
-        rotations,
-        s.v[6:],
-        _with_obstacles(actuation.torques, s),
-        actuation.armature,
-        ground_forces,
-        apply(transpose(attitude), _triple(s.p["gravity"])),
-    )
-    return _Dynamics(
-        attitude,
-        actuation.electrical,
-        # M_L = r K_M I - B omega - J r^2 domega; behind backlash the rotor is not in the joint.
-        [
-            torque - inertia * joint
-            for torque, inertia, joint in zip(
-                actuation.torques, actuation.armature, acceleration.joints, strict=True
+def _limbs_by_pinocchio(robot: Robot) -> tuple[Limb, ...]:
+    """The limbs as Pinocchio reads the URDF."""
+    limbs_of(robot)  # Refuses what cannot be simulated, with the reason.
+    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
+    limbs = []
+    for number, leg in enumerate(robot.description.legs):
+        placements = []
+        for name in leg.joints:
+            j = model.getJointId(name)
+            inertia = model.inertias[j]
+            placements.append(
+                Placement(
+                    np.asarray(model.joints[j].createData().S).reshape(-1)[3:],
+                    np.asarray(model.jointPlacements[j].rotation),
+                    np.asarray(model.jointPlacements[j].translation),
+                    BodyInertia(
+                        float(inertia.mass),
+                        np.asarray(inertia.lever),
+                        np.asarray(inertia.inertia),
+                    ),
+                )
             )
-        ],
-        [
-            dot(axis, force.linear)
-            for foot, force in zip(feet, ground_forces.values(), strict=True)
-            for axis in (foot.ahead, foot.left, foot.up)
-        ],
-        acceleration,
-        [*actuation.internal_state, *internal_state],
-    )
+        foot = model.frames[model.getFrameId(leg.foot)].placement.translation
+        limbs.append(limb_of(robot, number, placements, np.asarray(foot)))
+    assert len(limbs[0].joints) == JOINTS_PER_LEG  # noqa: S101
+    return tuple(limbs)
 
 
-def link_states(
-    links: Sequence[Link],
-    q: Sequence[Scalar],
-    v: Sequence[Scalar],
-    attitude: Matrix,
-) -> tuple[list[LinkState], list[Matrix]]:
-    """Where every link is and how it moves.
-
-    Args:
-        links: Of the robot.
-        q: Position, quaternion x y z w, joint angles (7+J).
-        v: Base twist in its own frame, joint rates (6+J).
-        attitude: Rotation of the base to the world.
-
-    Returns:
-        State of every link (the base first), and each joint's rotation to its parent.
-    """
-    base = LinkState(
-        velocity=Motion(_triple(v[0:3]), _triple(v[3:6])),
-        up=attitude[2],
-        ahead=attitude[0],
-        height=q[2],
-    )
-    sines, cosines = [ca.sin(x) for x in q[7:]], [ca.cos(x) for x in q[7:]]
-    return kinematics(links, base, sines, cosines, v[6:])
-
-
-def base_inertia(p: Mapping[str, Sequence[Scalar]]) -> Inertia:
-    """Inertia of the body with its load.
-
-    Args:
-        p: Parameters by name, as `parameters.Layout` says.
-
-    Returns:
-        In the base's frame.
-    """
-    xx, yy, zz, xy, xz, yz = p["base_inertia"]
-    tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    return Inertia.of_body(p["base_mass"][0], _triple(p["base_moment"]), tensor)
-
-
-@dataclass(frozen=True, slots=True)
-class _Actuation:
-    """torques: on each link (J); armature: rotor inertia that turns with the link (J)."""
-
-    electrical: Electrical
-    torques: Sequence[Scalar]
-    armature: Sequence[float]
-    internal_state: Sequence[Scalar]
-
-
-def _actuate(robot: Robot, s: _Symbols) -> _Actuation:
-    n, data = robot.n_joints, robot.actuators()
-    rotors = s.internal_state[n : 2 * n] if robot.has_backlash else s.v[6:]
-    motors = electrical(
-        data,
-        s.duty,
-        rotors,
-        s.p["viscous"],
-        s.p["supply_voltage"][0],
-        s.p["supply_resistance"][0],
-    )
-    geared = list(motors.torques)
-    for joint, friction in enumerate(s.p["static_friction"]):
-        geared[joint] = geared[joint] + static_friction(rotors[joint], friction)
-    if not robot.has_backlash:
-        torques = [a + b for a, b in zip(geared, s.disturbance, strict=True)]
-        return _Actuation(motors, torques, data.armature.tolist(), ())
-    displaced = s.p["displaced"][0]
-    shafts = [
-        shaft_torque(motor - link + displaced * disturbance, rotor - rate, play, stiffness, damping)
-        for motor, link, disturbance, rotor, rate, play, stiffness, damping in zip(
-            s.internal_state[:n],
-            s.q[7:],
-            s.disturbance,
-            rotors,
-            s.v[6:],
-            s.p["backlash"],
-            data.shaft_stiffness.tolist(),
-            data.shaft_damping.tolist(),
-            strict=True,
-        )
-    ]
-    dt = s.p["timestep"][0]
-    faster = [
-        rotor + dt * ((torque - shaft) * (1.0 / inertia))
-        for rotor, torque, shaft, inertia in zip(
-            rotors, geared, shafts, data.armature.tolist(), strict=True
-        )
-    ]
-    further = [
-        angle + dt * rotor for angle, rotor in zip(s.internal_state[:n], faster, strict=True)
-    ]
-    share = 1.0 - displaced
-    torques = [a + share * b for a, b in zip(shafts, s.disturbance, strict=True)]
-    return _Actuation(motors, torques, [0.0] * n, [*further, *faster])
-
-
-def _with_obstacles(torques: Sequence[Scalar], s: _Symbols) -> list[Scalar]:
-    """Torques on the links with those of a jammed leg's obstacle, which no gearhead passes on."""
-    jams = zip(s.p["jam_stiffness"], s.p["jam_damping"], s.p["jam_angle"], strict=True)
-    return [
-        torque - (stiffness * (q - angle) + damping * v)
-        for torque, q, v, (stiffness, damping, angle) in zip(
-            torques, s.q[7:], s.v[6:], jams, strict=True
-        )
-    ]
-
-
-def _feet(
-    robot: Robot, model: Any, s: _Symbols, states: Sequence[LinkState]
-) -> tuple[list[Foot], dict[int, Any], list[Scalar]]:
-    """Every foot, the ground's force on its link (by the link's index), internal state."""
-    law = CONTACT_LAWS[robot.description.contact_law]
-    friction = FRICTION[robot.description.contact_law]
-    start = 2 * robot.n_joints if robot.has_backlash else 0
-    feet: list[Foot] = []
-    forces: dict[int, Any] = {}
-    internal_state: list[Scalar] = []
-    for n, leg in enumerate(robot.description.legs):
-        frame = model.frames[model.getFrameId(leg.foot)]
-        index = 1 + robot.joint_names.index(model.names[frame.parentJoint])
-        ground = {name: s.p[name][n] for name in law.parameters}
-        foot = foot_on_ground(states[index], vector(frame.placement.translation), ground)
-        begin = start + n * law.internal_state_size
-        before: InternalState = tuple(s.internal_state[begin : begin + law.internal_state_size])
-        forces[index], after = friction(foot, ground, before, s.p["timestep"][0])
-        feet.append(foot)
-        internal_state += after
-    return feet, forces, internal_state
-
-
-def _integrands(robot: Robot, s: _Symbols, d: _Dynamics) -> list[Scalar]:
-    """The rates of INTEGRANDS at the state before the step."""
-    torque = sum(ca.fabs(load) for load in d.loads)
-    v, w = _triple(s.v[0:3]), _triple(s.v[3:6])
-    # The base's twist is in its own frame, so the material acceleration adds omega x v.
-    linear = add(d.acceleration.base.linear, cross(w, v))
-    angular = d.acceleration.base.angular
-    currents = d.electrical.currents
-    powers = [
-        voltage * current for voltage, current in zip(d.electrical.voltages, currents, strict=True)
-    ]
-    world = apply(d.attitude, v)
-    ahead_x, ahead_y = d.attitude[0][0], d.attitude[1][0]
-    forward = (world[0] * ahead_x + world[1] * ahead_y) / ca.sqrt(
-        ahead_x * ahead_x + ahead_y * ahead_y
-    )
-    return [
-        torque * torque,
-        dot(linear, linear),
-        dot(angular, angular),
-        sum(powers),
-        forward,
-        sum(ca.fabs(power) for power in powers),
-        sum(ca.fabs(current) for current in currents),
-        _heat(robot, currents),
-    ]
-
-
-def _heat(robot: Robot, currents: Sequence[Scalar]) -> Scalar:
-    """Sum of R I^2; motors of one resistance share a product."""
-    squares: dict[float, Scalar] = {}
-    for resistance, current in zip(robot.actuators().resistance.tolist(), currents, strict=True):
-        squares[resistance] = squares.get(resistance, 0.0) + current * current
-    return sum(resistance * square for resistance, square in squares.items())
-
-
-def _largest(values: Sequence[Scalar]) -> Scalar:
-    return reduce(ca.fmax, values)
-
-
-def _triple(values: Sequence[Scalar]) -> Vector:
-    x, y, z = values
-    return x, y, z
-
-
-def _function(name: str, s: _Symbols, outputs: list[list[Scalar]]) -> Any:
-    return ca.Function(name, list(s.inputs), [ca.vertcat(*o) for o in outputs], {"cse": True})
+def _function(name: str, inputs: Sequence[Any], outputs: list[Sequence[Scalar]]) -> Any:
+    return ca.Function(name, list(inputs), [ca.vertcat(*o) for o in outputs], {"cse": True})

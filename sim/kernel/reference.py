@@ -40,28 +40,28 @@ class ReferenceKernel:
         self._model = model
         self._has_backlash = robot.has_backlash
         self.layout = model.layout
-        self.internal_state_size = model.step.numel_in(2)
+        self.internal_state_size = model.kick.numel_in(2)
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """All walks, one after the other."""
         for setup in setups:
             setup.check(
-                joints=self._model.step.numel_in(3),
+                joints=self._model.kick.numel_in(3),
                 internal_state=self.internal_state_size,
                 parameters=self.layout.size,
             )
         walks = [self._walk(setup, coding, log=log) for setup in setups]
-        ticks = sum(walked for _, walked in walks)
-        return WalkResults(tuple(result for result, _ in walks), LaneUse(ticks, ticks))
+        rounds = sum(walked for _, walked in walks)
+        return WalkResults(tuple(result for result, _ in walks), LaneUse(rounds, rounds))
 
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> tuple[WalkResult, int]:
-        """What became of the walk, and how many control ticks it had."""
-        step = Stepper(self._model.step, setup)
+        """What became of the walk, and how many rounds of physics steps it took."""
+        step = Stepper(self._model, setup)
         past = _Past.of(setup.desired.shape[1])
         sensed = np.zeros(setup.desired.shape[1])
         sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
-        status, tick = Status.OK, 0
+        status, rounds = Status.OK, 0
         for tick, desired in enumerate(setup.desired):
             encoder = step.internal_state[: len(desired)] if self._has_backlash else step.q[7:]
             error, load = _read_sensors(encoder, sensed, desired, coding)
@@ -71,56 +71,92 @@ class ReferenceKernel:
                 step.disturbance[:] = setup.disturbance[tick]
             if log:
                 rows.append(np.concatenate([step.q, step.v, step.internal_state, step.duty]))
-            for _ in range(coding.substeps):
-                step.advance()
-                sensed = _low_pass(sensed, np.abs(step.current), setup.current_smoothing)
-                sums += step.integrands
-                peak_current = max(peak_current, float(step.largest_current[0]))
+            refinement = coding.refinement if step.landing[0] > 0.0 else 1
+            step.refine(refinement)
+            rounds += refinement
+            for _ in range(refinement):
+                step.drift(0.5)
+                for left in reversed(range(coding.substeps)):
+                    step.kick()
+                    step.drift(1.0 if left else 0.5)
+                    current = np.abs(step.current)
+                    sensed = _low_pass(sensed, current, setup.smoothing(refinement))
+                    sums += step.integrands / refinement
+                    peak_current = max(peak_current, float(step.largest_current[0]))
             status = _status_of(step, setup)
             if status is not Status.OK:
                 break
         states = _padded(rows, setup.ticks) if log else None
-        return WalkResult(status, sums, step.q.copy(), peak_current, states), tick + 1
+        return WalkResult(status, sums, step.q.copy(), peak_current, states), rounds
 
 
 class Stepper:
-    """CasADi's step on fixed buffers: several times cheaper than calling the function.
+    """CasADi's kick and drift on fixed buffers: several times cheaper than calling the functions.
 
     Args:
-        function: `PhysicsModel.step`.
+        model: The robot's physics.
         setup: The walk to be stepped, from its start.
     """
 
-    def __init__(self, function: Any, setup: WalkSetup) -> None:
+    def __init__(self, model: PhysicsModel, setup: WalkSetup) -> None:
         n_joints = setup.desired.shape[1]
         self.q, self.v = setup.start.copy(), np.zeros(6 + n_joints)
         self.internal_state, self.parameters = (
             setup.internal_state.copy(),
-            np.ascontiguousarray(setup.parameters),
+            np.array(setup.parameters),
         )
         self.duty, self.disturbance, self.current = (np.zeros(n_joints) for _ in range(3))
         self.integrands, self.largest_current = np.zeros(len(INTEGRANDS)), np.zeros(1)
-        self._after = [np.zeros_like(array) for array in (self.q, self.v, self.internal_state)]
-        self._buffer, self._evaluate = function.buffer()
-        arguments = (
-            self.q,
-            self.v,
-            self.internal_state,
-            self.duty,
-            self.disturbance,
-            self.parameters,
+        self.landing = np.zeros(1)
+        self._at = model.layout.slices["timestep"]
+        self._timestep = float(setup.parameters[self._at][0])
+        self._time = np.zeros(1)
+        kicked = [np.zeros_like(array) for array in (self.v, self.internal_state)]
+        drifted = [np.zeros_like(array) for array in (self.q, self.internal_state)]
+        state = [self.q, self.v, self.internal_state]
+        self._kick = _buffered(
+            model.kick,
+            [*state, self.duty, self.disturbance, self.parameters],
+            [*kicked, self.current, self.integrands, self.largest_current, self.landing],
         )
-        for k, array in enumerate(arguments):
-            self._buffer.set_arg(k, array.data)
-        results = (*self._after, self.current, self.integrands, self.largest_current)
-        for k, array in enumerate(results):
-            self._buffer.set_res(k, array.data)
+        self._drift = _buffered(model.drift, [*state, self._time], drifted)
+        self._kicked = list(zip((self.v, self.internal_state), kicked, strict=True))
+        self._drifted = list(zip((self.q, self.internal_state), drifted, strict=True))
 
-    def advance(self) -> None:
-        """One physics step, in place."""
-        self._evaluate()
-        for array, after in zip((self.q, self.v, self.internal_state), self._after, strict=True):
+    def refine(self, refinement: int) -> None:
+        """Set the length of the steps that follow.
+
+        Args:
+            refinement: How many of them are a physics step.
+        """
+        self.parameters[self._at] = self._timestep / refinement
+
+    def kick(self) -> None:
+        """Velocities of the next step, in place; what is measured is of its middle."""
+        self._kick[1]()
+        for array, after in self._kicked:
             array[:] = after
+
+    def drift(self, steps: float) -> None:
+        """Positions at these velocities, in place.
+
+        Args:
+            steps: For how many of the steps that `refine` set.
+        """
+        self._time[:] = steps * self.parameters[self._at]
+        self._drift[1]()
+        for array, after in self._drifted:
+            array[:] = after
+
+
+def _buffered(function: Any, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Any:
+    """A CasADi function bound to arrays: its buffer, which must be kept, and what evaluates it."""
+    buffer, evaluate = function.buffer()
+    for k, array in enumerate(inputs):
+        buffer.set_arg(k, array.data)
+    for k, array in enumerate(outputs):
+        buffer.set_res(k, array.data)
+    return buffer, evaluate
 
 
 @dataclass(slots=True)

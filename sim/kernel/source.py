@@ -9,13 +9,23 @@ from importlib import metadata, resources
 from typing import TYPE_CHECKING, Final
 
 from sim.compiler.compilation import vector_header
-from sim.kernel.parameters import internal_state_size
+from sim.kernel.kinds import limb_kinds
+from sim.kernel.parameters import Layout, internal_state_size
 from sim.robot import Robot
+from sim.robot.limbs import limbs_of
 
 if TYPE_CHECKING:
     from sim.kernel.walk import Precision
 
-_NOT_IN_THE_SOURCE: Final = ("native.py", "observation.py", "reference.py", "walk.py")
+_NOT_IN_THE_SOURCE: Final = (
+    "batch.py",
+    "lanes.py",
+    "native.py",
+    "observation.py",
+    "physics_step.py",
+    "reference.py",
+    "walk.py",
+)
 """Files of this package that the source does not depend on; a new one counts until it is here."""
 
 _deriving: Final = threading.Lock()
@@ -33,18 +43,15 @@ def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
     Returns:
         A digest of 32 bytes.
     """
-    digest = hashlib.sha256(_generator())
-    digest.update(precision.encode())
-    digest.update(robot.urdf.text.encode())
-    actuators = robot.actuators()
-    for array in (actuators.torque, actuators.resistance, actuators.armature):
-        digest.update(array.tobytes())
-    if robot.has_backlash:
-        digest.update(actuators.shaft_stiffness.tobytes() + actuators.shaft_damping.tobytes())
-    legs = [(*leg.joints, leg.foot) for leg in robot.description.legs]
-    kind = (robot.description.contact_law, robot.has_backlash, robot.has_static_friction)
-    digest.update(repr((legs, *kind)).encode())
-    return digest.digest()
+    options = (
+        precision,
+        robot.n_joints,
+        robot.description.contact_law,
+        robot.has_backlash,
+        robot.has_static_friction,
+    )
+    kinds = limb_kinds(limbs_of(robot))
+    return hashlib.sha256(_generator() + repr((kinds, options)).encode()).digest()
 
 
 def kernel_source(robot: Robot, precision: Precision = "double") -> str:
@@ -58,22 +65,21 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
         C text that lacks the definition of DOUBLES only.
     """
     # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
-    from sim.kernel.emit_c import emit_c  # noqa: PLC0415
-    from sim.kernel.physics_step import physics_model  # noqa: PLC0415
+    from sim.kernel.pieces import kernel_pieces  # noqa: PLC0415
 
+    layout = Layout(robot)
     with _deriving:
-        model = physics_model(robot)
-        step = emit_c(model.step, "step")
+        pieces = kernel_pieces(robot)
     return "\n".join(
         [
             f"#define NJ {robot.n_joints}",
-            f"#define NP {model.layout.size}",
+            f"#define NP {layout.size}",
             f"#define NI {internal_state_size(robot)}",
             f"#define BACKLASH {int(robot.has_backlash)}",
-            f"#define TIMESTEP {model.layout.slices['timestep'].start}",
+            f"#define TIMESTEP {layout.slices['timestep'].start}",
             *(["#define SINGLE"] if precision == "single" else []),
             vector_header(),
-            step,
+            pieces,
             *(
                 (resources.files("sim.kernel") / name).read_text(encoding="utf-8")
                 for name in ("control.c", "driver.c")
@@ -93,5 +99,5 @@ def _generator() -> bytes:
     }
     for name in sorted(files):
         digest.update(files[name].read_bytes())
-    digest.update(f"{metadata.version('casadi')} {metadata.version('pin')}".encode())
+    digest.update(f"{metadata.version('casadi')}".encode())
     return digest.digest()

@@ -44,6 +44,8 @@ class Coding:
         pwm_step: resolution of the PWM [counts].
         pwm_counts: full scale of the PWM [counts].
         substeps: physics steps a control tick.
+        refinement: how many times as many of a control tick in which a foot may come down: what
+            happens then is faster than a step.
     """
 
     angle_counts: float
@@ -54,21 +56,30 @@ class Coding:
     pwm_step: int
     pwm_counts: int
     substeps: int
+    refinement: int = 1
 
     def __post_init__(self) -> None:
-        for name in ("angle_step", "current_step", "pwm_step", "pwm_counts", "substeps"):
+        for name in (
+            "angle_step",
+            "current_step",
+            "pwm_step",
+            "pwm_counts",
+            "substeps",
+            "refinement",
+        ):
             if getattr(self, name) < 1:
                 raise SimulationInputError(f"{name}: {getattr(self, name)} is less than 1")
         if self.pwm_counts > LARGEST_PWM:
             raise SimulationInputError(f"pwm_counts: {self.pwm_counts} is over {LARGEST_PWM}")
 
     @classmethod
-    def of(cls, robot: Robot, substeps: int) -> Coding:
+    def of(cls, robot: Robot, substeps: int, refinement: int = 1) -> Coding:
         """Resolutions of a robot's sensors and bridges.
 
         Args:
             robot: The robot.
             substeps: Physics steps a control tick.
+            refinement: How many times as many where a foot may come down.
 
         Returns:
             The coding.
@@ -83,6 +94,7 @@ class Coding:
             pwm_step=d.pwm.step,
             pwm_counts=d.pwm.counts,
             substeps=substeps,
+            refinement=refinement,
         )
 
 
@@ -132,6 +144,19 @@ class WalkSetup:
     direction: int = 1
     drop: float = 0.0
     current_smoothing: float = 1.0
+
+    def smoothing(self, refinement: int) -> float:
+        """The analog low-pass over a shorter step.
+
+        Args:
+            refinement: How many of them are a physics step.
+
+        Returns:
+            `current_smoothing` of such a step [1].
+        """
+        if refinement == 1 or self.current_smoothing >= 1.0:
+            return self.current_smoothing
+        return -math.expm1(math.log1p(-self.current_smoothing) / refinement)
 
     @property
     def ticks(self) -> int:
@@ -193,7 +218,8 @@ class WalkResult:
 
     Attributes:
         status: how it ended.
-        sums: `physics_step.INTEGRANDS` summed over physics steps, (8,).
+        sums: `physics_step.INTEGRANDS` summed over physics steps, shorter ones by their share,
+            (8,).
         end: final q, (7+J,).
         peak_current: largest |I| of any motor at any physics step [A].
         states: q, v, internal state and duty at every control tick after its control,
@@ -213,8 +239,8 @@ class LaneUse:
     """How well a kernel's lanes were used.
 
     Attributes:
-        walked: control ticks, summed over lanes, that belonged to a walk.
-        computed: control ticks, summed over lanes, in all.
+        walked: rounds of physics steps, summed over lanes, that belonged to a walk.
+        computed: rounds of physics steps, summed over lanes, in all.
     """
 
     walked: int = 0

@@ -62,17 +62,24 @@ class Joint:
 
     Attributes:
         name: as in the file.
-        fixed: whether it never moves.
+        kind: its type: revolute, fixed, ...
         parent: link that carries it.
         child: link that it carries.
         origin: of the child's frame in the parent's, at rest.
+        axis: that it turns about in the child's frame, of unit length, (3,).
     """
 
     name: str
-    fixed: bool
+    kind: str
     parent: str
     child: str
     origin: Origin
+    axis: Floats
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it never moves."""
+        return self.kind == "fixed"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,6 +136,21 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """Where a link is in its rigid body.
+
+    Attributes:
+        body: name of the rigid body's first link, in whose frame it is.
+        rotation: from the link's frame, (3, 3).
+        position: of the link's origin, (3,) [m].
+    """
+
+    body: str
+    rotation: Floats
+    position: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Urdf:
     """A URDF that has been read.
 
@@ -136,24 +158,45 @@ class Urdf:
         text: of the file.
         links: by name, parents before their children, the robot's body first.
         joints: in the file's order.
-        bodies: inertia of every rigid body in the frame of its first link, the robot's body first.
-            Links that are fixed to one another are one rigid body, as in Pinocchio.
+        bodies: inertia of every rigid body in the frame of its first link, by this link's name, the
+            robot's body first. Links that are fixed to one another are one rigid body, as in
+            Pinocchio.
+        places: where each link is in its rigid body.
     """
 
     text: str
     links: Mapping[str, Link]
     joints: tuple[Joint, ...]
-    bodies: tuple[BodyInertia, ...]
+    bodies: Mapping[str, BodyInertia]
+    places: Mapping[str, Place]
 
     @property
     def body(self) -> BodyInertia:
         """Inertia of the robot's body with all that is fixed to it."""
-        return self.bodies[0]
+        return next(iter(self.bodies.values()))
+
+    def place(self, name: str) -> Place:
+        """Where a frame is.
+
+        Args:
+            name: Of a link, or of a fixed joint, which stands for the link that it carries.
+
+        Returns:
+            Its place.
+
+        Raises:
+            RobotFileError: There is no such frame.
+        """
+        carried = {joint.name: joint.child for joint in self.joints if joint.fixed}
+        link = name if name in self.places else carried.get(name)
+        if link is None:
+            raise RobotFileError(f"robot.urdf: there is no link or fixed joint {name!r}")
+        return self.places[link]
 
     @property
     def total_mass(self) -> float:
         """Mass of all bodies [kg]."""
-        return sum(body.mass for body in self.bodies)
+        return sum(body.mass for body in self.bodies.values())
 
 
 def parse_urdf(text: str) -> Urdf:
@@ -181,7 +224,8 @@ def parse_urdf(text: str) -> Urdf:
             raise RobotFileError(f"robot.urdf: there are two links {name!r}")
         links[name] = Link(name, _inertia(element, f"link {name!r}"), element)
     in_order = {name: links[name] for name in _from_the_body(links, joints)}
-    return Urdf(text, in_order, joints, tuple(_rigid_bodies(in_order, joints)))
+    bodies, places = _rigid_bodies(in_order, joints)
+    return Urdf(text, in_order, joints, bodies, places)
 
 
 def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterator[str]:
@@ -216,36 +260,43 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
         raise RobotFileError(f"robot.urdf: link {min(left)!r} hangs on no body")
 
 
-def _rigid_bodies(links: Mapping[str, Link], joints: Sequence[Joint]) -> list[BodyInertia]:
+def _rigid_bodies(
+    links: Mapping[str, Link], joints: Sequence[Joint]
+) -> tuple[Mapping[str, BodyInertia], Mapping[str, Place]]:
     """Depth first in the order of the joints' names, as Pinocchio numbers its joints."""
     carried: dict[str, list[Joint]] = {name: [] for name in links}
     for joint in sorted(joints, key=lambda joint: joint.name, reverse=True):
         carried[joint.parent].append(joint)
-    bodies: list[BodyInertia] = []
-    # A link, the body that it is fixed to (None: it begins one), and its frame in that body's.
-    waiting: list[tuple[str, int | None, Floats, Floats]]
-    waiting = [(name, None, np.eye(3), np.zeros(3)) for name in list(links)[:1]]
+    bodies: dict[str, BodyInertia] = {}
+    places: dict[str, Place] = {}
+    waiting = [(name, Place(name, np.eye(3), np.zeros(3))) for name in list(links)[:1]]
     while waiting:
-        name, body, rotation, position = waiting.pop()
-        if body is None:
-            body = len(bodies)
-            bodies.append(NO_INERTIA)
-        bodies[body] = bodies[body].joined(links[name].inertia.seen_from(rotation, position))
+        name, place = waiting.pop()
+        places[name] = place
+        own = links[name].inertia.seen_from(place.rotation, place.position)
+        bodies[place.body] = bodies.get(place.body, NO_INERTIA).joined(own)
         for joint in carried[name]:
             if joint.fixed:
-                turned, at = rotation @ joint.origin.matrix(), rotation @ joint.origin.xyz
-                waiting.append((joint.child, body, turned, position + at))
+                turned = place.rotation @ joint.origin.matrix()
+                at = place.rotation @ joint.origin.xyz
+                waiting.append((joint.child, Place(place.body, turned, place.position + at)))
             else:
-                waiting.append((joint.child, None, np.eye(3), np.zeros(3)))
-    return bodies
+                waiting.append((joint.child, Place(joint.child, np.eye(3), np.zeros(3))))
+    return bodies, places
 
 
 def _joint(element: ET.Element) -> Joint:
     name = element.get("name", "")
     ends = [element.find(end) for end in ("parent", "child")]
     parent, child = ("" if end is None else end.get("link", "") for end in ends)
-    fixed = element.get("type") == "fixed"
-    return Joint(name, fixed, parent, child, _origin(element, f"joint {name!r}"))
+    whose = f"joint {name!r}"
+    direction = element.find("axis")
+    axis = np.array([1.0, 0.0, 0.0]) if direction is None else _numbers(direction, "xyz", whose)
+    length = float(np.linalg.norm(axis))
+    kind = element.get("type", "")
+    if length == 0.0 and kind != "fixed":
+        raise RobotFileError(f"robot.urdf: {whose}: its axis has no direction")
+    return Joint(name, kind, parent, child, _origin(element, whose), axis / (length or 1.0))
 
 
 def _inertia(link: ET.Element, whose: str) -> BodyInertia:

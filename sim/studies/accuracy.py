@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from sim.assembly import PHYSICS_RATE, judge, plan_walk
+from sim.assembly import PHYSICS_RATE, control_steps, judge, plan_walk
 from sim.controllers.base import ControlLaw
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.quantisation import Axis
 from sim.errors import SimulationInputError
 from sim.kernel.reference import reference_kernel
-from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status
 from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
@@ -30,7 +29,7 @@ RESOLUTIONS: Final = ((6, 6), (8, 8), (10, 6))
 
 NoiseKind = Literal["angle", "torque"]
 
-RATES: Final = (5_000, 10_000, 20_000)
+RATES: Final = (2_500, 5_000, 10_000, 20_000)
 
 NOISE: Final[Mapping[NoiseKind, float]] = MappingProxyType({"angle": 0.001, "torque": 10.0})
 """Standard deviations [rad], [N m] of the study's noise; the thesis does not give its own."""
@@ -107,7 +106,7 @@ def step_halving(
     *,
     robot: RobotChoice = DEFAULT_ROBOT,
 ) -> tuple[Deviation, ...]:
-    """Physics at 5, 10 and 20 kHz against 40 kHz.
+    """Physics at 2.5, 5, 10 and 20 kHz against 40 kHz.
 
     Args:
         controller: Name of the motor controller.
@@ -124,7 +123,7 @@ def step_halving(
         for rate in RATES:
             walked = _walk(scenario, controller, design, robot, physics_rate=rate)
             deviations.append(
-                Deviation(f"{rate // 1000} kHz", scenario.name, finest, walked / finest)
+                Deviation(f"{rate / 1000:g} kHz", scenario.name, finest, walked / finest)
             )
     return tuple(deviations)
 
@@ -203,12 +202,11 @@ def _walk(
 def _reference_walk(scenario: Scenario, control_law: ControlLaw, robot: RobotChoice) -> Floats:
     machine = load_robot(robot)
     kernel = reference_kernel(machine)
-    timestep = 1.0 / PHYSICS_RATE
+    coding, timestep = control_steps(machine)
     plan = plan_walk(machine, scenario, timestep)
     if plan is None:
         raise SimulationInputError(f"scenario {scenario.name!r}: out of the legs' reach")
     setup = plan(control_law)
-    coding = Coding.of(machine, 10)
     (result,) = kernel.walk([setup], coding, log=False)
     status, objectives = judge(setup, result, coding.substeps, timestep)
     return objectives if status is Status.OK else np.full_like(objectives, np.nan)

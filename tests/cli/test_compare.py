@@ -72,4 +72,4 @@ def test_a_study_is_told_as_ratios(capsys: pytest.CaptureFixture[str]) -> None:
     rows = json.loads(capsys.readouterr().out)
     assert [row["variant"] for row in rows] == ["link 1", "link 2", "link 3"]
     assert run(["study", "steps", "--scenario", "1"]) == 0
-    assert "5 kHz" in capsys.readouterr().out
+    assert "2.5 kHz" in capsys.readouterr().out

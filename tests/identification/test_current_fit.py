@@ -13,7 +13,6 @@ from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.identification.current_fit import CurrentFit, recorded_currents
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.walk import Coding
 from sim.measurement.measured_log import simulated_log
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
@@ -36,11 +35,11 @@ pytestmark = pytest.mark.slow
 )
 def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
     robot = load_robot(source)
-    kernel, (substeps, timestep) = kernel_of(robot), control_steps(robot)
+    kernel, (coding, timestep) = kernel_of(robot), control_steps(robot)
     plan = plan_walk(robot, SCENARIO, timestep)
     assert plan is not None
     setup = plan(CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A))
-    (result,) = kernel.walk([setup], Coding.of(robot, substeps), log=True)
+    (result,) = kernel.walk([setup], coding, log=True)
     log = simulated_log(robot, logged_walk(SCENARIO, robot=robot))
     assert result.states is not None
     np.testing.assert_allclose(recorded_currents(robot, result.states), log.current, atol=1e-10)

@@ -13,19 +13,29 @@ from sim.robot import Robot
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """Of the motors at an instant: voltage [V], current [A], torque after friction [N m], (J,)."""
+
+    voltage: Floats
+    current: Floats
+    torque: Floats
+
+
 class Motors:
-    """Quasi-static currents on a battery of finite resistance (thesis 2.2.5)."""
+    """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
+
+    damping: by which torques after friction fall with the rates (J,) [N m s/rad].
+    """
 
     def __init__(self, robot: Robot) -> None:
         actuators, supply = robot.actuators(), robot.description.supply
         self._k, self._r, self._viscous = actuators.torque, actuators.resistance, actuators.viscous
         self._source, self._internal = supply.voltage, supply.resistance
+        self.damping = self._k**2 / self._r + self._viscous
 
-    def __call__(self, duty: Floats, rates: Floats) -> tuple[Floats, Floats, Floats]:
-        """Voltages, currents and torques after friction, by joint.
-
-        The battery gives sum(duty I) at U = source - internal sum(duty I).
-        """
+    def __call__(self, duty: Floats, rates: Floats) -> Drive:
+        """By joint. The battery gives sum(duty I) at U = source - internal sum(duty I)."""
         back = self._k * rates
         share = duty / self._r
         supply = (self._source + self._internal * (share @ back)) / (
@@ -33,39 +43,61 @@ class Motors:
         )
         voltage = duty * supply
         current = (voltage - back) / self._r
-        return voltage, current, self._k * current - self._viscous * rates
+        return Drive(voltage, current, self._k * current - self._viscous * rates)
+
+    def current_after(self, current: Floats, faster: Floats) -> Floats:
+        """Currents [A] at the same voltages when the rates have grown [rad/s]."""
+        after: Floats = current - self._k / self._r * faster
+        return after
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuation:
-    """Of the actuators in one step: voltage [V], current [A], torque on the links [N m], (J,)."""
+    """Of motors and gears at an instant: the drive, and the torque on the links [N m], (J,)."""
 
-    voltage: Floats
-    current: Floats
+    drive: Drive
     torque: Floats
 
 
 class Gears(Protocol):
     """Motors and what joins them to the links.
 
+    motors: the motors.
     armature: rotor inertia that turns with the links (J,) [kg m2].
+    damping: by which torques on the links fall with the links' rates, and which a step takes
+        implicitly (J,) [N m s/rad].
+    memory: angles and rates of rotors of their own.
     """
 
+    motors: Motors
     armature: Floats
+    damping: Floats
+
+    @property
+    def memory(self) -> list[Floats]:
+        """See `Gears`."""
 
     def encoders(self, angles: Floats) -> Floats:
         """Links' angles (J,) [rad] -> what the encoders see."""
 
     def actuate(self, duty: Floats, angles: Floats, rates: Floats) -> Actuation:
-        """One physics step with the links at these angles [rad] and rates [rad/s]."""
+        """With the links at these angles [rad] and rates [rad/s]."""
+
+    def kick(self, actuation: Actuation, spins: Floats, timestep: float) -> Floats:
+        """Step the rotors' rates; their accelerations, where the links have these [rad/s2]."""
+
+    def drift(self, time: float) -> None:
+        """Turn the rotors for a time [s]."""
 
 
 class FirmGears:
     """Rotors that turn with the links."""
 
+    memory: list[Floats] = []  # noqa: RUF012
+
     def __init__(self, robot: Robot) -> None:
-        self._motors = Motors(robot)
-        self.armature = robot.actuators().armature
+        self.motors = Motors(robot)
+        self.armature, self.damping = robot.actuators().armature, self.motors.damping
 
     def encoders(self, angles: Floats) -> Floats:
         """See `Gears`."""
@@ -74,7 +106,16 @@ class FirmGears:
     def actuate(self, duty: Floats, angles: Floats, rates: Floats) -> Actuation:
         """See `Gears`."""
         del angles
-        return Actuation(*self._motors(duty, rates))
+        drive = self.motors(duty, rates)
+        return Actuation(drive, drive.torque)
+
+    def kick(self, actuation: Actuation, spins: Floats, timestep: float) -> Floats:
+        """See `Gears`."""
+        del actuation, timestep
+        return spins
+
+    def drift(self, time: float) -> None:
+        """See `Gears`."""
 
 
 class LooseGears:
@@ -83,13 +124,18 @@ class LooseGears:
     angles [rad] and rates [rad/s]: the rotors', at the gearheads' outputs (J,).
     """
 
-    def __init__(self, robot: Robot, angles: Floats, timestep: float) -> None:
+    def __init__(self, robot: Robot, angles: Floats) -> None:
         actuators = robot.actuators()
-        self._motors, self._inertia, self._timestep = Motors(robot), actuators.armature, timestep
+        self.motors, self._inertia = Motors(robot), actuators.armature
         self._half = actuators.backlash / 2.0
         self._stiffness, self._damping = actuators.shaft_stiffness, actuators.shaft_damping
-        self.armature = np.zeros(robot.n_joints)
+        self.armature = self.damping = np.zeros(robot.n_joints)
         self.angles, self.rates = angles.copy(), np.zeros(robot.n_joints)
+
+    @property
+    def memory(self) -> list[Floats]:
+        """See `Gears`."""
+        return [self.angles, self.rates]
 
     def encoders(self, angles: Floats) -> Floats:
         """See `Gears`."""
@@ -97,12 +143,21 @@ class LooseGears:
         return self.angles
 
     def actuate(self, duty: Floats, angles: Floats, rates: Floats) -> Actuation:
-        """See `Gears`; the rotors are stepped."""
-        voltage, current, torque = self._motors(duty, self.rates)
+        """See `Gears`."""
         passed = self.shaft_torques(self.angles - angles, self.rates - rates)
-        self.rates = self.rates + self._timestep * (torque - passed) / self._inertia
-        self.angles = self.angles + self._timestep * self.rates
-        return Actuation(voltage, current, passed)
+        return Actuation(self.motors(duty, self.rates), passed)
+
+    def kick(self, actuation: Actuation, spins: Floats, timestep: float) -> Floats:
+        """See `Gears`. Motors damp at the step's middle, shafts before the step."""
+        del spins
+        inertia = self._inertia + 0.5 * timestep * self.motors.damping
+        own: Floats = (actuation.drive.torque - actuation.torque) / inertia
+        self.rates = self.rates + timestep * own
+        return own
+
+    def drift(self, time: float) -> None:
+        """See `Gears`."""
+        self.angles = self.angles + time * self.rates
 
     def shaft_torques(self, ahead: Floats, faster: Floats) -> Floats:
         """Torques on the links [N m] of rotors that are ahead [rad] and faster [rad/s] (J,).
@@ -116,6 +171,6 @@ class LooseGears:
         return torque
 
 
-def gears_of(robot: Robot, angles: Floats, timestep: float) -> Gears:
+def gears_of(robot: Robot, angles: Floats) -> Gears:
     """The robot's, with motors and links at the same angles (J,) [rad], at rest."""
-    return LooseGears(robot, angles, timestep) if robot.has_backlash else FirmGears(robot)
+    return LooseGears(robot, angles) if robot.has_backlash else FirmGears(robot)

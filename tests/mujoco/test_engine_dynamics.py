@@ -13,9 +13,18 @@ from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import STEEP, random_state
 from tests.mujoco.export import Feet, model
-from tests.mujoco.ground import GROUNDS, Floats, Ground, LinearZone, Stick, ground_forces
+from tests.mujoco.ground import (
+    GROUNDS,
+    Floats,
+    Ground,
+    LinearZone,
+    Stick,
+    apply_forces,
+    feet_of,
+)
+from tests.mujoco.leapfrog import Leapfrog
 from tests.mujoco.motors import Gears, LooseGears, gears_of
-from tests.mujoco.walker import drag_of
+from tests.mujoco.walker import LANDING_HORIZON, drag_of
 
 TIMESTEP = 2e-4
 DATASHEET = RobotVariant(name="szabadka2")
@@ -95,26 +104,25 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
     parameters = pack_parameters(robot, scenario, TIMESTEP)
     exported = model(robot, scenario=scenario)
     d = mujoco.MjData(exported)
-    ground = GROUNDS[robot.description.contact_law](robot, TIMESTEP)
-    tread = ground_forces(exported, d, robot, ground)
+    ground = GROUNDS[robot.description.contact_law](robot)
     friction = np.array([contact.friction for contact in robot.contacts()])
     rng = np.random.default_rng(7)
     held, slid, worst = 0, 0, 0.0
     for _ in range(300):
         q, v = random_state(rng, robot.n_joints)
         v *= 10.0 ** rng.uniform(-4.0, 0.0)
-        gears = gears_of(robot, q[7:], TIMESTEP)
+        gears = gears_of(robot, q[7:])
         remembered = remember_anything(rng, gears, ground, v[6:])
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
         disturbance = rng.normal(size=robot.n_joints)
         state = q, v, remembered, duty, disturbance, parameters
         found = np.array(ours.observe(*state)[-1]).ravel()
-        kept = np.array(ours.step(*state)[2]).ravel()
         attitude = into(d, q, v)
         mujoco.mj_step1(exported, d)
         d.qfrc_applied[:6] = 0.0
         d.qfrc_applied[6:] = gears.actuate(duty, q[7:], v[6:]).torque + disturbance
-        forces = tread()
+        forces = ground(*feet_of(d), 0.0).force
+        apply_forces(exported, d, robot, forces)
         limit = friction * forces[:, 2]
         rub = np.hypot(forces[:, 0], forces[:, 1])
         slid += int((rub > 0.99 * limit)[limit > 0.0].sum())
@@ -124,9 +132,58 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
         twist = attitude.T @ d.qacc[:3] - np.cross(v[3:6], v[:3])
         expected = np.concatenate([twist, d.qacc[3:]])
         worst = max(worst, float(np.abs(found - expected).max() / np.abs(expected).max()))
-        np.testing.assert_allclose(kept, internal_state_of(gears, ground), rtol=1e-12, atol=1e-12)
     assert min(held, slid) > 20
     assert worst < 1e-9
+
+
+@pytest.mark.parametrize("timestep", [1.0 / 2500, 1.0 / 40_000])
+@pytest.mark.parametrize(
+    "variant",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name != "default")) for name in VARIANTS],
+)
+def test_a_kick_changes_velocities_and_what_is_carried_alike(variant: str, timestep: float) -> None:
+    """The linearly implicit step, by limbs here and by MuJoCo's whole inertia matrix there."""
+    robot = load_robot(VARIANTS[variant])
+    ours = physics_model(robot)
+    parameters = pack_parameters(robot, STEEP, timestep)
+    exported = model(robot, scenario=STEEP)
+    d = mujoco.MjData(exported)
+    rng = np.random.default_rng(11)
+    landings, carried, damped, worst = 0, 0.0, 0.0, 0.0
+    for _ in range(200):
+        q, v = random_state(rng, robot.n_joints)
+        v *= 10.0 ** rng.uniform(-4.0, 0.0)
+        into(d, q, v)
+        mujoco.mj_forward(exported, d)
+        # A foot comes down or lifts off about now.
+        foot = rng.integers(len(robot.legs))
+        height, rising = (part[foot, 2] for part in feet_of(d))
+        q[2] += robot.contacts()[foot].sole - height
+        q[2] += rng.uniform(-2.0, 2.0) * LANDING_HORIZON * rising
+        gears, ground = gears_of(robot, q[7:]), GROUNDS[robot.description.contact_law](robot)
+        remembered = remember_anything(rng, gears, ground, v[6:])
+        duty = rng.uniform(-1.0, 1.0, robot.n_joints)
+        disturbance = rng.normal(size=robot.n_joints)
+        inputs = q, v, remembered, duty, disturbance, parameters
+        out = [np.array(part).ravel() for part in ours.kick(*inputs)]
+        faster, after, current, landing = *out[:3], out[-1]
+        explicit = timestep * np.array(ours.observe(*inputs)[-1]).ravel()
+        attitude = into(d, q, v)
+        leapfrog = Leapfrog(exported, d, robot, gears, ground)
+        middle = leapfrog.kick(duty, timestep, disturbance)
+        expected = np.concatenate([attitude.T @ d.qvel[:3], d.qvel[3:]])
+        gain = np.abs(expected - v).max()
+        worst = max(worst, float(np.abs(faster - expected).max() / gain))
+        damped = max(damped, float(np.abs(expected - v - explicit).max() / gain))
+        np.testing.assert_allclose(after, internal_state_of(gears, ground), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(current, middle.current, rtol=1e-9, atol=1e-9)
+        assert landing == leapfrog.landing(LANDING_HORIZON)
+        landings += int(landing.item())
+        carried = max(carried, np.abs(after - remembered).max(initial=0.0))
+    assert worst < 1e-9
+    assert damped > 0.1
+    assert carried > 0.0 or remembered.size == 0
+    assert 10 < landings < 190
 
 
 def remember_anything(
@@ -137,15 +194,13 @@ def remember_anything(
         gears.angles = gears.angles + rng.uniform(-0.03, 0.03, len(rates))
         gears.rates = rates + rng.normal(size=len(rates))
     if isinstance(ground, Stick):
-        ground.elongation = rng.normal(size=ground.elongation.shape) * 5e-3
+        ground.memory = rng.normal(size=ground.memory.shape) * 5e-3
     return internal_state_of(gears, ground)
 
 
 def internal_state_of(gears: Gears, ground: Ground) -> Floats:
     """What our kernel carries beside q and v: rotors, then springs along the ground."""
-    rotors = [gears.angles, gears.rates] if isinstance(gears, LooseGears) else []
-    springs = [ground.elongation.ravel()] if isinstance(ground, Stick) else []
-    return np.concatenate([*rotors, *springs, []])
+    return np.concatenate([*gears.memory, ground.memory.ravel(), []])
 
 
 def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
@@ -154,7 +209,7 @@ def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
     feet = Feet(drag_of(robot, scenario))
     exported = model(robot, scenario=scenario, feet=feet)
     d = mujoco.MjData(exported)
-    ground, legs = LinearZone(robot, TIMESTEP), robot.description.legs
+    ground, legs = LinearZone(robot), robot.description.legs
     rng = np.random.default_rng(5)
     q, _ = random_state(rng, robot.n_joints)
     seen = 0
@@ -164,7 +219,7 @@ def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
         into(d, q, rng.normal(size=6 + robot.n_joints) * 0.03)
         mujoco.mj_forward(exported, d)
         position, velocity = d.sensordata.reshape(2, len(legs), 3)
-        expected = ground(position, velocity)
+        expected = ground(position, velocity, 0.0).force
         for k in range(d.ncon):
             (sole,) = (name for name in _geoms(exported, d.contact[k]) if name != "ground")
             leg = [f"{leg.foot}_sole" for leg in legs].index(sole)

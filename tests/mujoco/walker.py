@@ -7,8 +7,9 @@ the start and the desired angles.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -18,14 +19,20 @@ from sim.kernel.observation import WalkLog
 from sim.robot import Robot
 from sim.scenario import Scenario
 from tests.mujoco.export import Feet, model
-from tests.mujoco.ground import GROUNDS, ground_forces
-from tests.mujoco.motors import gears_of
+from tests.mujoco.ground import GROUNDS, apply_forces, feet_of
+from tests.mujoco.leapfrog import Leapfrog, Middle, attitude_of
+from tests.mujoco.motors import Gears, gears_of
 
 Floats = NDArray[np.float64]
-Integration = Literal["mujoco", "body frame"]
 
 CONTROL_PERIOD = 0.002
 """[s]"""
+
+LANDING_RATE = 40_000
+"""Steps a second [Hz] at least in control ticks in which a foot may come down."""
+
+LANDING_HORIZON = 0.0025
+"""How far ahead that is seen [s]."""
 
 
 class Controller(Protocol):
@@ -51,9 +58,11 @@ class Trace:
     objectives: Floats
 
 
-def timestep_of(robot: Robot) -> float:
-    """[s]; links without their rotors answer the ground too fast for 5 kHz."""
-    return 2.5e-5 if robot.has_backlash else 2e-4
+def physics_rate_of(robot: Robot) -> int:
+    """Steps a second where no foot comes down [Hz], as docs/model.md has them."""
+    if robot.has_backlash:
+        return 40_000
+    return 5000 if robot.description.contact_law == "karnopp" else 2500
 
 
 def drag_of(robot: Robot, scenario: Scenario) -> float:
@@ -69,106 +78,154 @@ def drag_of(robot: Robot, scenario: Scenario) -> float:
 
 
 def walk(
+    robot: Robot, scenario: Scenario, log: WalkLog, controller: Controller, ticks: int | None = None
+) -> Trace:
+    """Walk in MuJoCo from the log's first state, in the steps of docs/model.md.
+
+    MuJoCo has the kinematics, inertia and bias forces; the step is `leapfrog.Leapfrog`.
+    """
+    rate = physics_rate_of(robot)
+    m = model(robot, scenario=scenario)
+    d = _at_the_start(m, log)
+    gears, ground = gears_of(robot, d.qpos[7:]), GROUNDS[robot.description.contact_law](robot)
+    step = Leapfrog(m, d, robot, gears, ground)
+    substeps, shorter = round(CONTROL_PERIOD * rate), math.ceil(LANDING_RATE / rate)
+    measures, record = _Measures(), _Record(robot, len(log.time) if ticks is None else ticks)
+    sensed, landing = np.zeros(robot.n_joints), False
+    for tick in range(record.ticks):
+        record.add(tick, d, gears, step.reaction(0.0).force)
+        duty = controller(tick, record.motor_angle[tick], sensed)
+        rounds = shorter if landing else 1
+        timestep = 1.0 / rate / rounds
+        share = settled_share(robot, timestep)
+        for _ in range(rounds):
+            step.drift(0.5 * timestep)
+            for left in reversed(range(substeps)):
+                middle = step.kick(duty, timestep)
+                landing = step.landing(LANDING_HORIZON)
+                step.drift(timestep if left else 0.5 * timestep)
+                sensed = sensed + share * (np.abs(middle.current) - sensed)
+                measures.add(middle, timestep)
+    return record.trace(measures.objectives(d.qpos[2] - record.states[0, 2]))
+
+
+def walk_by_euler(
     robot: Robot,
     scenario: Scenario,
     log: WalkLog,
     controller: Controller,
     *,
-    integration: Integration = "mujoco",
+    timestep: float,
     feet: Feet | None = None,
     ticks: int | None = None,
 ) -> Trace:
-    """Walk in MuJoCo from the log's first state.
+    """The same in MuJoCo's own steps, semi-implicit Euler, of one length [s].
 
-    integration: MuJoCo's own semi-implicit Euler, or the same in the base's frame, as our kernel
-        has it; they differ in second order of the step.
     feet: MuJoCo's own contacts in place of our law of ground forces.
     """
-    m = model(robot, scenario=scenario, timestep=timestep_of(robot), feet=feet)
+    m = model(robot, scenario=scenario, timestep=timestep, feet=feet)
+    d = _at_the_start(m, log)
+    gears, ground = gears_of(robot, d.qpos[7:]), GROUNDS[robot.description.contact_law](robot)
+    share = settled_share(robot, timestep)
+    measures, record = _Measures(), _Record(robot, len(log.time) if ticks is None else ticks)
+    sensed, forces = np.zeros(robot.n_joints), np.zeros((len(robot.legs), 3))
+    for tick in range(record.ticks):
+        record.add(tick, d, gears, forces)
+        duty = controller(tick, record.motor_angle[tick], sensed)
+        for _ in range(round(CONTROL_PERIOD / timestep)):
+            mujoco.mj_step1(m, d)
+            actuation = gears.actuate(duty, d.qpos[7:], d.qvel[6:])
+            sensed = sensed + share * (np.abs(actuation.drive.current) - sensed)
+            d.qfrc_applied[:6] = 0.0
+            d.qfrc_applied[6:] = actuation.torque
+            if feet is None:
+                reaction = ground(*feet_of(d), timestep)
+                ground.memory, forces = reaction.memory, reaction.force
+                apply_forces(m, d, robot, forces)
+            attitude = attitude_of(d)
+            velocity = attitude.T @ d.qvel[:3]
+            mujoco.mj_step2(m, d)
+            gears.kick(actuation, d.qacc[6:], timestep)
+            gears.drift(timestep)
+            measures.add(
+                Middle(
+                    velocity=velocity,
+                    acceleration=d.qacc[:3],
+                    angular_acceleration=d.qacc[3:6],
+                    attitude=attitude,
+                    load=actuation.torque - gears.armature * d.qacc[6:],
+                    current=actuation.drive.current,
+                    voltage=actuation.drive.voltage,
+                ),
+                timestep,
+            )
+    return record.trace(measures.objectives(d.qpos[2] - record.states[0, 2]))
+
+
+def settled_share(robot: Robot, timestep: float) -> float:
+    """Of its distance from the current that the sensors' low-pass goes in a step [s]."""
+    settling = robot.description.sensors.current_filter
+    return 1.0 - math.exp(-timestep / settling) if settling > 0.0 else 1.0
+
+
+def _at_the_start(m: mujoco.MjModel, log: WalkLog) -> mujoco.MjData:
     d = mujoco.MjData(m)
-    n, legs = robot.n_joints, len(robot.legs)
-    substeps = round(CONTROL_PERIOD / m.opt.timestep)
-    ticks = len(log.time) if ticks is None else ticks
     d.qpos[:] = np.concatenate(
         [log.base_position[0], log.base_orientation[0, [3, 0, 1, 2]], log.joint_angle[0]]
     )
-    ground = GROUNDS[robot.description.contact_law](robot, m.opt.timestep)
-    push = ground_forces(m, d, robot, ground) if feet is None else None
-    gears = gears_of(robot, d.qpos[7:], m.opt.timestep)
-    advance = _advance_in_body_frame if integration == "body frame" else mujoco.mj_step2
-    measures = _Measures(gears.armature)
-    sensed, forces = np.zeros(n), np.zeros((legs, 3))
-    settling = robot.description.sensors.current_filter
-    share = 1.0 - np.exp(-m.opt.timestep / settling) if settling > 0.0 else 1.0
-    states, turned = np.empty((ticks, 7 + n)), np.empty((ticks, n))
-    trodden = np.empty((ticks, legs, 3))
-    for tick in range(ticks):
-        states[tick], turned[tick] = d.qpos, gears.encoders(d.qpos[7:])
-        duty = controller(tick, turned[tick], sensed)
-        for substep in range(substeps):
-            mujoco.mj_step1(m, d)
-            actuation = gears.actuate(duty, d.qpos[7:], d.qvel[6:])
-            sensed = sensed + share * (np.abs(actuation.current) - sensed)
-            d.qfrc_applied[:6] = 0.0
-            d.qfrc_applied[6:] = actuation.torque
-            if push is not None:
-                forces = push()
-            if substep == 0:
-                trodden[tick] = forces
-            before = d.qpos[3:7].copy(), d.qvel[:3].copy()
-            power = float(actuation.voltage @ actuation.current)
-            advance(m, d)
-            measures.add(*before, d.qacc, actuation.torque, power)
-    objectives = measures.objectives(m.opt.timestep, d.qpos[2] - states[0, 2])
-    return Trace(states[:, :3], states[:, [4, 5, 6, 3]], states[:, 7:], turned, trodden, objectives)
+    return d
 
 
-def _advance_in_body_frame(m: mujoco.MjModel, d: mujoco.MjData) -> None:
-    """Semi-implicit Euler of the base's twist in its own frame, with MuJoCo's accelerations."""
-    mujoco.mj_forwardSkip(m, d, mujoco.mjtStage.mjSTAGE_VEL, 1)
-    dt = m.opt.timestep
-    rotation, turned = np.empty(9), np.empty(3)
-    mujoco.mju_quat2Mat(rotation, d.qpos[3:7])
-    attitude = rotation.reshape(3, 3)
-    linear, angular = attitude.T @ d.qvel[:3], d.qvel[3:6].copy()
-    mujoco.mju_cross(turned, angular, linear)
-    linear += dt * (attitude.T @ d.qacc[:3] - turned)
-    d.qvel[3:] += dt * d.qacc[3:]
-    d.qpos[:3] += attitude @ linear * dt
-    mujoco.mju_quatIntegrate(d.qpos[3:7], d.qvel[3:6], dt)
-    mujoco.mju_quat2Mat(rotation, d.qpos[3:7])
-    d.qvel[:3] = rotation.reshape(3, 3) @ linear
-    d.qpos[7:] += dt * d.qvel[6:]
-    d.time += dt
+class _Record:
+    """States at the control ticks."""
+
+    def __init__(self, robot: Robot, ticks: int) -> None:
+        self.ticks = ticks
+        self.states = np.empty((ticks, 7 + robot.n_joints))
+        self.motor_angle = np.empty((ticks, robot.n_joints))
+        self.foot_force = np.empty((ticks, len(robot.legs), 3))
+
+    def add(self, tick: int, d: mujoco.MjData, gears: Gears, forces: Floats) -> None:
+        self.states[tick] = d.qpos
+        self.motor_angle[tick] = gears.encoders(d.qpos[7:])
+        self.foot_force[tick] = forces
+
+    def trace(self, objectives: Floats) -> Trace:
+        states = self.states
+        return Trace(
+            states[:, :3],
+            states[:, [4, 5, 6, 3]],
+            states[:, 7:],
+            self.motor_angle,
+            self.foot_force,
+            objectives,
+        )
 
 
 class _Measures:
     """Objectives of table 4.1, summed over the physics steps."""
 
-    def __init__(self, armature: Floats) -> None:
-        self._armature = armature
+    def __init__(self) -> None:
         self._sums = np.zeros(5)
-        self._steps = 0
+        self._time = 0.0
 
-    def add(
-        self, attitude: Floats, velocity: Floats, qacc: Floats, torque: Floats, power: float
-    ) -> None:
-        """attitude w x y z and velocity of the base in the world, before the step."""
-        w, x, y, z = attitude
-        ahead = np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)])
-        load = float(np.abs(torque - self._armature * qacc[6:]).sum())
-        self._sums += (
-            load * load,
-            float(qacc[:3] @ qacc[:3]),
-            float(qacc[3:6] @ qacc[3:6]),
-            power,
-            float(velocity[:2] @ ahead) / float(np.hypot(*ahead)),
+    def add(self, middle: Middle, timestep: float) -> None:
+        """Of a step [s]."""
+        ahead = middle.attitude[:2, 0]
+        load = float(np.abs(middle.load).sum())
+        self._sums += timestep * np.array(
+            [
+                load * load,
+                middle.acceleration @ middle.acceleration,
+                middle.angular_acceleration @ middle.angular_acceleration,
+                middle.voltage @ middle.current,
+                (middle.attitude @ middle.velocity)[:2] @ ahead / np.hypot(*ahead),
+            ]
         )
-        self._steps += 1
+        self._time += timestep
 
-    def objectives(self, timestep: float, rise: float) -> Floats:
-        """f1..f6."""
-        rms = np.sqrt(self._sums[:3] / self._steps)
-        distance = self._sums[4] * timestep
-        energy = self._sums[3] * timestep / distance
-        return np.array([*rms, energy, self._steps * timestep / distance, rise])
+    def objectives(self, rise: float) -> Floats:
+        """f1..f6; rise: of the body [m]."""
+        rms = np.sqrt(self._sums[:3] / self._time)
+        distance = self._sums[4]
+        return np.array([*rms, self._sums[3] / distance, self._time / distance, rise])

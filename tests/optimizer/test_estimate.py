@@ -16,9 +16,10 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.pso import PsoSettings
 from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.batch import Walking
 from sim.robot import RobotVariant
 from sim.scenario import Scenario
-from sim.simulate import Simulation, simulate
+from sim.simulate import Simulation, simulating
 from sim.variables import Variable
 from tests.examples.walks import SHORT_WALK
 from tests.optimizer.formula import job
@@ -121,11 +122,11 @@ def test_a_measured_walk_is_short_however_long_the_jobs_walks_are(
     long = SPEC.model_copy(update={"scenarios": (scenario,)})
     walked: list[float] = []
 
-    def noted(scenario: Scenario, *arguments: Any, **options: Any) -> Simulation:
+    def noted(scenario: Scenario, *arguments: Any, **options: Any) -> Walking[Simulation]:
         walked.append(scenario.cycles)
-        return simulate(scenario, *arguments, **options)
+        return simulating(scenario, *arguments, **options)
 
-    monkeypatch.setattr("sim.case.simulate", noted)
+    monkeypatch.setattr("sim.case.simulating", noted)
     found = estimate(long, long.cases({}), (), MeasuredRates())
     assert found.seconds is not None
     assert max(walked) * scenario.cycle_time == pytest.approx(5.0)

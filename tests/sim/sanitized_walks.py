@@ -18,7 +18,7 @@ from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
 from sim.controllers.mamdani import Shape
 from sim.controllers.native_inference import compiled_table
 from sim.kernel.native import NativeKernel
-from sim.kernel.walk import Coding, Precision
+from sim.kernel.walk import Precision
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS
@@ -37,7 +37,7 @@ def digest_of_walks(
 ) -> str:
     """Published optimum A in all scenarios, with a fall and a divergence, an uneven number."""
     law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
-    substeps, timestep = control_steps(robot)
+    coding, timestep = control_steps(robot)
     setups = []
     for number, scenario in enumerate(SCENARIOS):
         brief = scenario.model_copy(update={"cycles": 1.0, "cycle_time": 0.3 + 0.05 * number})
@@ -54,7 +54,7 @@ def digest_of_walks(
     digest = hashlib.sha256()
     statuses = set()
     for log in logs:
-        for result in kernel.walk(setups, Coding.of(robot, substeps), log=log):
+        for result in kernel.walk(setups, coding, log=log):
             statuses.add(result.status)
             states = np.empty(0) if result.states is None else result.states
             for array in (result.sums, result.end, states):
@@ -66,7 +66,7 @@ def digest_of_walks(
 
 def digest_of_odd_batches(kernel: NativeKernel, robot: Robot) -> str:
     """Every control law, and NaN in all that can hold one, in batches that leave lanes empty."""
-    substeps, timestep = control_steps(robot)
+    coding, timestep = control_steps(robot)
     plan = plan_walk(robot, SCENARIOS[0].model_copy(update=BRIEFEST), timestep)
     assert plan is not None
     setups = [
@@ -88,12 +88,12 @@ def digest_of_odd_batches(kernel: NativeKernel, robot: Robot) -> str:
     digest = hashlib.sha256()
     for size in (0, 1, kernel.lanes - 1, kernel.lanes + 3):
         batch = list(itertools.islice(itertools.cycle(mixed), size))
-        results = kernel.walk(batch, Coding.of(robot, substeps), log=size % 2 == 1)
+        results = kernel.walk(batch, coding, log=size % 2 == 1)
         assert len(results) == size
         for result in results:
             digest.update(bytes([result.status]))
             digest.update(np.where(np.isnan(result.end), np.nan, result.end).tobytes())
-    statuses = [r.status for r in kernel.walk(unknown, Coding.of(robot, substeps), log=False)]
+    statuses = [r.status for r in kernel.walk(unknown, coding, log=False)]
     assert {statuses[0], statuses[1], statuses[3]} == {Status.DIVERGED}
     return digest.hexdigest()
 

@@ -9,11 +9,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.kernel.articulated_body import LinkState, links_of
+from sim.kernel.articulated_body import LinkState
+from sim.kernel.body import body_inertia, body_state
+from sim.kernel.limb import links_at
 from sim.kernel.parameters import Floats, gravity_on, pack_parameters
-from sim.kernel.physics_step import base_inertia, link_states, physics_model
-from sim.kernel.spatial import Matrix, add, apply, cross, dot, rotation_of, scale
+from sim.kernel.physics_step import physics_model
+from sim.kernel.spatial import Matrix, add, apply, cross, dot, scale
 from sim.robot import Robot
+from sim.robot.limbs import limbs_of
 from tests.examples.walks import STEEP, random_state
 from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named
 
@@ -46,17 +49,20 @@ def _symbolic_tree(robot: Robot) -> Any:
     model = physics_model(robot)
     packed = pack_parameters(robot, STEEP, 2e-4)
     p = {name: packed[where].tolist() for name, where in model.layout.slices.items()}
-    links = links_of(Oracle(robot).model, robot.joint_names)
     inputs = ca.SX.sym("q", 7 + robot.n_joints), ca.SX.sym("v", 6 + robot.n_joints)
     q, v = ([s[k] for k in range(s.numel())] for s in inputs)
-    states, _ = link_states(links, q, v, rotation_of(q[3:7]))
-    rotations = [_to_world(state) for state in states]
     # The model itself has no use for the links' x and y; height is its own.
-    positions = [(q[0], q[1], q[2])]
-    for link in links:
-        positions.append(add(positions[link.parent], apply(rotations[link.parent], link.offset)))
+    states, positions, inertias = [body_state(q, v)], [(q[0], q[1], q[2])], [body_inertia(p)]
+    for n, limb in enumerate(limbs_of(robot)):
+        angles, rates = q[7 + 3 * n : 10 + 3 * n], v[6 + 3 * n : 9 + 3 * n]
+        at, state = positions[0], states[0]
+        for link in links_at(limb, angles, rates):
+            at, state = add(at, apply(_to_world(state), link.offset)), state.carries(link)
+            states.append(state)
+            positions.append(at)
+            inertias.append(link.inertia)
+    rotations = [_to_world(state) for state in states]
     kinetic, rotors, mass, moment = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
-    inertias = [base_inertia(p), *(link.inertia for link in links)]
     for inertia, state, rotation, at in zip(inertias, states, rotations, positions, strict=True):
         momentum = inertia.times(state.velocity)
         kinetic += 0.5 * dot(state.velocity.linear, momentum.linear)

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.assembly import plan_walk
+from sim.assembly import control_steps, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw, LookupTable
 from sim.kernel.native import native_kernel
@@ -38,6 +38,16 @@ def test_a_filters_time_constant_is_that_of_a_first_order_low_pass() -> None:
     assert 1.0 - (1.0 - share) ** 25 == pytest.approx(1.0 - math.exp(-1.0), rel=1e-12)
 
 
+def test_as_many_shorter_steps_follow_a_current_as_far_as_one_step(robot: Robot) -> None:
+    plan = plan_walk(filtered(robot, 0.005), BRIEF, 2e-4)
+    assert plan is not None
+    setup = plan(softer_by_current())
+    left = 1.0 - setup.smoothing(16)
+    assert left**16 == pytest.approx(1.0 - setup.smoothing(1), rel=1e-12)
+    assert setup.smoothing(1) == current_smoothing(0.005, 2e-4) > setup.smoothing(16)
+    assert dataclasses.replace(setup, current_smoothing=1.0).smoothing(16) == 1.0
+
+
 def softer_by_current() -> ControlLaw:
     """PWM of the error's sign that falls by 3 counts with every 32 counts of current."""
     soft = np.arange(127, -1, -1, dtype=np.int8)
@@ -48,7 +58,7 @@ def softer_by_current() -> ControlLaw:
 
 @pytest.mark.parametrize("kind", ["native", "reference"])
 def test_the_controller_reads_the_filtered_absolute_current(robot: Robot, kind: str) -> None:
-    """With a control tick at every physics step, the log has every current that is filtered."""
+    """With a control tick at every physics step, the log tells every current that is filtered."""
     kernel = native_kernel(robot) if kind == "native" else reference_kernel(robot)
     plan = plan_walk(robot, BRIEF, 2e-4)
     assert kernel is not None
@@ -61,11 +71,14 @@ def test_the_controller_reads_the_filtered_absolute_current(robot: Robot, kind: 
     coding = Coding.of(robot, 1)
     (result,) = kernel.walk([setup], coding, log=True)
     assert result.states is not None
-    signed = walk_log(robot, setup, result.states).current
+    log, actuators = walk_log(robot, setup, result.states), robot.actuators()
+    # The currents of a step are those of its middle.
+    faster = 0.5 * np.diff(log.joint_velocity, axis=0)
+    signed = log.current[:-1] - actuators.torque * faster / actuators.resistance
     assert signed.min() < -0.1 < 0.1 < signed.max()
     current = np.abs(signed)
-    sensed = np.zeros_like(current)
-    for tick in range(1, len(current)):
+    sensed = np.zeros_like(log.current)
+    for tick in range(1, len(sensed)):
         sensed[tick] = sensed[tick - 1] + 0.1 * (current[tick - 1] - sensed[tick - 1])
     code = np.floor((np.rint(sensed * 2079.0) + 8.0) / 16.0) * 16.0
     counts = side * 3.0 * (127.0 - np.floor(code / 32.0 + 0.5))
@@ -120,9 +133,9 @@ def test_a_filter_changes_a_fuzzy_walk_and_none_that_ignores_currents(robot: Rob
 def test_walks_with_different_filters_are_computed_together_as_alone(robot: Robot) -> None:
     kernel = native_kernel(robot)
     assert kernel is not None
-    coding, setups = Coding.of(robot, 10), []
+    (coding, timestep), setups = control_steps(robot), []
     for seconds in (0.0, 0.01, 0.002, 0.0, 0.03):
-        plan = plan_walk(filtered(robot, seconds), BRIEF, 2e-4)
+        plan = plan_walk(filtered(robot, seconds), BRIEF, timestep)
         assert plan is not None
         setups.append(plan(CONTROLLERS["fuzzy-pi"].compile(PUBLISHED_A)))
     together = kernel.walk(setups, coding, log=False)
@@ -130,3 +143,4 @@ def test_walks_with_different_filters_are_computed_together_as_alone(robot: Robo
     for a, b in zip(together, alone, strict=True):
         np.testing.assert_array_equal(a.sums, b.sums)
     assert len({tuple(result.end) for result in together}) == 4
+    assert together.lane_use.walked > sum(setup.ticks for setup in setups)

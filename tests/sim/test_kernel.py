@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.assembly import PHYSICS_RATE, plan_walk
+from sim.assembly import control_steps, plan_walk
 from sim.compiler.target import X86, Target, host_architecture, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw, LookupTable
+from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.kernel.native import NativeKernel, load_kernel, native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.reference import ReferenceKernel, reference_kernel
@@ -57,6 +58,21 @@ def test_compiled_and_readable_kernel_agree(scenario: Scenario) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 
 
+def test_kernels_take_the_same_short_steps_where_feet_come_down(robot: Robot) -> None:
+    kernel, reference = native_kernel(robot), reference_kernel(robot)
+    assert kernel is not None
+    coding, _ = control_steps(robot)
+    setup = _setup(robot, kernel, SHORT)
+    fast, slow = (k.walk([setup], coding, log=False) for k in (kernel, reference))
+    ticks, rounds = setup.ticks, fast.lane_use.walked
+    assert ticks < rounds < coding.refinement * ticks
+    assert slow.lane_use.walked == rounds
+    np.testing.assert_allclose(fast[0].sums, slow[0].sums, rtol=1e-9)
+    # A kernel that took long steps there would walk elsewhere.
+    (coarse,) = kernel.walk([setup], dataclasses.replace(coding, refinement=1), log=False)
+    assert np.abs(coarse.sums / fast[0].sums - 1.0).max() > 1e-3
+
+
 def test_pi_controller_agrees_between_kernels() -> None:
     results = [
         simulate(SHORT, "pi", ["P", "I"], np.array([[0.25, 0.3]]), backend=backend).outcome
@@ -85,13 +101,13 @@ def test_a_log_does_not_change_the_walk() -> None:
 
 
 def _setup(robot: Robot, kernel: Kernel, scenario: Scenario) -> WalkSetup:
-    plan = plan_walk(robot, scenario, 1.0 / PHYSICS_RATE)
+    plan = plan_walk(robot, scenario, control_steps(robot)[1])
     assert plan is not None
     return plan(FUZZY.compile(PUBLISHED_A))
 
 
 def _sums(kernel: Kernel, setups: Sequence[WalkSetup], robot: Robot) -> list[tuple[Status, bytes]]:
-    results = kernel.walk(setups, Coding.of(robot, 10), log=False)
+    results = kernel.walk(setups, control_steps(robot)[0], log=False)
     return [(result.status, result.sums.tobytes()) for result in results]
 
 
@@ -123,7 +139,7 @@ def test_a_fallen_walkers_log_is_the_same_alone_and_in_company(robot: Robot) -> 
     assert kernel is not None
     good = _setup(robot, kernel, SHORT)
     falling = _falling(good, kernel)
-    coding = Coding.of(robot, 10)
+    coding = control_steps(robot)[0]
     (alone,) = kernel.walk([falling], coding, log=True)
     company = kernel.walk([good, falling, good], coding, log=True)
     (readable,) = reference.walk([falling], coding, log=True)
@@ -151,7 +167,7 @@ def test_a_walk_whose_internal_state_is_undefined_has_diverged(kind: str) -> Non
     # The angle of a motor: comparisons of the play hide it from the links.
     undefined[0] = np.nan
     lost = dataclasses.replace(brief, internal_state=undefined)
-    results = kernel.walk([brief, lost], Coding.of(machine, 40), log=True)
+    results = kernel.walk([brief, lost], control_steps(machine)[0], log=True)
     assert [result.status for result in results] == [Status.OK, Status.DIVERGED]
     assert np.isfinite(results[1].end).all()
 
@@ -184,7 +200,7 @@ def test_an_array_of_another_shape_is_refused_by_name(kind: str, name: str) -> N
         change: dict[str, Any] = {name: wrong}
         bad = dataclasses.replace(good, **change)
         with pytest.raises(ValueError, match=rf"^{name}: .*shape"):
-            kernel.walk([good, bad], Coding.of(machine, 40), log=True)
+            kernel.walk([good, bad], control_steps(machine)[0], log=True)
 
 
 @pytest.mark.parametrize("shape", [(4, 0, 1), (4, 4)], ids=str)
@@ -194,13 +210,13 @@ def test_a_table_that_a_kernel_cannot_look_up_is_refused(shape: tuple[int, ...])
 
 
 @pytest.mark.parametrize(
-    "name", ["angle_step", "current_step", "pwm_step", "pwm_counts", "substeps"]
+    "name", ["angle_step", "current_step", "pwm_step", "pwm_counts", "substeps", "refinement"]
 )
 def test_a_resolution_that_the_kernel_would_divide_by_is_one_at_least(
     robot: Robot, name: str
 ) -> None:
     with pytest.raises(ValueError, match=f"^{name}: 0 "):
-        dataclasses.replace(Coding.of(robot, 10), **{name: 0})
+        dataclasses.replace(control_steps(robot)[0], **{name: 0})
 
 
 @pytest.mark.parametrize(
@@ -218,7 +234,7 @@ def test_a_gain_beyond_the_controllers_integers_is_refused_by_name(robot: Robot,
         beyond = {"direct": dataclasses.replace(law.direct, **beyond)}
     bad = dataclasses.replace(setup, control_law=dataclasses.replace(law, **beyond))
     with pytest.raises(ValueError, match=rf"^(direct\.)?{name}: too large"):
-        kernel.walk([bad], Coding.of(robot, 10), log=False)
+        kernel.walk([bad], control_steps(robot)[0], log=False)
 
 
 def _random_law(rng: np.random.Generator) -> ControlLaw:
@@ -276,7 +292,7 @@ def test_a_standing_robot_carries_its_weight(robot: Robot, kind: str) -> None:
     assert kernel is not None
     setup = _setup(robot, kernel, SHORT)
     still = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], 500, axis=0))
-    (result,) = kernel.walk([still], Coding.of(robot, 10), log=True)
+    (result,) = kernel.walk([still], control_steps(robot)[0], log=True)
     assert result.states is not None
     log = walk_log(robot, still, result.states)
     carried = log.foot_force[:, :, 2].sum(axis=1)
@@ -290,7 +306,7 @@ def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
     log = walks.logged_walk(SHORT)
     actuators = robot.actuators()
     steps = 10
-    decay = np.exp(-actuators.resistance / actuators.inductance / PHYSICS_RATE)
+    decay = np.exp(-actuators.resistance / actuators.inductance * CONTROL_PERIOD / steps)
     exact = np.zeros(robot.n_joints)
     charge = quasi = 0.0
     for k in range(len(log.time) - 1):
@@ -318,7 +334,7 @@ def test_a_walk_has_the_same_bits_at_every_vector_width(narrower: Target, robot:
     assert narrow is not None
     assert narrow.lanes == narrower.lanes
     setups = [_setup(robot, wide, s.model_copy(update={"cycles": 1.0})) for s in SCENARIOS]
-    ours, theirs = (k.walk(setups, Coding.of(robot, 10), log=True) for k in (wide, narrow))
+    ours, theirs = (k.walk(setups, control_steps(robot)[0], log=True) for k in (wide, narrow))
     for a, b in zip(ours, theirs, strict=True):
         assert (a.status, a.sums.tobytes(), a.end.tobytes()) == (
             b.status,

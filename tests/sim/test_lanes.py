@@ -33,10 +33,12 @@ CONTROL_LAWS: Final = [
 
 
 def varied_walks(kernel: NativeKernel, variant: RobotVariant, n: int) -> list[WalkSetup]:
-    """Walks of 1 to 130 control ticks, some over ground that carries nothing or far too much."""
+    """Walks of 1 to 130 control ticks after a small fall, some onto ground that carries nothing or
+    far too much."""
     robot = load_robot(variant)
     _, timestep = control_steps(robot)
-    plan = plan_walk(robot, SCENARIOS[0].model_copy(update={"cycles": 1.0}), timestep)
+    dropped = SCENARIOS[0].model_copy(update={"cycles": 1.0, "drop": 0.002})
+    plan = plan_walk(robot, dropped, timestep)
     assert plan is not None
     rng = np.random.default_rng(11)
     setups = []
@@ -75,7 +77,7 @@ def kernel_and_coding(
     robot = load_robot(variant)
     kernel = native_kernel(robot, precision)
     assert kernel is not None
-    return kernel, Coding.of(robot, control_steps(robot)[0])
+    return kernel, control_steps(robot)[0]
 
 
 @pytest.mark.slow
@@ -93,6 +95,8 @@ def test_a_walk_has_the_same_bits_in_a_lane_that_others_have_left(
 
     alone = {k: walked([k])[k] for k in range(len(setups))}
     assert {status for status, _ in alone.values()} == {Status.OK, Status.FELL, Status.DIVERGED}
+    rounds = kernel.walk(setups[:1], coding, log=False).lane_use.walked
+    assert setups[0].ticks < rounds < coding.refinement * setups[0].ticks or coding.refinement == 1
     rng = np.random.default_rng(7)
     everyone = np.arange(len(setups))
     for size in (len(setups), len(setups), kernel.lanes - 1, kernel.lanes + 1):
@@ -100,17 +104,29 @@ def test_a_walk_has_the_same_bits_in_a_lane_that_others_have_left(
         assert walked(order) == {k: alone[k] for k in order}
 
 
+def still_walk(ticks: int, drop: float) -> WalkSetup:
+    """A robot that falls from so high [m] and stands."""
+    robot = load_robot(VARIANTS["dead_zone"])
+    _, timestep = control_steps(robot)
+    plan = plan_walk(robot, SCENARIOS[0].model_copy(update={"drop": drop}), timestep)
+    assert plan is not None
+    setup = plan(CONTROL_LAWS[0])
+    return dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], ticks, axis=0))
+
+
+def landing_walk() -> WalkSetup:
+    """A fall that takes 20 ms, and 30 ms on the ground."""
+    return still_walk(25, 0.002)
+
+
 def lane_use(kernel: NativeKernel, coding: Coding, ticks: Sequence[int]) -> LaneUse:
-    """Of walks of so many control ticks each, none of which ends early."""
-    (setup, *_) = varied_walks(kernel, VARIANTS["dead_zone"], 1)
-    longest = dataclasses.replace(setup, desired=np.repeat(setup.desired[:1], max(ticks), axis=0))
-    setups = [dataclasses.replace(longest, desired=longest.desired[:count]) for count in ticks]
-    results = kernel.walk(setups, coding, log=False)
+    """Of walks of so many control ticks each, none of which ends early, and no foot comes down."""
+    results = kernel.walk([still_walk(count, 0.2) for count in ticks], coding, log=False)
     assert {result.status for result in results} == {Status.OK}
     return results.lane_use
 
 
-def test_a_call_tells_how_many_lane_ticks_were_walked_and_how_many_computed() -> None:
+def test_a_call_tells_how_many_rounds_were_walked_and_how_many_computed() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
     n = kernel.lanes
     assert lane_use(kernel, coding, [7]) == LaneUse(walked=7, computed=7 * n)
@@ -127,10 +143,31 @@ def test_a_lane_takes_the_next_walk_when_one_ends_the_longest_first() -> None:
     assert lane_use(kernel, coding, ticks) == LaneUse(walked=30 * n, computed=30 * n)
 
 
+def test_a_control_tick_with_a_landing_takes_as_many_rounds_as_it_has_more_steps() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    landing = landing_walk()
+    use = kernel.walk([landing], coding, log=False).lane_use
+    extra, rest = divmod(use.walked - landing.ticks, coding.refinement - 1)
+    assert rest == 0
+    # Nine ticks are over before the feet come down in the tenth, which is told before it begins.
+    assert 1 <= extra <= landing.ticks - 9
+    reference = reference_kernel(load_robot(VARIANTS["dead_zone"]))
+    assert reference.walk([landing], coding, log=False).lane_use.walked == use.walked
+
+
+def test_lanes_do_not_wait_for_one_another_where_a_foot_comes_down() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    n, landing = kernel.lanes, landing_walk()
+    rounds = kernel.walk([landing], coding, log=False).lane_use.walked
+    others = [still_walk(count, 0.2) for count in (rounds - 10, 10)]
+    results = kernel.walk([landing] + (n - 1) * others, coding, log=False)
+    assert {result.status for result in results} == {Status.OK}
+    assert results.lane_use == LaneUse(walked=n * rounds, computed=n * rounds)
+
+
 def test_a_walk_that_ends_early_frees_its_lane() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
-    (setup, *_) = varied_walks(kernel, VARIANTS["dead_zone"], 1)
-    falling = dataclasses.replace(setup, fall_height=1.0)
+    falling = dataclasses.replace(still_walk(7, 0.2), fall_height=1.0)
     results = kernel.walk([falling] * (2 * kernel.lanes), coding, log=False)
     assert {result.status for result in results} == {Status.FELL}
     assert results.lane_use == LaneUse(2 * kernel.lanes, 2 * kernel.lanes)

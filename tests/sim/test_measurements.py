@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from sim.assembly import Backend, measure, plan_walk
+from sim.assembly import Backend, control_steps, measure, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import native_kernel
 from sim.kernel.observation import walk_log
@@ -31,20 +31,27 @@ def robot() -> Robot:
 
 
 def test_measurements_are_sums_over_every_physics_step(robot: Robot) -> None:
-    """With a control tick at every physics step the log has them all."""
+    """With a control tick at every physics step the log has the states before and after each."""
     kernel, plan = native_kernel(robot), plan_walk(robot, SCENARIOS[0], 2e-4)
     assert kernel is not None
     assert plan is not None
-    setup = plan(CONTROLLERS["pi"].compile(PI))
-    (result,) = kernel.walk([setup], Coding.of(robot, 1), log=True)
-    assert result.states is not None
-    log = walk_log(robot, setup, result.states)
-    peak, mean, heat, power, speed = measure(setup, result, 1)
-    assert peak == pytest.approx(np.abs(log.current).max(), rel=1e-9)
-    assert mean == pytest.approx(np.abs(log.current).mean(), rel=1e-9)
-    lost = (robot.actuators().resistance * log.current**2).sum(axis=1)
+    longer = plan(CONTROLLERS["pi"].compile(PI))
+    setup = dataclasses.replace(longer, desired=longer.desired[:-1])
+    coding = Coding.of(robot, 1)
+    result, beyond = kernel.walk([setup, longer], coding, log=True)
+    assert beyond.states is not None
+    log = walk_log(robot, longer, beyond.states)
+    # The voltage is that of the step's beginning, the speed that of its middle.
+    actuators, voltage = robot.actuators(), log.voltage[:-1]
+    speed = 0.5 * (log.joint_velocity[:-1] + log.joint_velocity[1:])
+    current = (voltage - actuators.torque * speed) / actuators.resistance
+    assert not np.allclose(current, log.current[:-1], rtol=0.01)
+    peak, mean, heat, power, forward = measure(setup, result, 1)
+    assert peak == pytest.approx(np.abs(current).max(), rel=1e-9)
+    assert mean == pytest.approx(np.abs(current).mean(), rel=1e-9)
+    lost = (actuators.resistance * current**2).sum(axis=1)
     assert heat == pytest.approx(lost.mean(), rel=1e-9)
-    powers = log.voltage * log.current
+    powers = voltage * current
     counted = {"signed": powers, "positive": powers.clip(min=0.0), "absolute": np.abs(powers)}
     assert power == pytest.approx(powers.sum(axis=1).mean(), rel=1e-9)
     for convention in get_args(EnergyConvention):
@@ -52,7 +59,22 @@ def test_measurements_are_sums_over_every_physics_step(robot: Robot) -> None:
         assert measure(changed_setup, result, 1)[3] == pytest.approx(
             counted[convention].sum(axis=1).mean(), rel=1e-9
         )
-    assert speed == pytest.approx(result.end[0] / (setup.ticks * 2e-4), rel=0.01)
+    assert forward == pytest.approx(result.end[0] / (setup.ticks * 2e-4), rel=0.01)
+
+
+def test_shorter_steps_of_a_landing_count_by_their_share(robot: Robot) -> None:
+    """Else the speed would not be that of the way that was gone."""
+    (coding, timestep), kernel = control_steps(robot), native_kernel(robot)
+    plan = plan_walk(robot, SCENARIOS[0], timestep)
+    assert kernel is not None
+    assert plan is not None
+    setup = plan(CONTROLLERS["pi"].compile(PI))
+    results = kernel.walk([setup], coding, log=False)
+    # Counted in full, the shorter steps would make a tenth more.
+    assert results.lane_use.walked > 1.1 * setup.ticks
+    *_, speed = measure(setup, results[0], coding.substeps)
+    way = float(results[0].end[0])
+    assert speed == pytest.approx(way / (setup.ticks * coding.substeps * timestep), rel=0.01)
 
 
 def test_power_and_speed_are_those_of_the_objectives() -> None:

@@ -14,6 +14,7 @@ import pytest
 
 from sim.compiler.compilation import build_library, load_library, vector_header
 from sim.errors import KernelBuildError, SimulationInputError
+from sim.kernel.kinds import robot_constants
 from sim.kernel.native import NativeKernel, native_kernel, text_size
 from sim.kernel.parameters import Layout
 from sim.robot import Robot, RobotFiles, load_robot
@@ -171,6 +172,7 @@ def test_a_compiler_that_takes_too_long_is_ended_with_all_that_it_started(tmp_pa
 LOAD_QUADRUPED = """
 import os
 from pathlib import Path
+from sim.kernel.kinds import robot_constants
 from sim.kernel.native import native_kernel
 from sim.robot import RobotFiles, load_robot
 files = Path(os.environ["FILES"])
@@ -181,6 +183,7 @@ COMPILE_ANOTHER = """
 import os, threading
 from pathlib import Path
 from sim.errors import KernelBuildError, SimulationInputError
+from sim.kernel.kinds import robot_constants
 from sim.kernel.native import native_kernel
 from sim.robot import load_robot
 def compile_another():
@@ -237,7 +240,7 @@ def test_a_source_is_derived_without_the_files_that_its_identity_leaves_out() ->
     )
     derived_by = {name.removeprefix("sim.kernel.") for name in done.stdout.split()}
     assert {"articulated_body", "emit_c", "source"} <= derived_by, done.stderr
-    assert not derived_by & {"native", "observation", "reference", "walk"}
+    assert not derived_by & {"native", "observation", "physics_step", "reference", "walk"}
 
 
 def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_path: Path) -> None:
@@ -293,7 +296,7 @@ for name in ["unchanged", *sys.argv[1:]]:
 
 def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_path: Path) -> None:
     used = run_python(
-        "import sys, sim.kernel.emit_c, sim.kernel.physics_step, sim.kernel.source\n"
+        "import sys, sim.kernel.emit_c, sim.kernel.pieces, sim.kernel.source\n"
         "print(*(name for name in sys.modules if name.startswith('sim.kernel.')))"
     )
     files = [
@@ -301,7 +304,7 @@ def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_
         "driver.c",
         *(f"{name.split('.')[-1]}.py" for name in used.stdout.split()),
     ]
-    assert {"physics_step.py", "contact.py", "inertia.py"} < set(files)
+    assert {"pieces.py", "limb.py", "contact.py", "inertia.py"} < set(files)
     shutil.copytree(ROOT / "sim", tmp_path / "sim", ignore=shutil.ignore_patterns("__pycache__"))
     done = subprocess.run(
         [sys.executable, "-B", "-c", IDENTITIES, *files],
@@ -322,9 +325,10 @@ def test_a_library_whose_structures_differ_is_refused_with_its_name(robot: Robot
         "parameters": Layout(robot).size,
         "internal_state_size": 0,
         "log_width": 67,
-        "size_of_coding": 64,
+        "constants": len(robot_constants(robot)),
+        "size_of_coding": 80,
         "size_of_table": 64,
-        "size_of_walker": 264,
+        "size_of_walker": 272,
         "size_of_lane_use": 16,
     }
 

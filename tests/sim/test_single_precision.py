@@ -14,8 +14,9 @@ from sim.compiler.compilation import load_library, vector_header
 from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw
+from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.kernel.native import NativeKernel, load_kernel, native_kernel
-from sim.kernel.walk import Coding, Floats, Precision, WalkSetup
+from sim.kernel.walk import Floats, Precision, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS
@@ -62,9 +63,12 @@ def test_a_kernel_of_floats_has_twice_the_lanes(robot: Robot) -> None:
 
 def objectives(kernel: NativeKernel, robot: Robot, setups: Sequence[WalkSetup]) -> Floats:
     """f1 to f5; the last, a difference of heights, may be next to nothing."""
-    substeps, timestep = control_steps(robot)
-    results = kernel.walk(setups, Coding.of(robot, substeps), log=False)
-    judged = [judge(setup, r, substeps, timestep) for setup, r in zip(setups, results, strict=True)]
+    coding, timestep = control_steps(robot)
+    results = kernel.walk(setups, coding, log=False)
+    judged = [
+        judge(setup, result, coding.substeps, timestep)
+        for setup, result in zip(setups, results, strict=True)
+    ]
     assert {status for status, _ in judged} == {Status.OK}
     return np.array([values[:5] for _, values in judged])
 
@@ -105,7 +109,8 @@ def test_floats_have_the_same_bits_at_every_vector_width(narrower: Target, robot
     narrow = load_kernel(robot, "single", wanted=narrower)
     assert narrow is not None
     assert narrow.lanes == 2 * narrower.lanes
-    setups, coding = short_walks(robot), Coding.of(robot, 10)
+    setups, (coding, _) = short_walks(robot), control_steps(robot)
+    assert coding.refinement > 1
     ours = kernel_in("single", robot).walk(setups, coding, log=True)
     theirs = narrow.walk(setups, coding, log=True)
     for a, b in zip(ours, theirs, strict=True):
@@ -116,7 +121,7 @@ def test_floats_have_the_same_bits_at_every_vector_width(narrower: Target, robot
 
 
 def test_small_increments_of_large_positions_are_kept(robot: Robot) -> None:
-    """A robot that floats on at a micrometre a second; a float of its height changes by nothing."""
+    """A robot that all but floats for 0.2 s; a float of its height changes by nothing."""
     kernel = kernel_in("single", robot)
     (setup, *_) = short_walks(robot)
     parameters = setup.parameters.copy()
@@ -132,9 +137,8 @@ def test_small_increments_of_large_positions_are_kept(robot: Robot) -> None:
         desired=np.repeat(setup.desired[:1], 100, axis=0),
         control_law=ControlLaw(),
     )
-    (result,) = kernel.walk([floating], Coding.of(robot, 10), log=False)
-    steps = 1000
-    risen = 1e-6 * (1 / 5000) ** 2 * steps * (steps + 1) / 2
+    (result,) = kernel.walk([floating], control_steps(robot)[0], log=False)
+    risen = 0.5 * 1e-6 * (100 * CONTROL_PERIOD) ** 2
     assert result.end[2] - 10.0 == pytest.approx(risen, rel=1e-3)
     assert risen < np.spacing(np.float32(10.0))
 
@@ -154,3 +158,30 @@ def test_sine_and_cosine_of_floats_are_accurate_to_their_last_bits() -> None:
     library.both(*pointers, ctypes.c_int64(len(x)))
     assert np.abs(sine - np.sin(x.astype(np.float64))).max() < 1.2e-7
     assert np.abs(cosine - np.cos(x.astype(np.float64))).max() < 1.2e-7
+
+
+@pytest.mark.parametrize("wanted", [target(), Target(4, "x86-64-v3"), Target(2, "")], ids=str)
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_fused_multiply_add_is_rounded_once_whatever_the_machine_has(
+    precision: Precision, wanted: Target
+) -> None:
+    kind, define = ("float", "#define SINGLE\n") if precision == "single" else ("double", "")
+    source = (
+        f"{define}{vector_header()}"
+        f"void fused(const {kind} *a, const {kind} *b, const {kind} *c, {kind} *out) {{\n"
+        "  const vec x = SPLAT(*a), y = SPLAT(*b), z = SPLAT(*c);\n"
+        "  out[0] = vec_fma(x, y, z)[0], out[1] = vec_fms(x, y, z)[0];\n"
+        "  out[2] = vec_fnma(x, y, z)[LANES - 1]; }"
+    )
+    aim = wanted if wanted.lanes <= target().lanes else target()
+    library = load_library("fused-check", source.encode(), lambda: source, wanted=aim)
+    assert library is not None
+    real = np.float32 if precision == "single" else np.float64
+    epsilon = float(np.finfo(real).eps)
+    # (1 + e)(1 - e) = 1 - e^2, of which a rounded product keeps nothing.
+    x, y, z = (np.array([value], dtype=real) for value in (1.0 + epsilon, 1.0 - epsilon, 1.0))
+    out = np.empty(3, dtype=real)
+    library.fused(*(ctypes.c_void_p(a.ctypes.data) for a in (x, y, np.negative(z), out)))
+    assert out.tolist() == [-(epsilon**2), 2.0, -2.0]
+    library.fused(*(ctypes.c_void_p(a.ctypes.data) for a in (x, y, z, out)))
+    assert out.tolist() == [2.0, -(epsilon**2), epsilon**2]

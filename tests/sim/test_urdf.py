@@ -54,7 +54,7 @@ def test_links_that_are_fixed_to_one_another_are_one_body_as_in_pinocchio(name: 
     urdf = parse_urdf(with_camera(robot_named(name)))
     model = model_of(urdf.text)
     assert urdf.total_mass == pytest.approx(pin.computeTotalMass(model), rel=1e-15)
-    for body, theirs in zip(urdf.bodies, list(model.inertias)[1:], strict=True):
+    for body, theirs in zip(urdf.bodies.values(), list(model.inertias)[1:], strict=True):
         assert body.mass == pytest.approx(theirs.mass, rel=1e-15)
         np.testing.assert_allclose(body.centre, theirs.lever, rtol=0, atol=1e-15)
         np.testing.assert_allclose(body.rotational, theirs.inertia, rtol=0, atol=1e-15)
@@ -81,8 +81,8 @@ A, B, C = (f'<link name="{name}"/>' for name in "abc")
 TENSOR = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
 
 
-def joint(name: str, parent: str, child: str, origin: str = "") -> str:
-    return f'<joint name="{name}"><parent link="{parent}"/><child link="{child}"/>{origin}</joint>'
+def joint(name: str, parent: str, child: str, inside: str = "") -> str:
+    return f'<joint name="{name}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
 
 
 def inertial(inside: str) -> str:
@@ -111,12 +111,29 @@ def inertial(inside: str) -> str:
             A + B + joint("j", "a", "b", '<origin xyz="0 nan 0"/>'),
             "joint 'j': xyz='0 nan 0' of <origin> is not three numbers",
         ),
+        (
+            A + B + joint("j", "a", "b", '<axis xyz="0 0 0"/>'),
+            "joint 'j': its axis has no direction",
+        ),
+        (
+            A + B + joint("j", "a", "b", '<axis xyz="0 1"/>'),
+            "joint 'j': xyz='0 1' of <axis> is not three numbers",
+        ),
     ],
 )
 def test_what_cannot_be_read_is_named(robot: str, said: str) -> None:
     with pytest.raises(RobotFileError, match=r"^robot\.urdf: ") as refused:
         parse_urdf(f"<robot>{robot}</robot>")
     assert said in str(refused.value)
+
+
+def test_an_axis_is_made_a_unit_vector_and_a_fixed_joint_needs_none() -> None:
+    hinge = joint("j", "a", "b", '<axis xyz="0 3 -4"/>')
+    weld = joint("k", "b", "c", '<axis xyz="0 0 0"/>').replace("<joint", '<joint type="fixed"')
+    found = parse_urdf(f"<robot>{A + B + C + hinge + weld}</robot>").joints[0].axis
+    np.testing.assert_allclose(found, [0.0, 0.6, -0.8], rtol=1e-15)
+    plain = parse_urdf(f"<robot>{A + B + joint('j', 'a', 'b')}</robot>").joints[0].axis
+    np.testing.assert_array_equal(plain, [1.0, 0.0, 0.0])
 
 
 def test_what_is_no_xml_is_told_by_line_and_column() -> None:

@@ -1,0 +1,150 @@
+"""The robot's body in a physics step, as symbols: before its limbs are known, and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+
+from sim.kernel.articulated_body import LinkState, bias_force, free_acceleration
+from sim.kernel.inertia import Force, Inertia, Motion
+from sim.kernel.spatial import (
+    Scalar,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    rotation_of,
+    scale,
+)
+
+Scalars = tuple[Scalar, ...]
+
+
+def body_state(q: Sequence[Scalar], v: Sequence[Scalar]) -> LinkState:
+    """Where the body is and how it moves.
+
+    Args:
+        q: Position and quaternion x y z w first.
+        v: Twist in the body's own frame first.
+
+    Returns:
+        Its state.
+    """
+    attitude = rotation_of(q[3:7])
+    return LinkState(
+        velocity=Motion(_triple(v[0:3]), _triple(v[3:6])),
+        up=attitude[2],
+        ahead=attitude[0],
+        height=q[2],
+    )
+
+
+def body_inertia(p: Mapping[str, Sequence[Scalar]]) -> Inertia:
+    """Inertia of the body with its load.
+
+    Args:
+        p: Parameters by name, as `parameters.Layout` says.
+
+    Returns:
+        In the body's frame.
+    """
+    xx, yy, zz, xy, xz, yz = p["base_inertia"]
+    tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    return Inertia.of_body(p["base_mass"][0], _triple(p["base_moment"]), tensor)
+
+
+def solved(
+    state: LinkState, inertia: Inertia, force: Force, p: Mapping[str, Sequence[Scalar]]
+) -> tuple[Motion, Motion]:
+    """The body's acceleration under all limbs.
+
+    Args:
+        state: Of the body.
+        inertia: Sum of what the limbs pass to it.
+        force: Likewise.
+        p: Run-time parameters.
+
+    Returns:
+        Acceleration relative to free fall, which `limb.after` wants, and the true one.
+    """
+    own = body_inertia(p)
+    falling = free_acceleration(own.plus(inertia), bias_force(own, state.velocity).plus(force))
+    left = cross(state.up, state.ahead)
+    x, y, z = p["gravity"]
+    gravity = add(scale(x, state.ahead), scale(y, left), scale(z, state.up))
+    return falling, Motion(add(falling.linear, gravity), falling.angular)
+
+
+def body_integrands(
+    state: LinkState, acceleration: Motion, timestep: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """What the driver accumulates of the body, at the step's middle.
+
+    Args:
+        state: Before the step.
+        acceleration: In the step.
+        timestep: [s].
+
+    Returns:
+        Squared acceleration [m2/s4] and angular acceleration [rad2/s4], speed along the heading
+        [m/s].
+    """
+    half = 0.5 * timestep
+    v = add(state.velocity.linear, scale(half, acceleration.linear))
+    w = add(state.velocity.angular, scale(half, acceleration.angular))
+    # The body's twist is in its own frame, so the material acceleration adds omega x v.
+    linear = add(acceleration.linear, cross(w, v))
+    ahead_x, ahead_y = state.ahead[0], cross(state.up, state.ahead)[0]
+    world_x, world_y = dot(state.ahead, v), dot(cross(state.up, state.ahead), v)
+    forward = (world_x * ahead_x + world_y * ahead_y) / ca.sqrt(
+        ahead_x * ahead_x + ahead_y * ahead_y
+    )
+    return dot(linear, linear), dot(acceleration.angular, acceleration.angular), forward
+
+
+def drifted(q: Sequence[Scalar], v: Sequence[Scalar], time: Scalar) -> list[Scalar]:
+    """Positions after some time at constant velocities.
+
+    Args:
+        q: Position, quaternion x y z w, angles (7+J).
+        v: Base twist in its own frame, rates (6+J).
+        time: [s].
+
+    Returns:
+        q then. The body's path bends with its turning, to the second order.
+    """
+    turn = scale(time, _triple(v[3:6]))
+    along = scale(time, _triple(v[0:3]))
+    bent = add(along, scale(0.5, cross(turn, along)))
+    position = add(_triple(q[0:3]), apply(rotation_of(q[3:7]), bent))
+    angles = [angle + time * rate for angle, rate in zip(q[7:], v[6:], strict=True)]
+    return [*position, *_turned(q[3:7], turn), *angles]
+
+
+def _turned(quaternion: Sequence[Scalar], turn: Vector) -> list[Scalar]:
+    """Quaternion times the exponential of a small turn vector [rad], renormalised.
+
+    Series in the squared angle (4e-3 rad at 10 rad/s) exact to rounding; one Newton step
+    towards unit length instead of a square root.
+    """
+    x, y, z, w = quaternion
+    half = scale(0.5, turn)
+    square = dot(half, half)
+    a, b, c = (component * (1.0 - square * (1.0 / 6.0)) for component in half)
+    e = 1.0 - square * (0.5 - square * (1.0 / 24.0))
+    product = [
+        w * a + x * e + y * c - z * b,
+        w * b - x * c + y * e + z * a,
+        w * c + x * b - y * a + z * e,
+        w * e - x * a - y * b - z * c,
+    ]
+    length = sum(component * component for component in product)
+    correction = 1.5 - 0.5 * length
+    return [component * correction for component in product]
+
+
+def _triple(values: Sequence[Scalar]) -> Vector:
+    x, y, z = values
+    return x, y, z

@@ -1,0 +1,198 @@
+"""A robot's limbs as numbers: geometry, inertias and motors of every leg."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RobotFileError
+from sim.robot.description import JOINTS_PER_LEG
+from sim.robot.inertia import BodyInertia, parallel_axis
+from sim.robot.robot import Robot
+
+_NOISE: Final = 1e-14
+
+Floats = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+
+@dataclass(frozen=True, slots=True)
+class LimbJoint:
+    """A joint, the link behind it and the motor that drives it.
+
+    Attributes:
+        axis: in the link's frame; one of the frame's own axes is counted along it.
+        sign: 1, or -1 if the joint turns against `axis`.
+        rotation: of the joint in the frame before it, at rest.
+        offset: of the joint in the frame before it [m].
+        mass: of the link [kg].
+        moment: first moment of the link's mass [kg m].
+        angular: of the link about its origin: xx, yy, zz, xy, xz, yz [kg m2].
+        torque: r K_M [N m/A].
+        resistance: of the motor [ohm].
+        conductance: its inverse [1/ohm].
+        armature: of the rotor at the joint [kg m2].
+        shaft_stiffness: of the closed play [N m/rad].
+        shaft_damping: of the closed play [N m s/rad].
+    """
+
+    axis: Vector
+    sign: float
+    rotation: Matrix
+    offset: Vector
+    mass: float
+    moment: Vector
+    angular: tuple[float, float, float, float, float, float]
+    torque: float
+    resistance: float
+    conductance: float
+    armature: float
+    shaft_stiffness: float
+    shaft_damping: float
+
+
+@dataclass(frozen=True, slots=True)
+class Limb:
+    """A leg.
+
+    Attributes:
+        joints: from the body to the foot.
+        foot: in the last link's frame [m].
+        mobility: upper bound of how fast a force accelerates the foot against the rotors' inertia,
+            which is most of a geared leg's: with the body held and the leg stretched [1/kg].
+    """
+
+    joints: tuple[LimbJoint, ...]
+    foot: Vector
+    mobility: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where a joint or a foot is, by any reader of a URDF.
+
+    Attributes:
+        axis: of the joint, (3,).
+        rotation: in the frame before it, (3, 3).
+        offset: in the frame before it, (3,) [m].
+        inertia: of the link behind it.
+    """
+
+    axis: Floats
+    rotation: Floats
+    offset: Floats
+    inertia: BodyInertia
+
+
+@lru_cache(maxsize=64)
+def limbs_of(robot: Robot) -> tuple[Limb, ...]:
+    """The legs of a robot, in its order.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Its limbs.
+
+    Raises:
+        RobotFileError: Its URDF's movable joints are not the legs' joints, one is not revolute, or
+            a leg is not a chain from the body to its foot.
+    """
+    urdf = robot.urdf
+    movable = {joint.name: joint for joint in urdf.joints if not joint.fixed}
+    if movable.keys() != set(robot.joint_names):
+        raise RobotFileError(
+            "robot.urdf: its movable joints are not the legs' joints of robot.toml:"
+            f" {', '.join(sorted(movable.keys() ^ set(robot.joint_names)))}"
+        )
+    for name in robot.joint_names:
+        if movable[name].kind != "revolute":
+            raise RobotFileError(f"robot.urdf: joint {name!r} is not revolute")
+    limbs = []
+    for number, leg in enumerate(robot.description.legs):
+        before, placements = next(iter(urdf.links)), []
+        for name in leg.joints:
+            joint = movable[name]
+            parent = urdf.place(joint.parent)
+            if parent.body != before:
+                raise RobotFileError(f"robot.urdf: joint {name!r} comes before its parent")
+            placements.append(
+                Placement(
+                    joint.axis,
+                    parent.rotation @ joint.origin.matrix(),
+                    parent.rotation @ joint.origin.xyz + parent.position,
+                    urdf.bodies[joint.child],
+                )
+            )
+            before = joint.child
+        foot = urdf.place(leg.foot)
+        if foot.body != before:
+            raise RobotFileError(f"robot.urdf: foot {leg.foot!r} is not on its leg's last link")
+        limbs.append(limb_of(robot, number, placements, foot.position))
+    return tuple(limbs)
+
+
+def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Floats) -> Limb:
+    """A limb from its placements and its motors.
+
+    Args:
+        robot: The robot.
+        number: Of the leg.
+        placements: Of its joints, from the body on.
+        foot: In the last link's frame, (3,) [m].
+
+    Returns:
+        The limb; rounding noise of unit-sized numbers is gone.
+    """
+    actuators = robot.actuators()
+    joints = []
+    for index, place in enumerate(placements, start=JOINTS_PER_LEG * number):
+        axis = _without_noise(place.axis)
+        sign = -1.0 if sorted(axis.tolist()) == [-1.0, 0.0, 0.0] else 1.0
+        link = place.inertia
+        about = link.rotational + link.mass * parallel_axis(link.centre)
+        resistance, armature = float(actuators.resistance[index]), float(actuators.armature[index])
+        joints.append(
+            LimbJoint(
+                axis=_triple(sign * axis + 0.0),
+                sign=sign,
+                rotation=tuple(map(_triple, _without_noise(place.rotation))),  # type: ignore[arg-type]
+                offset=_triple(_without_noise(place.offset)),
+                mass=link.mass,
+                moment=_triple(link.mass * link.centre),
+                angular=tuple(about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()),
+                torque=float(actuators.torque[index]),
+                resistance=resistance,
+                conductance=1.0 / resistance,
+                armature=armature,
+                shaft_stiffness=float(actuators.shaft_stiffness[index]),
+                shaft_damping=float(actuators.shaft_damping[index]),
+            )
+        )
+    at = _without_noise(foot)
+    parts = [_triple(at), *(joint.offset for joint in reversed(joints[1:]))]
+    lengths = [math.hypot(*part) for part in parts]
+    mobility = sum(
+        reach**2 / joint.armature
+        for reach, joint in zip(itertools.accumulate(lengths), reversed(joints), strict=True)
+    )
+    return Limb(tuple(joints), _triple(at), mobility)
+
+
+def _triple(values: Floats) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _without_noise(values: Floats) -> Floats:
+    """Numbers that are whole but for rounding become so: structural zeros and ones."""
+    nearest = np.rint(values)
+    return np.where(np.abs(values - nearest) < _NOISE, nearest, values) + 0.0

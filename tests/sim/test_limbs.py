@@ -1,0 +1,161 @@
+"""Limbs: as Pinocchio reads the URDF, refused by name, and data of a kernel that robots share."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from sim.errors import RobotFileError
+from sim.kernel.kinds import robot_constants
+from sim.kernel.native import native_kernel
+from sim.kernel.source import kernel_identity, kernel_source
+from sim.kernel.tree import leaves
+from sim.outcome import Status
+from sim.robot import SHIPPED, Robot, RobotFiles, load_robot
+from sim.robot.inertia import BodyInertia
+from sim.robot.limbs import Placement, limb_of, limbs_of
+from sim.robot.urdf import parse_urdf
+from tests.examples.walks import short_walk, walk
+from tests.sim.pinocchio_oracle import Oracle, robot_named
+
+BRIEF = short_walk(cycle_time=0.5)
+
+
+def mounted_quadruped() -> Robot:
+    """The quadruped whose femurs hang on turned brackets that are fixed to the coxas."""
+    robot = robot_named("turned quadruped")
+    text = re.sub(r'parent link="(\w+)_coxa_link"', r'parent link="\1_bracket"', robot.urdf.text)
+    brackets = "".join(BRACKET.format(leg.name) for leg in robot.description.legs)
+    return replace(robot, urdf=parse_urdf(text.replace("</robot>", f"{brackets}</robot>")))
+
+
+BRACKET = """
+  <link name="{0}_bracket"/>
+  <joint name="{0}_weld" type="fixed">
+    <parent link="{0}_coxa_link"/><child link="{0}_bracket"/>
+    <origin xyz="0.01 0.02 -0.03" rpy="-0.3 0.2 0.5"/>
+  </joint>"""
+
+
+@pytest.mark.parametrize("name", [*SHIPPED, "quadruped", "turned quadruped", "on brackets"])
+def test_limbs_are_as_pinocchio_reads_the_urdf(name: str) -> None:
+    if name == "on brackets":
+        robot = mounted_quadruped()
+    else:
+        robot = load_robot(name) if name in SHIPPED else robot_named(name)
+    model = Oracle(robot).model
+    for number, limb in enumerate(limbs_of(robot)):
+        leg, placements = robot.description.legs[number], []
+        for joint in leg.joints:
+            index = model.getJointId(joint)
+            before, inertia = model.jointPlacements[index], model.inertias[index]
+            placements.append(
+                Placement(
+                    # Rates of a joint's subspace, linear first.
+                    np.asarray(model.joints[index].createData().S).ravel()[3:],
+                    np.asarray(before.rotation),
+                    np.asarray(before.translation),
+                    BodyInertia(
+                        float(inertia.mass), np.asarray(inertia.lever), np.asarray(inertia.inertia)
+                    ),
+                )
+            )
+        foot = model.frames[model.getFrameId(leg.foot)].placement.translation
+        theirs = limb_of(robot, number, placements, np.asarray(foot))
+        np.testing.assert_allclose(list(leaves(limb)), list(leaves(theirs)), rtol=1e-12, atol=1e-12)
+
+
+def files_of(folder: str) -> RobotFiles:
+    kept = resources.files("sim.robot") / folder
+    toml, urdf = ((kept / f"robot.{kind}").read_text(encoding="utf-8") for kind in ("toml", "urdf"))
+    return RobotFiles(toml=toml, urdf=urdf)
+
+
+def heavier_and_longer() -> Robot:
+    """Szabad(ka)-II with other motors, and lengths and masses that differ from limb to limb."""
+    files, rng = files_of("szabadka2"), np.random.default_rng(4)
+
+    def scaled(match: re.Match[str]) -> str:
+        factor = float(rng.uniform(1.02, 1.15))
+        return " ".join(
+            [f'{match[1]}="{" ".join(repr(factor * float(part)) for part in match[2].split())}"']
+        )
+
+    urdf = re.sub(r'(value|xyz)="(0\.[12][0-9]+|0 -?0\.[01][0-9]* 0)"', scaled, files.urdf)
+    toml = files.toml.replace("resistance = 4.09", "resistance = 4.6")
+    toml = toml.replace("torque_constant = 0.0134", "torque_constant = 0.015")
+    return load_robot(RobotFiles(toml=toml, urdf=urdf))
+
+
+@pytest.mark.slow
+def test_robots_with_limbs_of_one_kind_share_a_library_and_walk_by_their_own_constants() -> None:
+    robot, other = load_robot("szabadka2"), heavier_and_longer()
+    assert len({limb.mobility for limb in limbs_of(other)}) == len(other.legs)
+    assert kernel_identity(other) == kernel_identity(robot)
+    assert kernel_source(other) == kernel_source(robot)
+    assert len(robot_constants(other)) == len(robot_constants(robot))
+    assert (robot_constants(other) != robot_constants(robot)).mean() > 0.5
+    assert native_kernel(other) is not native_kernel(robot)
+    objectives = []
+    for machine in (robot, other):
+        fast, slow = (walk(BRIEF, robot=machine, backend=kind) for kind in ("native", "reference"))
+        assert fast.outcome.statuses.tolist() == [Status.OK]
+        np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
+        objectives.append(fast.outcome.objectives[0, :5])
+    assert (np.abs(objectives[1] / objectives[0] - 1.0) > 1e-3).all()
+
+
+def test_limbs_about_other_axes_are_of_another_kind() -> None:
+    robot = load_robot("szabadka2")
+    tilted = robot.urdf.text.replace('<axis xyz="-1 0 0"/>', '<axis xyz="-1 0.1 0"/>')
+    assert kernel_identity(replace(robot, urdf=parse_urdf(tilted))) != kernel_identity(robot)
+
+
+PAN = """
+  <link name="camera"/>
+  <joint name="pan" type="revolute">
+    <parent link="body"/><child link="camera"/><axis xyz="0 0 1"/>
+  </joint>
+</robot>"""
+FEMUR = '<joint name="right_front_femur" type="revolute">\n    <parent link="'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("</robot>", PAN, "its movable joints are not the legs' joints of robot.toml: pan"),
+        (
+            '"right_front_coxa" type="revolute"',
+            '"right_front_coxa" type="fixed"',
+            "its movable joints are not the legs' joints of robot.toml: right_front_coxa",
+        ),
+        (
+            '"right_front_tibia" type="revolute"',
+            '"right_front_tibia" type="prismatic"',
+            "joint 'right_front_tibia' is not revolute",
+        ),
+        (
+            FEMUR + "right_front_coxa_link",
+            FEMUR + "body",
+            "joint 'right_front_femur' comes before its parent",
+        ),
+        (
+            '<parent link="right_front_tibia_link"/>\n    <child link="right_front_foot"/>',
+            '<parent link="right_front_femur_link"/>\n    <child link="right_front_foot"/>',
+            "foot 'right_front_foot' is not on its leg's last link",
+        ),
+    ],
+    ids=["one more joint", "a joint less", "a slider", "no chain", "a foot on the femur"],
+)
+def test_legs_that_are_no_chains_of_hinges_to_their_feet_are_refused_by_name(
+    old: str, new: str, said: str
+) -> None:
+    robot = load_robot("szabadka2")
+    assert robot.urdf.text.count(old) == 1
+    other = replace(robot, urdf=parse_urdf(robot.urdf.text.replace(old, new)))
+    with pytest.raises(RobotFileError, match=rf"^robot\.urdf: {re.escape(said)}$"):
+        limbs_of(other)

@@ -118,6 +118,22 @@ def test_kernels_agree_on_a_filtered_current(robot: Robot) -> None:
     np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
 
 
+def test_kernels_agree_on_a_current_that_is_filtered_while_feet_come_down(robot: Robot) -> None:
+    slow_sensor = filtered(robot, 0.01)
+    kernel, (coding, timestep) = native_kernel(slow_sensor), control_steps(slow_sensor)
+    plan = plan_walk(slow_sensor, BRIEF.model_copy(update={"drop": 0.002}), timestep)
+    assert kernel is not None
+    assert plan is not None
+    setup = plan(softer_by_current())
+    brief = dataclasses.replace(setup, desired=setup.desired[:40] + 2000)
+    fast, slow = (
+        k.walk([brief], coding, log=True) for k in (kernel, reference_kernel(slow_sensor))
+    )
+    assert fast.lane_use.walked == slow.lane_use.walked > brief.ticks
+    ours, theirs = (np.asarray(results[0].states)[:, -robot.n_joints :] for results in (fast, slow))
+    np.testing.assert_allclose(ours, theirs, rtol=1e-12)
+
+
 def test_a_filter_changes_a_fuzzy_walk_and_none_that_ignores_currents(robot: Robot) -> None:
     slow_sensor = filtered(robot, 0.01)
     assert native_kernel(slow_sensor) is native_kernel(robot)

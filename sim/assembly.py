@@ -39,8 +39,8 @@ KARNOPP_PHYSICS_RATE: Final = 5000
 """Rate [Hz] for robots whose friction jumps at v_d: steps decide when it does."""
 
 BACKLASH_PHYSICS_RATE: Final = 40_000
-"""Rate [Hz] for robots with backlash: without their rotors, tibias answer the ground too fast for
-5 kHz, and on soles as damped as table 2.7's still for 20 kHz."""
+"""Rate [Hz] for robots with backlash: without their rotors, tibias answer soles as damped as those
+of table 2.7 too fast for 20 kHz."""
 
 SHORTEST_WALK: Final = 1e-3
 """Distance [m] under which a robot counts as not walking: energy per metre has no value."""

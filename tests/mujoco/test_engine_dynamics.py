@@ -181,7 +181,7 @@ def test_a_kick_changes_velocities_and_what_is_carried_alike(variant: str, times
         landings += int(landing.item())
         carried = max(carried, np.abs(after - remembered).max(initial=0.0))
     assert worst < 1e-9
-    assert damped > 0.1
+    assert damped > 1e-3
     assert carried > 0.0 or remembered.size == 0
     assert 10 < landings < 190
 

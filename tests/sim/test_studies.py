@@ -53,7 +53,9 @@ def test_an_unknown_drive_is_answered_with_those_that_exist() -> None:
 
 
 def test_finer_tables_are_closer_to_the_inference() -> None:
-    coarse, _, fine = tables_against_inference(PUBLISHED_A, [BRIEF])
+    # Shorter than a cycle, a walk tells more of single steps than of tables.
+    cycle = SCENARIOS[0].model_copy(update={"cycles": 1.0})
+    coarse, _, fine = tables_against_inference(PUBLISHED_A, [cycle])
     assert (coarse.variant, fine.variant) == ("6x6 bit", "10x6 bit")
     assert fine.relative[:5].max() < 0.02
     assert 0.0 < fine.relative[:5].mean() < coarse.relative[:5].mean() < 0.05
@@ -85,7 +87,10 @@ def test_steps_of_walks_are_short_enough(robot: RobotName) -> None:
 def test_noise_is_reported_for_each_link_against_the_noiseless_walk() -> None:
     found = noise_on_links("pi", {"P": 0.45, "I": 0.1})
     assert [d.variant for d in found] == ["link 1", "link 2", "link 3"]
-    # Torque and accelerations grow on every link, as in table 2.9; speed hardly changes.
+    # Accelerations grow on every link, as in table 2.9, torque on the first; speed hardly changes.
     for deviation in found:
-        assert (deviation.ratio[:3] > 1.0).all()
+        assert (deviation.ratio[1:3] > 1.5).all()
         assert deviation.ratio[4] == pytest.approx(1.0, abs=0.15)
+    torques = [deviation.ratio[0] for deviation in found]
+    assert torques[0] > 1.1
+    assert torques == sorted(torques, reverse=True)

@@ -80,7 +80,7 @@ class EmulatedLibrary:
 
     @cached_property
     def sizes(self) -> dict[str, int]:
-        """Bytes of a walker's arrays; of those that are as long as the walk, of one tick."""
+        """Bytes of a call's arrays; of those that are as long as a walk, of one tick."""
         joints = self.gaitswarm_joints()
         return {
             "q0": 8 * (7 + joints),
@@ -91,6 +91,7 @@ class EmulatedLibrary:
             "desired": 4 * joints,
             "disturbance": 8 * joints,
             "log": 8 * self.gaitswarm_log_width(),
+            "robot": 8 * self.gaitswarm_constants(),
         }
 
 

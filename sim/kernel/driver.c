@@ -1,5 +1,5 @@
 /* The walk: per control tick read the sensors, run the controller, step the physics, measure.
-   Included after control.c, the emitted function `step`, and the sizes NJ (joints), NI (numbers of
+   Included after control.c, the emitted function `kick`, and the sizes NJ (joints), NI (numbers of
    the internal state), NP (parameters, of which TIMESTEP is the physics'). With BACKLASH the
    internal state begins with the motors' angles, which the encoders see, and their rates.
    Positions and sums are doubles, whatever a real is. The Python twin is reference.py. */

@@ -12,9 +12,11 @@ from pydantic import ValidationError
 
 from gaitswarm.errors import InvalidRequest, invalid_request
 from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.optimizer_choice import optimizer_settings
 from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.search.pso import OptimizerName, PsoSettings, optimizer_settings
+from services.optimizer.search.optimizer import SearchSettings
+from services.optimizer.search.registry import OptimizerName, OptimizerSettings
 from sim.controllers import ControllerName
 from sim.kernel.walk import Precision
 from sim.robot import RobotFiles, RobotVariant
@@ -54,7 +56,7 @@ class SpecOptions(TypedDict, total=False):
         preference: How objectives are weighed.
         optimizer: Settings of the search, or the name of a preset: `pso`, or `pso-thesis` with the
             thesis's constant inertia.
-        particles: Size of the swarm, in place of `optimizer`'s.
+        particles: Designs of one iteration, in place of `optimizer`'s.
         iterations: Budget: iterations of the swarm.
         seed: Source of all randomness; the same seed gives the same bits.
         precision: Of the numbers of the search's physics; what is reported as best is judged in
@@ -68,7 +70,7 @@ class SpecOptions(TypedDict, total=False):
     variables: Sequence[str | Variable | Document]
     fixed: Mapping[str, float | str]
     preference: PreferenceInput
-    optimizer: OptimizerName | PsoSettings | Document
+    optimizer: OptimizerName | OptimizerSettings | Document
     particles: int
     iterations: int
     seed: int
@@ -107,18 +109,18 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
 
 
 def with_particles(optimizer: object, particles: object) -> object:
-    """An optimizer with another size of its swarm.
+    """An optimizer with another size of its iterations.
 
     Args:
         optimizer: Settings, a document of some, or the name of a preset.
-        particles: Size of the swarm.
+        particles: Designs of one iteration.
 
     Returns:
         A document; what is none of these as it is, for validation to refuse.
     """
     with suppress(ValueError):
         optimizer = optimizer_settings(optimizer)
-    if isinstance(optimizer, PsoSettings):
+    if isinstance(optimizer, SearchSettings):
         optimizer = optimizer.model_dump()
     return {**optimizer, "particles": particles} if isinstance(optimizer, Mapping) else optimizer
 

@@ -75,8 +75,9 @@ def random_designs(samples: int, seed: int) -> Floats:
     space = DesignSpace.build(
         required=CONTROLLERS[_CONTROLLER].variables, optional=(), chosen=None, fixed={}
     )
-    shares = np.random.Generator(np.random.Philox(key=seed)).random((samples, len(space.low)))
-    return space.designs(space.low + shares * (space.high - space.low))
+    box = space.box
+    shares = np.random.Generator(np.random.Philox(key=seed)).random((samples, box.dimension))
+    return space.designs(box.from_unit(shares))
 
 
 def published_designs() -> Floats:

@@ -8,7 +8,12 @@ from pydantic import ConfigDict, Field
 
 from gaitswarm.views.base import View, listing_name
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
-from services.optimizer.search.pso import OPTIMIZERS, OptimizerName, PsoSettings
+from services.optimizer.search.registry import (
+    METHODS,
+    OPTIMIZERS,
+    OptimizerName,
+    OptimizerSettings,
+)
 from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
 from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
@@ -65,10 +70,17 @@ class PreferenceView(Preference):
 
 
 class OptimizerView(View):
-    """A preset of the search method."""
+    """A search method by its default settings, or a preset of one."""
 
     name: OptimizerName = Field(description="Name, as in job specs.", examples=["pso-thesis"])
-    settings: PsoSettings = Field(description="What the name stands for.")
+    description: str = Field(
+        description="What the method is, with its source.",
+        examples=["Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)"],
+    )
+    settings: OptimizerSettings = Field(description="What the name stands for.")
+    settings_schema: dict[str, Any] = Field(
+        description="JSON schema of the method's settings, with defaults, bounds and descriptions."
+    )
 
 
 class ControllerView(View):
@@ -116,8 +128,16 @@ def preference_views() -> list[PreferenceView]:
 
 
 def optimizer_views() -> list[OptimizerView]:
-    """The presets of the search method, the default first."""
-    return [OptimizerView(name=name, settings=settings) for name, settings in OPTIMIZERS.items()]
+    """Every search method and preset."""
+    return [
+        OptimizerView(
+            name=name,
+            description=METHODS[settings.name].summary,
+            settings=settings,
+            settings_schema=type(settings).model_json_schema(),
+        )
+        for name, settings in OPTIMIZERS.items()
+    ]
 
 
 def controller_views() -> list[ControllerView]:

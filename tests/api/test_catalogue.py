@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import httpx2
+import jsonschema
 
 from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.search.registry import OPTIMIZERS
 from sim.controllers import CONTROLLERS
 from sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
 from sim.scenario import GAIT_VARIABLES, PRESETS, SCENARIOS
@@ -57,13 +59,18 @@ def test_preferences_have_their_biases_and_exponents(client: httpx2.Client) -> N
 
 
 def test_optimizers_have_their_settings(client: httpx2.Client) -> None:
-    found = {item["name"]: item["settings"] for item in items(client, "optimizers")}
+    found = {item["name"]: item for item in items(client, "optimizers")}
 
-    assert {name: (s["inertia_start"], s["inertia_end"]) for name, s in found.items()} == {
+    assert set(found) == set(OPTIMIZERS)
+    swarms = {name: found[name]["settings"] for name in ("pso", "pso-thesis")}
+    assert {name: (s["inertia_start"], s["inertia_end"]) for name, s in swarms.items()} == {
         "pso": (0.9, 0.7),
         "pso-thesis": (0.9, 0.9),
     }
-    assert all((s["cognitive"], s["social"]) == (0.5, 1.5) for s in found.values())
+    assert all((s["cognitive"], s["social"]) == (0.5, 1.5) for s in swarms.values())
+    for item in found.values():
+        assert item["description"]
+        jsonschema.validate(item["settings"], item["settings_schema"])
 
 
 def test_controllers_have_variables_with_bounds_units_and_published_designs(

@@ -13,6 +13,7 @@ import pytest
 from cli.controllers_study import Budget, comparisons, study_document, study_table
 from gaitswarm.jobs.embedded import earlier_job
 from services.optimizer.jobs.job import Command, Job
+from services.optimizer.search.registry import OPTIMIZERS
 from services.optimizer.service import JobService
 from services.runtime import open_store
 from tests.cli.conftest import Gaitswarm
@@ -51,7 +52,9 @@ def test_both_are_optimized_alike_and_compared(gaitswarm: Gaitswarm, db: Path) -
         ]
         assert [spec.seed for spec in specs] == [1, 2, 1, 2]
         assert len({(s.optimizer, s.iterations, s.case_names, s.robot) for s in specs}) == 1
-        assert specs[0].optimizer.inertia_end == 0.9
+        assert specs[0].optimizer == OPTIMIZERS["pso-thesis"].model_copy(
+            update={"particles": specs[0].optimizer.particles}
+        )
     searched = {
         (comparison["chapter"], runs["controller"]): len(
             jobs[runs["jobs"][0]].spec.design_space().variables

@@ -1,209 +1,255 @@
-"""What every optimizer keeps to, whatever its method. A new one is added to `JOBS`."""
+"""What every search method keeps to. A method of the registry is tested as soon as it is in it."""
 
 from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from services.optimizer.jobs.spec import create_optimizer
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.optimizer import Optimizer
+from services.optimizer.search.registry import METHODS, MethodName, create_search
+from services.optimizer.search.space import Axis, Space
 
-JOBS = {
-    "pso, reflecting": {"name": "pso", "particles": 6, "bounds": "reflect"},
-    "pso, absorbing": {"name": "pso", "particles": 6, "bounds": "absorb", "velocity_limit": 1.0},
+Floats = NDArray[np.float64]
+
+SPACES = {
+    "mixed": Space(
+        [
+            Axis(-1.0, 2.0),
+            Axis(0.0, 10.0, "integer"),
+            Axis(0.0, 2.0, "categorical"),
+            Axis(1500.0, 6000.0),
+        ]
+    ),
+    "one variable": Space([Axis(-3.0, 5.0)]),
+    "integers only": Space([Axis(0.0, 3.0, "integer"), Axis(0.0, 1.0, "categorical")]),
 }
 
+PARTICLES = 6
+BUDGET = 90
+SEED = 3
 
-@pytest.fixture(params=JOBS)
-def spec(request: pytest.FixtureRequest) -> JobSpec:
-    return job(JOBS[request.param])
-
-
-def job(optimizer: dict[str, object], **others: object) -> JobSpec:
-    given = {"optimizer": optimizer, "iterations": 8, "seed": 3} | others
-    return JobSpec.model_validate(given)
+METHOD = pytest.mark.parametrize("method", METHODS)
+SPACE = pytest.mark.parametrize("space", SPACES)
 
 
-def fitness_of(positions: NDArray[np.float64], iteration: int) -> NDArray[np.float64]:
-    """Anything that depends on all coordinates, with a failure now and then."""
-    fitness = np.log1p(np.abs(positions)).sum(axis=1)
-    fitness[iteration % len(fitness)] = math.inf
+def search(
+    method: MethodName, space: str = "mixed", *, seed: int = SEED, particles: int = PARTICLES
+) -> Optimizer:
+    settings = METHODS[method].settings.model_validate({"name": method, "particles": particles})
+    return create_search(settings, SPACES[space], BUDGET, seed)
+
+
+def fitness_of(positions: Floats, space: str = "mixed") -> Floats:
+    """A bowl in designs, of which a part cannot be judged."""
+    box = SPACES[space]
+    unit = box.to_unit(box.designs(positions))
+    fitness = np.square(unit - 0.3).sum(axis=1) + 0.1
+    fitness[np.sin(40.0 * unit.sum(axis=1)) > 0.95] = math.inf
     return fitness
 
 
-def through_json(optimizer: Optimizer, spec: JobSpec) -> Optimizer:
-    loaded = create_optimizer(spec)
-    loaded.load(json.loads(json.dumps(optimizer.dump(), allow_nan=False)))
-    return loaded
+def path(
+    optimizer: Optimizer,
+    space: str = "mixed",
+    *,
+    evaluations: int = BUDGET,
+    most: int | None = None,
+) -> Iterator[Floats]:
+    """Every position that is asked for, one by one."""
+    while optimizer.evaluations < evaluations:
+        left = evaluations - optimizer.evaluations
+        positions = optimizer.ask(left if most is None else min(most, left))
+        yield from positions
+        optimizer.tell(fitness_of(positions, space))
 
 
-def history(spec: JobSpec, *, reload: bool) -> list[bytes]:
-    optimizer = create_optimizer(spec)
-    asked = []
-    for iteration in range(spec.iterations):
-        optimizer = through_json(optimizer, spec) if reload else optimizer
-        positions = optimizer.ask()
-        asked.append(positions.tobytes())
-        optimizer = through_json(optimizer, spec) if reload else optimizer
-        optimizer.tell(fitness_of(positions, iteration))
-    return asked
+def bits(positions: Iterator[Floats]) -> list[bytes]:
+    return [position.tobytes() for position in positions]
 
 
-def test_a_dump_loaded_between_any_ask_and_tell_changes_no_bit(spec: JobSpec) -> None:
-    assert history(spec, reload=True) == history(spec, reload=False)
+def through_json(optimizer: Optimizer) -> dict[str, object]:
+    state: dict[str, object] = json.loads(json.dumps(optimizer.dump(), allow_nan=False))
+    return state
 
 
-def test_another_seed_searches_elsewhere(spec: JobSpec) -> None:
-    other = spec.model_copy(update={"seed": spec.seed + 1})
-    assert history(spec, reload=False)[0] != history(other, reload=False)[0]
+@METHOD
+@SPACE
+def test_every_position_is_finite_and_inside_the_bounds(method: MethodName, space: str) -> None:
+    box = SPACES[space]
+    found = np.array(list(path(search(method, space), space)))
+    assert found.shape == (BUDGET, box.dimension)
+    assert (found >= box.low).all() and (found <= box.high).all()
 
 
-def test_asking_twice_gives_the_same_positions(spec: JobSpec) -> None:
-    optimizer = create_optimizer(spec)
+@METHOD
+def test_a_budget_is_kept_to_the_last_evaluation(method: MethodName) -> None:
+    optimizer = search(method)
+    assert len(list(path(optimizer, evaluations=47))) == optimizer.evaluations == 47
+
+
+@METHOD
+@SPACE
+def test_the_same_seed_gives_the_same_bits_and_another_one_others(
+    method: MethodName, space: str
+) -> None:
+    first, again, other = (bits(path(search(method, space, seed=s), space)) for s in (3, 3, 4))
+    assert first == again
+    if space == "mixed":
+        assert first != other
+
+
+@METHOD
+@SPACE
+def test_a_dump_loaded_between_any_ask_and_tell_changes_no_bit(
+    method: MethodName, space: str
+) -> None:
+    straight = bits(path(search(method, space), space))
+    reloaded, found = search(method, space), list[bytes]()
+    while reloaded.evaluations < BUDGET:
+        state = through_json(reloaded)
+        # The first copy may go on with what the process has; the second one has the state alone.
+        for copy in (search(method, space), search(method, space)):
+            copy.load(state)
+            reloaded = copy
+            positions = copy.ask(BUDGET - copy.evaluations)
+        state = through_json(reloaded)
+        reloaded = search(method, space)
+        reloaded.load(state)
+        assert reloaded.ask().tobytes() == positions.tobytes()
+        found += [position.tobytes() for position in positions]
+        reloaded.tell(fitness_of(positions, space))
+    assert found == straight
+
+
+RESUME = """
+import json, sys
+from tests.optimizer.test_optimizer_contract import bits, path, search
+method, state = json.load(sys.stdin)
+optimizer = search(method)
+optimizer.load(state)
+print(json.dumps([row.hex() for row in bits(path(optimizer))]))
+"""
+
+
+def test_another_process_goes_on_with_the_same_bits() -> None:
+    for method in METHODS:
+        straight, stopped = search(method), search(method)
+        expected = bits(path(straight))
+        done = list(path(stopped, evaluations=BUDGET // 2))
+        given = json.dumps([method, stopped.dump()])
+        printed = subprocess.run(
+            [sys.executable, "-c", RESUME], input=given, capture_output=True, text=True, check=True
+        ).stdout
+        assert json.loads(printed) == [row.hex() for row in expected[len(done) :]], method
+
+
+@METHOD
+def test_the_path_does_not_depend_on_how_much_is_asked_at_once(method: MethodName) -> None:
+    whole = bits(path(search(method)))
+    for most in (1, 4):
+        assert bits(path(search(method), most=most)) == whole
+
+
+@METHOD
+def test_no_ask_gives_more_than_the_settings_or_the_caller_allow(method: MethodName) -> None:
+    optimizer = search(method)
+    for most in (None, 3, 100, 1) * 5:
+        positions = optimizer.ask(most)
+        assert 1 <= len(positions) <= min(PARTICLES, most or PARTICLES)
+        optimizer.tell(fitness_of(positions))
+
+
+@METHOD
+def test_asking_twice_gives_the_same_positions(method: MethodName) -> None:
+    optimizer = search(method)
     first = optimizer.ask()
-    again = optimizer.ask()
-    assert first.tobytes() == again.tobytes()
-    assert optimizer.iteration == 0
+    first_bits = first.tobytes()
+    first[:] = math.nan
+    assert optimizer.ask(1).tobytes() == first_bits
+    assert (optimizer.iteration, optimizer.evaluations) == (0, 0)
 
 
-def test_what_the_caller_does_to_an_ask_is_its_own_affair(spec: JobSpec) -> None:
-    optimizer = create_optimizer(spec)
-    expected = optimizer.ask()
-    optimizer.ask()[:] = math.nan
-    np.testing.assert_array_equal(optimizer.ask(), expected)
-
-
-def test_iteration_counts_the_tells(spec: JobSpec) -> None:
-    optimizer = create_optimizer(spec)
-    for k in range(3):
-        assert optimizer.iteration == k
-        optimizer.tell(fitness_of(optimizer.ask(), k))
-    assert optimizer.iteration == 3
-
-
-def test_every_position_is_inside_the_bounds(spec: JobSpec) -> None:
-    space = spec.design_space()
-    optimizer = create_optimizer(spec)
-    for k in range(200):
+@METHOD
+def test_tells_and_evaluations_are_counted(method: MethodName) -> None:
+    optimizer, evaluations = search(method), 0
+    for k in range(5):
+        assert (optimizer.iteration, optimizer.evaluations) == (k, evaluations)
         positions = optimizer.ask()
-        assert positions.shape == (6, len(space.variables))
-        assert (positions >= space.low).all() and (positions <= space.high).all()
-        optimizer.tell(fitness_of(positions, k))
+        evaluations += len(positions)
+        optimizer.tell(fitness_of(positions))
 
 
-def test_a_swarm_that_only_fails_keeps_searching(spec: JobSpec) -> None:
-    optimizer = create_optimizer(spec)
-    seen = set()
-    for _ in range(4):
+@METHOD
+def test_a_search_of_which_everything_fails_keeps_searching(method: MethodName) -> None:
+    optimizer, seen = search(method), set()
+    while optimizer.evaluations < BUDGET:
         positions = optimizer.ask()
         assert np.isfinite(positions).all()
-        seen.add(positions.tobytes())
-        optimizer.tell(np.full(6, math.inf))
-    assert len(seen) == 4
+        seen |= {row.tobytes() for row in positions}
+        optimizer.tell(np.full(len(positions), math.inf))
+    assert len(seen) > BUDGET // 2
 
 
-@pytest.mark.parametrize(
-    "fitness",
-    [np.zeros(5), np.zeros((6, 1)), np.full(6, math.nan), np.full(6, -math.inf)],
-    ids=["too few", "two axes", "nan", "-inf"],
-)
-def test_a_fitness_that_is_none_is_refused(spec: JobSpec, fitness: NDArray[np.float64]) -> None:
-    optimizer = create_optimizer(spec)
-    optimizer.ask()
-    with pytest.raises(ValueError, match="fitness"):
-        optimizer.tell(fitness)
+@METHOD
+@SPACE
+def test_a_search_goes_on_when_all_is_equal(method: MethodName, space: str) -> None:
+    optimizer = search(method, space)
+    while optimizer.evaluations < BUDGET:
+        optimizer.tell(np.ones(len(optimizer.ask())))
+
+
+@METHOD
+@pytest.mark.parametrize("worst", [np.nan, -np.inf])
+def test_a_fitness_that_is_none_is_refused(method: MethodName, worst: float) -> None:
+    optimizer = search(method)
+    with pytest.raises(ValueError, match="before ask"):
+        optimizer.tell(np.zeros(PARTICLES))
+    asked = len(optimizer.ask())
+    for fitness in (np.zeros(asked + 1), np.zeros((asked, 1)), np.full(asked, worst)):
+        with pytest.raises(ValueError, match="fitness"):
+            optimizer.tell(fitness)
     assert optimizer.iteration == 0
 
 
-def test_a_tell_needs_an_ask(spec: JobSpec) -> None:
-    with pytest.raises(ValueError, match="before ask"):
-        create_optimizer(spec).tell(np.zeros(6))
-
-
-def test_a_damaged_state_is_refused_and_named(spec: JobSpec) -> None:
-    sound = create_optimizer(spec)
-    sound.ask()
+@METHOD
+def test_a_damaged_state_is_refused_by_name_and_leaves_the_state_before(method: MethodName) -> None:
+    optimizer = search(method)
+    optimizer.tell(fitness_of(optimizer.ask()))
+    before = through_json(optimizer)
+    optimizer.ask()
+    later = through_json(optimizer)
+    optimizer.load(before)
     for field, value in (
         ("schema_version", 999),
         ("iteration", -1),
         ("asked", None),
-        ("positions", [[1.0]]),
+        ("asked", 10**6),
         ("optimizer", "another"),
     ):
         with pytest.raises(ValueError, match=field):
-            create_optimizer(spec).load(sound.dump() | {field: value})
-    incomplete = sound.dump()
-    del incomplete["iteration"]
+            optimizer.load(later | {field: value})
     with pytest.raises(ValueError, match="iteration"):
-        create_optimizer(spec).load(incomplete)
+        optimizer.load({name: value for name, value in later.items() if name != "iteration"})
+    assert through_json(optimizer) == before
 
 
-def test_a_refused_state_leaves_the_state_before(spec: JobSpec) -> None:
-    optimizer = create_optimizer(spec)
-    optimizer.tell(fitness_of(optimizer.ask(), 0))
-    before = optimizer.dump()
-    optimizer.ask()
-    later = optimizer.dump()
-    optimizer.load(before)
-    outside = [[1e9] * len(row) for row in later["best_positions"]]
-    with pytest.raises(ValueError, match="best_positions: outside"):
-        optimizer.load(later | {"best_positions": outside})
-    assert optimizer.dump() == before
+@METHOD
+def test_a_search_learns(method: MethodName) -> None:
+    """Better than the median of random searches on a bowl; random search itself is exempt."""
+    if method == "random":
+        pytest.skip("it does not learn")
+    found = [best(method, seed) for seed in range(7)]
+    by_chance = [best("random", seed) for seed in range(7)]
+    assert np.median(found) < np.median(by_chance)
 
 
-def test_a_state_of_another_swarm_size_is_refused(spec: JobSpec) -> None:
-    larger = spec.model_copy(
-        update={"optimizer": spec.optimizer.model_copy(update={"particles": 7})}
-    )
-    optimizer = create_optimizer(larger)
-    optimizer.ask()
-    with pytest.raises(ValueError, match="positions: expected 6 rows"):
-        create_optimizer(spec).load(optimizer.dump())
-
-
-@given(
-    seed=st.integers(0, 2**63 - 1),
-    particles=st.integers(1, 9),
-    fitness=st.lists(st.one_of(st.floats(0.0, 1e300), st.just(math.inf)), min_size=9, max_size=9),
-    bounds=st.sampled_from(["reflect", "absorb"]),
-    limit=st.floats(0.01, 1.0),
-    social=st.floats(0.0, 10.0),
-)
-@settings(max_examples=60, deadline=None)
-def test_no_settings_and_no_fitness_lead_out_of_the_box_or_off_the_bits(
-    seed: int, particles: int, fitness: list[float], bounds: str, limit: float, social: float
-) -> None:
-    spec = job(
-        {
-            "particles": particles,
-            "bounds": bounds,
-            "velocity_limit": limit,
-            "social": social,
-            "inertia_start": 2.0,
-            "inertia_end": 1.5,
-        },
-        seed=seed,
-    )
-    space = spec.design_space()
-    straight, reloaded = create_optimizer(spec), create_optimizer(spec)
-    for k in range(5):
-        positions = straight.ask()
-        assert (positions >= space.low).all() and (positions <= space.high).all()
-        reloaded = through_json(reloaded, spec)
-        assert reloaded.ask().tobytes() == positions.tobytes()
-        told = np.roll(np.array(fitness), k)[:particles]
-        straight.tell(told)
-        reloaded.tell(told)
-
-
-def test_inertia_that_rises_is_refused() -> None:
-    with pytest.raises(ValidationError, match="inertia_end must not exceed inertia_start"):
-        job({"inertia_start": 0.4, "inertia_end": 0.5})
+def best(method: MethodName, seed: int) -> float:
+    optimizer = search(method, seed=seed)
+    return float(min(fitness_of(np.array(list(path(optimizer))))))

@@ -13,15 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.search.pso import (
-    OPTIMIZERS,
-    OptimizerName,
-    ParticleSwarm,
-    PsoSettings,
-    absorb,
-    reflect,
-)
+from services.optimizer.search.pso import ParticleSwarm, PsoSettings, absorb, reflect
 from services.optimizer.search.random_stream import uniform
+from services.optimizer.search.registry import OPTIMIZERS, OptimizerName
+from services.optimizer.search.space import Space
 from sim.variables import Variable
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -33,7 +28,7 @@ def swarm(
     *, particles: int = 5, iterations: int = 10, seed: int = 1, **given: object
 ) -> ParticleSwarm:
     settings = PsoSettings.model_validate({"particles": particles} | given)
-    return ParticleSwarm(settings, *BOX, iterations, seed)
+    return ParticleSwarm(settings, Space.continuous(*BOX), iterations * particles, seed)
 
 
 def best_of(optimizer: ParticleSwarm, function: Function, iterations: int) -> float:
@@ -169,7 +164,8 @@ def test_an_absorbed_particle_stops_at_the_wall_in_that_direction_only() -> None
 def speeds(name: OptimizerName, iterations: int) -> list[float]:
     """Of a lone particle that improves with every step, so that nothing but inertia moves it."""
     settings = OPTIMIZERS[name].model_copy(update={"particles": 1})
-    lone = ParticleSwarm(settings, np.array([-1e3]), np.array([1e3]), iterations, 1)
+    assert isinstance(settings, PsoSettings)
+    lone = ParticleSwarm(settings, Space.continuous([-1e3], [1e3]), iterations, 1)
     found = []
     for k in range(iterations):
         lone.ask()
@@ -190,9 +186,8 @@ def test_the_thesis_swarm_keeps_its_inertia_and_that_of_the_default_falls() -> N
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_converges_on_the_sphere(seed: int) -> None:
-    low, high = np.full(5, -5.0), np.full(5, 5.0)
     settings = PsoSettings(particles=25, inertia_end=0.4)
-    optimizer = ParticleSwarm(settings, low, high, 150, seed)
+    optimizer = ParticleSwarm(settings, Space.continuous([-5.0] * 5, [5.0] * 5), 150 * 25, seed)
     assert best_of(optimizer, lambda x: np.square(x - 1.0).sum(axis=1), 150) < 1e-4
 
 
@@ -227,7 +222,7 @@ def test_beats_random_search_by_far_on_the_mixed_integer_function_of_the_thesis(
     ratios = []
     for seed in range(5):
         swarm_best = best_of(
-            ParticleSwarm(PsoSettings(particles=40), MIXED.low, MIXED.high, 70, seed),
+            ParticleSwarm(PsoSettings(particles=40), MIXED.box, 70 * 40, seed),
             f_d7c0r0i1,
             70,
         )
@@ -237,7 +232,7 @@ def test_beats_random_search_by_far_on_the_mixed_integer_function_of_the_thesis(
 
 
 def test_integers_are_rounded_in_designs_and_nowhere_else() -> None:
-    positions = ParticleSwarm(PsoSettings(), MIXED.low, MIXED.high, 5, 1).ask()
+    positions = ParticleSwarm(PsoSettings(), MIXED.box, 5 * 25, 1).ask()
     designs = MIXED.designs(positions)
     assert not np.equal(positions[:, 5], np.rint(positions[:, 5])).any()
     np.testing.assert_array_equal(designs[:, 5], np.rint(positions[:, 5]))

@@ -18,6 +18,7 @@ from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.jobs.misfit import root_mean_square
+from services.optimizer.jobs.optimizer_choice import optimizer_settings
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance, optimizer_files
 from services.optimizer.jobs.spec import Spec
@@ -263,8 +264,8 @@ def test_a_refused_claim_sends_nothing() -> None:
 
 def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     specs = (JobSpec, IdentificationSpec, CalibrationSpec, Spec)
-    used = (*specs, ParticleSwarm, DesignSpace, Preference, root_mean_square)
+    used = (*specs, optimizer_settings, ParticleSwarm, DesignSpace, Preference, root_mean_square)
     files = {Path(inspect.getfile(thing)) for thing in used}
     search = Path(inspect.getfile(ParticleSwarm)).parent
-    files |= {file for file in search.glob("*.py") if file.name != "__init__.py"}
+    files |= set(search.rglob("*.py"))
     assert files == set(optimizer_files())

@@ -87,7 +87,7 @@ def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
 
 def _diversity(columns: EvaluationColumns, space: DesignSpace, particles: int) -> Floats:
     searched = len(space.variables)
-    share = (columns.designs[:, :searched] - space.low) / (space.high - space.low)
+    share = space.box.to_unit(columns.designs[:, :searched])
     spread: Floats = share.reshape(-1, particles, searched).std(axis=1).mean(axis=1)
     return spread
 

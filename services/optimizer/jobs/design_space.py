@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.errors import InvalidRequest
+from services.optimizer.search.space import Axis, Space
 from sim.errors import SimulationInputError
 from sim.variables import Variable
 
@@ -91,14 +92,19 @@ class DesignSpace:
         )
 
     @property
+    def box(self) -> Space:
+        """The box of the variables that are searched."""
+        return Space([Axis(v.low, v.high, v.kind) for v in self.variables])
+
+    @property
     def low(self) -> NDArray[np.float64]:
         """(d,) lower bounds."""
-        return np.array([variable.low for variable in self.variables])
+        return self.box.low
 
     @property
     def high(self) -> NDArray[np.float64]:
         """(d,) upper bounds."""
-        return np.array([variable.high for variable in self.variables])
+        return self.box.high
 
     @property
     def columns(self) -> tuple[Variable, ...]:
@@ -115,18 +121,8 @@ class DesignSpace:
             (n, len(names)), integer variables rounded, of categorical ones the index of the choice
             in whose equal share of the bounds the point lies, and fixed values appended.
         """
-        columns = np.empty((len(positions), len(self.names)))
-        for j, variable in enumerate(self.variables):
-            column = positions[:, j]
-            if variable.kind == "integer":
-                column = np.rint(column)
-            elif variable.kind == "categorical":
-                choices = len(variable.choices)
-                column = np.minimum(np.floor(column * (choices / (choices - 1))), choices - 1)
-            columns[:, j] = column
-        for j, (_, value) in enumerate(self.fixed, start=len(self.variables)):
-            columns[:, j] = value
-        return columns
+        held = np.array([value for _, value in self.fixed], dtype=np.float64)
+        return np.hstack([self.box.designs(positions), np.tile(held, (len(positions), 1))])
 
     def simulated(self, designs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Designs as the simulator takes them, which knows every choice of its catalogue.

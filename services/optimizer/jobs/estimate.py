@@ -63,7 +63,7 @@ def estimate(
     Returns:
         Counts, and times where a rate is known.
     """
-    evaluations = spec.iterations * spec.optimizer.particles
+    evaluations = spec.budget
     one = duration(spec, cases)
     alike = [job for job in earlier if _alike(job, spec)][:_MOST_JOBS]
     if alike:

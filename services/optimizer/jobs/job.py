@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
@@ -95,7 +96,7 @@ def extended(state: JobState, committed: int, iterations: int) -> JobState:
 
     Args:
         state: before.
-        committed: iterations that it has.
+        committed: iterations of the budget that are spent.
         iterations: of the new budget, in all.
 
     Returns:
@@ -198,6 +199,11 @@ class Job:
         return self.stored_spec
 
     @property
+    def spent(self) -> int:
+        """Iterations of its budget that are spent: whole ones of `particles` designs each."""
+        return math.ceil(self.progress.evaluations / self.spec.optimizer.particles)
+
+    @property
     def readable(self) -> bool:
         """Whether this version can read the spec."""
         return not isinstance(self.stored_spec, UnreadableSpec)
@@ -286,7 +292,7 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
         eta = 0.0
     elif job.state is JobState.RUNNING and job.readable:
         one = progress.compute_seconds / progress.iterations
-        remaining = max(0, job.spec.iterations - progress.iterations) * one
+        remaining = max(0, job.spec.budget - progress.evaluations) / rate
         under_way = min(one, max(0.0, (now - job.updated_at).total_seconds()))
         eta = max(0.0, remaining - under_way)
     return TimeLeft(eta, rate, rate * len(job.spec.case_names) if job.readable else None)

@@ -15,19 +15,17 @@ from sim.provenance import Provenance, provenance_of, source_digest
 
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
-_SOURCES: Final = (
+_JUDGING: Final = (
     "jobs/calibration.py",
     "jobs/design_space.py",
     "jobs/identification.py",
     "jobs/misfit.py",
+    "jobs/optimizer_choice.py",
     "jobs/preference.py",
     "jobs/spec.py",
     "jobs/tuning.py",
-    "search/optimizer.py",
-    "search/pso.py",
-    "search/random_stream.py",
 )
-"""Files that ask for designs and judge them."""
+"""Files that judge designs."""
 
 
 class JobProvenance(BaseModel):
@@ -148,8 +146,9 @@ def with_record(
 
 
 def optimizer_files() -> tuple[Path, ...]:
-    """The source files that ask for designs and judge them, in order."""
-    return tuple(_OPTIMIZER / name for name in _SOURCES)
+    """The source files that judge designs and ask for them, in order."""
+    search = sorted((_OPTIMIZER / "search").rglob("*.py"))
+    return (*(_OPTIMIZER / name for name in _JUDGING), *search)
 
 
 @lru_cache(maxsize=1)

@@ -16,12 +16,19 @@ from typing import Annotated, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.pso import OptimizerChoice, ParticleSwarm, PsoSettings
+from services.optimizer.search.registry import (
+    DEFAULT_METHOD,
+    LONGEST_REPLAY,
+    METHODS,
+    OPTIMIZERS,
+    create_search,
+)
 from sim.assembly import check_precision
 from sim.case import Case
 from sim.errors import SimulationInputError
@@ -99,12 +106,14 @@ class Spec(BaseModel):
         examples=[{"FOMF": 2, "stride": 0.15}],
     )
     optimizer: OptimizerChoice = Field(
-        default_factory=PsoSettings,
-        description="Search algorithm and its settings: `pso`, `pso-thesis` (the thesis's constant"
-        " inertia), or settings of your own.",
+        default=OPTIMIZERS[DEFAULT_METHOD],
+        description="Search method and its settings: a name (see /v1/optimizers), or settings of"
+        " your own.",
     )
     iterations: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
-        default=25, description="Budget: iterations to run (generations of the swarm)."
+        default=25,
+        description="Budget: `particles` of the optimizer times this many designs are judged. A"
+        " method that asks for fewer at once takes more iterations for them.",
     )
     seed: int = Field(
         default=1, ge=0, lt=2**63, description="Source of all randomness; same seed, same bits."
@@ -114,6 +123,20 @@ class Spec(BaseModel):
         description="Of the numbers of the search's physics: `double`, or `single`, which is about"
         " twice as fast and needs a C compiler. What is reported as best is judged in double.",
     )
+
+    @property
+    def budget(self) -> int:
+        """Designs that the job judges in all."""
+        return self.iterations * self.optimizer.particles
+
+    @model_validator(mode="after")
+    def _can_be_resumed(self) -> Self:
+        if METHODS[self.optimizer.name].replays and self.budget > LONGEST_REPLAY:
+            raise ValueError(
+                f"iterations: {self.optimizer.name} is replayed when a job is resumed, and so"
+                f" judges {LONGEST_REPLAY} designs at most, not {self.budget}"
+            )
+        return self
 
     @abstractmethod
     def design_space(self) -> DesignSpace:
@@ -267,5 +290,4 @@ def create_optimizer(spec: Spec) -> Optimizer:
     Returns:
         The optimizer before its first ask.
     """
-    space = spec.design_space()
-    return ParticleSwarm(spec.optimizer, space.low, space.high, spec.iterations, spec.seed)
+    return create_search(spec.optimizer, spec.design_space().box, spec.budget, spec.seed)

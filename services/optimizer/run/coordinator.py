@@ -230,7 +230,7 @@ def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, .
     if state.answered is not None:
         first = _following(job.spec, state.answered.ask, state.answered.fitness)
     else:
-        first = _ask(create_optimizer(job.spec))
+        first = _ask(job.spec, create_optimizer(job.spec))
     if first is None:
         raise ValueError(f"job {job.id} has spent its budget")
     state = replace(state, job=job, ask=first)
@@ -344,7 +344,7 @@ def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> 
             cases=spec.cases(state.recordings),
             designs=spec.design_space().simulated(designs),
             provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
-            iterations_left=spec.iterations - ask.iteration - 1,
+            iterations_left=max(0, spec.iterations - ask.iteration - 1),
         )
     )
 
@@ -354,11 +354,15 @@ def _following(spec: Spec, ask: Ask, fitness: NDArray[np.float64]) -> Ask | None
     optimizer = create_optimizer(spec)
     optimizer.load(ask.state)
     optimizer.tell(fitness)
-    return _ask(optimizer) if optimizer.iteration < spec.iterations else None
+    return _ask(spec, optimizer)
 
 
-def _ask(optimizer: Optimizer) -> Ask:
-    positions = optimizer.ask()
+def _ask(spec: Spec, optimizer: Optimizer) -> Ask | None:
+    """At most what is left of the budget; None at its end."""
+    left = spec.budget - optimizer.evaluations
+    if left <= 0:
+        return None
+    positions = optimizer.ask(left)
     return Ask(optimizer.iteration, positions, _as_stored(optimizer.dump()))
 
 

@@ -6,38 +6,60 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+
+class SearchSettings(BaseModel):
+    """What the settings of every method have."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: str
+    particles: int = Field(
+        default=25, ge=1, le=10_000, description="Designs of one iteration, at most."
+    )
 
 
 class Optimizer(Protocol):
     """A batch optimizer over a box. Knows nothing of storage, simulation or processes.
 
     call    state before    state after     returns
-    ask()   idle at k       asked at k      positions (particles, d)
+    ask()   idle at k       asked at k      positions (n, d), 1 <= n <= particles
     ask()   asked at k      asked at k      the same positions again
     tell(f) asked at k      idle at k + 1   -
     dump()  any             unchanged       JSON-able state, exact to the bit
 
-    All randomness is a function of (seed, iteration, particle); equal state, equal future.
-    A fitness of +inf (a failed evaluation) never becomes a best.
+    It is a function of its settings, space, budget and seed, and of what it was told: equal state,
+    equal future. The path does not depend on how many positions an ask was allowed to give: what is
+    asked in pieces is learned from when it is whole. It never ends by itself; a method that has
+    converged starts anew from elsewhere. A fitness of +inf (a failed evaluation) never becomes a
+    best.
     """
 
     @property
     def iteration(self) -> int:
         """Number of completed tells."""
 
-    def ask(self) -> NDArray[np.float64]:
+    @property
+    def evaluations(self) -> int:
+        """Number of positions that were told, in all."""
+
+    def ask(self, most: int | None = None) -> NDArray[np.float64]:
         """Give the positions to evaluate next; the same ones again until they are told.
 
+        Args:
+            most: Positions to give, at most, >= 1; what is asked already stays. Default: the
+                settings' `particles`, which also is the limit.
+
         Returns:
-            (particles, d), inside the bounds, in the variables' own units.
+            (n, d), inside the bounds, in the variables' own units.
         """
 
     def tell(self, fitness: NDArray[np.float64]) -> None:
         """Take what the positions last asked for are worth.
 
         Args:
-            fitness: (particles,) of each of them, minimized; +inf for a failed evaluation.
+            fitness: (n,) of each of them, minimized; +inf for a failed evaluation.
 
         Raises:
             ValueError: nothing was asked for, the shape is another, or a value is NaN or -inf.
@@ -54,12 +76,34 @@ class Optimizer(Protocol):
         """Take on a state.
 
         Args:
-            state: as `dump` gave it, for the same settings and bounds.
+            state: as `dump` gave it, for the same settings, space, budget and seed.
 
         Raises:
             ValueError: it is of another method, version or shape, or outside the bounds; the state
                 before is kept.
         """
+
+
+def checked_fitness(fitness: NDArray[np.float64], asked: int) -> NDArray[np.float64]:
+    """Check what is told.
+
+    Args:
+        fitness: Of the positions last asked for.
+        asked: How many those are, 0 if there are none.
+
+    Returns:
+        (asked,), a copy.
+
+    Raises:
+        ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
+    """
+    if not asked:
+        raise ValueError("tell() before ask(): there are no positions that this belongs to")
+    if fitness.shape != (asked,):
+        raise ValueError(f"fitness has shape {fitness.shape}; {asked} positions were asked for")
+    if np.isnan(fitness).any() or np.isneginf(fitness).any():
+        raise ValueError("fitness must be finite, or +inf for a failed evaluation")
+    return np.array(fitness, dtype=np.float64)
 
 
 M = TypeVar("M", bound=BaseModel)

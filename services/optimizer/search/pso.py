@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    NonNegativeInt,
-    model_validator,
+from pydantic import Field, model_validator
+
+from services.optimizer.search.generational import (
+    Generational,
+    GenerationState,
+    Row,
+    Worth,
+    of_worth,
+    worth,
 )
-
-from services.optimizer.search.optimizer import matrix, parse_state
+from services.optimizer.search.optimizer import SearchSettings, matrix
 from services.optimizer.search.random_stream import swarm_uniform
+from services.optimizer.search.space import Space
 
-_SCHEMA_VERSION: Final = 1
 _SCATTER: Final = 1
 _MOVE: Final = 2
 """Purposes of random streams: never renumbered, or stored jobs would change their future."""
@@ -29,10 +29,8 @@ _INITIAL_VELOCITY: Final = 0.1
 """Share of each variable's range."""
 
 
-class PsoSettings(BaseModel):
+class PsoSettings(SearchSettings):
     """Settings of the particle swarm; defaults are the thesis's, but for an inertia that falls."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: Literal["pso"] = "pso"
     particles: int = Field(default=25, ge=1, le=10_000, description="Size of the swarm.")
@@ -57,61 +55,15 @@ class PsoSettings(BaseModel):
         return self
 
 
-OptimizerName = Literal["pso", "pso-thesis"]
-
-OPTIMIZERS: Final[dict[OptimizerName, PsoSettings]] = {
-    "pso": PsoSettings(),
-    "pso-thesis": PsoSettings(inertia_end=0.9),
-}
-"""`pso`: the default, whose inertia falls. `pso-thesis`: inertia 0.9 throughout (3.4.1)."""
-
-
-def optimizer_settings(choice: object) -> object:
-    """Look up settings that are named.
-
-    Args:
-        choice: name of a preset, or anything else.
-
-    Returns:
-        The preset's settings; what is no name as it is.
-
-    Raises:
-        ValueError: no preset of that name; names those that there are.
-    """
-    if not isinstance(choice, str):
-        return choice
-    for name, settings in OPTIMIZERS.items():
-        if name == choice:
-            return settings
-    raise ValueError(
-        f"unknown optimizer {choice!r}; known are {', '.join(OPTIMIZERS)}, or give an object:"
-        " settings of your own"
-    )
-
-
-OptimizerChoice = Annotated[
-    PsoSettings,
-    BeforeValidator(optimizer_settings, json_schema_input_type=OptimizerName | PsoSettings),
-]
-"""How jobs choose a search: once it is read, a name has become settings."""
-
-
-class _SwarmState(BaseModel):
+class _SwarmState(GenerationState):
     """What `dump` writes. best_fitness: None where a particle has not succeeded yet."""
 
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-    optimizer: Literal["pso"]
-    schema_version: Literal[1]
-    iteration: NonNegativeInt
-    asked: bool
-    positions: list[list[FiniteFloat]]
-    velocities: list[list[FiniteFloat]]
-    best_positions: list[list[FiniteFloat]]
-    best_fitness: list[FiniteFloat | None]
+    velocities: list[Row]
+    best_positions: list[Row]
+    best_fitness: Worth
 
 
-class ParticleSwarm:
+class ParticleSwarm(Generational[PsoSettings, _SwarmState]):
     """A swarm that remembers each particle's best, the `pso` of job specs.
 
     It moves in the continuous box, in the variables' own units; whoever evaluates a position
@@ -119,162 +71,135 @@ class ParticleSwarm:
     same units.
     """
 
-    def __init__(
-        self,
-        settings: PsoSettings,
-        low: NDArray[np.float64],
-        high: NDArray[np.float64],
-        iterations: int,
-        seed: int,
-    ) -> None:
+    state_model = _SwarmState
+    schema_version = 2
+
+    def __init__(self, settings: PsoSettings, space: Space, budget: int, seed: int) -> None:
         """Create a swarm that has not been asked yet.
 
         Args:
             settings: of the method.
-            low: (d,) lower bounds, in the variables' own units.
-            high: (d,) upper bounds.
-            iterations: of the planned run, over which inertia goes from its start to its end.
+            space: the box that is searched.
+            budget: evaluations of the planned run, over which inertia goes from its start to its
+                end.
             seed: of all random numbers.
         """
-        self._settings = settings
-        self._low = np.array(low, dtype=np.float64)
-        self._high = np.array(high, dtype=np.float64)
-        self._iterations = iterations
-        self._seed = seed
-        shape = (settings.particles, len(self._low))
-        self._iteration = 0
-        self._asked = False
-        self._positions = np.tile(self._low, (settings.particles, 1))
-        self._velocities = np.zeros(shape)
-        self._best_positions = self._positions.copy()
+        super().__init__(settings, space, budget, seed)
+        self._velocities = np.zeros((settings.particles, space.dimension))
+        self._best_positions = np.tile(space.low, (settings.particles, 1))
         self._best_fitness = np.full(settings.particles, np.inf)
 
-    @property
-    def iteration(self) -> int:
-        """Number of completed tells."""
-        return self._iteration
-
-    def ask(self) -> NDArray[np.float64]:
-        """Give the positions to evaluate next; the same ones again until they are told.
+    def propose(self) -> NDArray[np.float64]:
+        """Scatter the swarm, or move it on.
 
         Returns:
-            (particles, d), inside the bounds, in the variables' own units.
+            (particles, d), inside the bounds.
         """
-        if not self._asked:
-            if self._iteration == 0:
-                self._scatter()
-            else:
-                self._move()
-            self._asked = True
-        return self._positions.copy()
+        return self._moved() if self.generations else self._scattered()
 
-    def tell(self, fitness: NDArray[np.float64]) -> None:
-        """Take what the positions last asked for are worth.
+    def learn(self, positions: NDArray[np.float64], fitness: NDArray[np.float64]) -> None:
+        """Let each particle remember its best.
 
         Args:
-            fitness: (particles,) of each of them, minimized; +inf for a failed evaluation.
-
-        Raises:
-            ValueError: nothing was asked for, the shape is another, or a value is NaN or -inf.
+            positions: (particles, d) of the swarm.
+            fitness: (particles,) of each, +inf for a failed evaluation.
         """
-        if not self._asked:
-            raise ValueError("tell() before ask(): there are no positions that this belongs to")
-        if fitness.shape != self._best_fitness.shape:
-            raise ValueError(
-                f"fitness has shape {fitness.shape}, the swarm {self._best_fitness.shape}"
-            )
-        if np.isnan(fitness).any() or np.isneginf(fitness).any():
-            raise ValueError("fitness must be finite, or +inf for a failed evaluation")
         better = fitness < self._best_fitness
-        self._best_positions[better] = self._positions[better]
+        self._best_positions[better] = positions[better]
         self._best_fitness[better] = fitness[better]
-        self._iteration += 1
-        self._asked = False
 
-    def dump(self) -> dict[str, Any]:
-        """Give the whole state.
-
-        Returns:
-            JSON-able values with a schema version. JSON prints the shortest text that reads back
-            as the same float, so none loses a bit.
-        """
+    def memory(self) -> dict[str, Any]:
+        """Give velocities and bests."""
         return {
-            "optimizer": self._settings.name,
-            "schema_version": _SCHEMA_VERSION,
-            "iteration": self._iteration,
-            "asked": self._asked,
-            "positions": self._positions.tolist(),
             "velocities": self._velocities.tolist(),
             "best_positions": self._best_positions.tolist(),
-            "best_fitness": [f if math.isfinite(f) else None for f in self._best_fitness.tolist()],
+            "best_fitness": worth(self._best_fitness),
         }
 
-    def load(self, state: dict[str, Any]) -> None:
-        """Take on a state.
+    def recall(self, state: _SwarmState) -> None:
+        """Take on velocities and bests.
 
         Args:
-            state: as `dump` gave it, for the same settings and bounds.
+            state: as it was parsed.
 
         Raises:
-            ValueError: it is of another method, version or shape, or outside the bounds; the state
-                before is kept.
+            ValueError: a shape is another, or something is outside the bounds.
         """
-        dumped = parse_state(state, "pso", _SwarmState)
-        shape = self._positions.shape
-        arrays = {
-            name: matrix(getattr(dumped, name), shape, name)
-            for name in ("positions", "velocities", "best_positions")
-        }
-        if len(dumped.best_fitness) != shape[0]:
-            raise ValueError(f"best_fitness: {len(dumped.best_fitness)} values, not {shape[0]}")
-        for name in ("positions", "best_positions"):
-            if (arrays[name] < self._low).any() or (arrays[name] > self._high).any():
-                raise ValueError(f"{name}: outside the bounds of this job")
-        self._iteration, self._asked = dumped.iteration, dumped.asked
-        self._positions, self._velocities = arrays["positions"], arrays["velocities"]
-        self._best_positions = arrays["best_positions"]
-        self._best_fitness = np.array([math.inf if f is None else f for f in dumped.best_fitness])
+        shape = self._best_positions.shape
+        if len(state.positions) not in (0, shape[0]):
+            raise ValueError(f"positions: expected {shape[0]} rows of {shape[1]} numbers")
+        velocities = matrix(state.velocities, shape, "velocities")
+        best = matrix(state.best_positions, shape, "best_positions")
+        if len(state.best_fitness) != shape[0]:
+            raise ValueError(f"best_fitness: {len(state.best_fitness)} values, not {shape[0]}")
+        self._best_positions = self.inside(best, "best_positions")
+        self._velocities, self._best_fitness = velocities, of_worth(state.best_fitness)
 
-    def _scatter(self) -> None:
+    def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Bring a state of version 1, which knew whole swarms only, to this one.
+
+        Args:
+            state: of any version.
+
+        Returns:
+            The same search's state in this version.
+        """
+        if state.get("schema_version") != 1 or not isinstance(state.get("asked"), bool):
+            return state
+        iteration, asked = state["iteration"], state["asked"]
+        particles = self.settings.particles
+        return {
+            **state,
+            "schema_version": self.schema_version,
+            "evaluations": iteration * particles,
+            "generations": iteration,
+            "positions": state["positions"] if asked or iteration else [],
+            "fitness": [] if asked or not iteration else [None] * particles,
+            "asked": particles if asked else 0,
+        }
+
+    def _scattered(self) -> NDArray[np.float64]:
         """Uniform in the box, with small random velocities.
 
         Small, because a swarm that starts fast spends its first steps at the walls; not zero,
         because the leader, and a swarm of which every member failed, would then stand still.
         """
         draws = self._draw(purpose=_SCATTER)
-        span = self._high - self._low
-        largest = min(_INITIAL_VELOCITY, self._settings.velocity_limit) * span
-        self._positions = np.clip(self._low + draws[0] * span, self._low, self._high)
+        space = self.space
+        largest = min(_INITIAL_VELOCITY, self.settings.velocity_limit) * space.span
         self._velocities = (2.0 * draws[1] - 1.0) * largest
+        return space.from_unit(draws[0])
 
-    def _move(self) -> None:
+    def _moved(self) -> NDArray[np.float64]:
         own, swarm = self._draw(purpose=_MOVE)
-        settings = self._settings
+        settings, space, positions = self.settings, self.space, self.positions
         velocities = self._inertia() * self._velocities
         known = np.isfinite(self._best_fitness)
-        to_own_best = np.where(known[:, np.newaxis], self._best_positions - self._positions, 0.0)
+        to_own_best = np.where(known[:, np.newaxis], self._best_positions - positions, 0.0)
         velocities += settings.cognitive * own * to_own_best
         if known.any():
             leader = self._best_positions[int(np.argmin(self._best_fitness))]
-            velocities += settings.social * swarm * (leader - self._positions)
-        fastest = settings.velocity_limit * (self._high - self._low)
+            velocities += settings.social * swarm * (leader - positions)
+        fastest = settings.velocity_limit * space.span
         velocities = np.clip(velocities, -fastest, fastest)
         at_bounds = absorb if settings.bounds == "absorb" else reflect
-        self._positions, self._velocities = at_bounds(
-            self._positions + velocities, velocities, self._low, self._high
+        moved, self._velocities = at_bounds(
+            positions + velocities, velocities, space.low, space.high
         )
+        return moved
 
     def _inertia(self) -> float:
         """Linear from the first to the last iteration of the plan, then it stays."""
-        share = min(self._iteration / max(self._iterations - 1, 1), 1.0)
-        start, end = self._settings.inertia_start, self._settings.inertia_end
+        planned = math.ceil(self.budget / self.settings.particles)
+        share = min(self.generations / max(planned - 1, 1), 1.0)
+        start, end = self.settings.inertia_start, self.settings.inertia_end
         return start + share * (end - start)
 
     def _draw(self, *, purpose: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Two numbers in [0, 1) per particle and coordinate: twice (particles, d)."""
-        particles, d = self._positions.shape
+        particles, d = self._best_positions.shape
         draws = swarm_uniform(
-            self._seed, purpose, iteration=self._iteration, particles=particles, count=2 * d
+            self.seed, purpose, iteration=self.generations, particles=particles, count=2 * d
         )
         return draws[:, :d], draws[:, d:]
 

@@ -205,7 +205,7 @@ class SqlStore(SqlHistory):
             row = job_row(connection, job_id, lock=True)
             require_readable(row)
             state = JobState(row["state"])
-            after = extended(state, row["iterations"], iterations)
+            after = extended(state, to_job(row).spent, iterations)
             # Whoever runs the job notices when it commits; until then nothing changes for it.
             changes = entering(after, self._clock(connection)) if after is not state else {}
             return to_job(update_job(connection, row, changes | {"budget": iterations}))

@@ -1,0 +1,273 @@
+"""The template of a method that learns from whole generations."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, Final, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, FiniteFloat, NonNegativeInt
+
+from services.optimizer.search.optimizer import (
+    SearchSettings,
+    checked_fitness,
+    matrix,
+    parse_state,
+)
+from services.optimizer.search.space import Space
+
+Floats = NDArray[np.float64]
+
+S = TypeVar("S", bound=SearchSettings)
+
+Row = list[FiniteFloat]
+Worth = list[FiniteFloat | None]
+"""Fitness values; None stands for +inf."""
+
+
+class GenerationState(BaseModel):
+    """What `Generational.dump` writes, to which a method adds its own memory.
+
+    Attributes:
+        optimizer: Name of the method.
+        schema_version: Of the method's state.
+        iteration: Completed tells.
+        evaluations: Positions told, in all.
+        generations: Generations that were learned from.
+        positions: The generation under way, empty before the first.
+        fitness: Of those of its positions that were told, in order.
+        asked: How many of the next ones are asked for.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    optimizer: str
+    schema_version: int
+    iteration: NonNegativeInt
+    evaluations: NonNegativeInt
+    generations: NonNegativeInt
+    positions: list[Row]
+    fitness: Worth
+    asked: NonNegativeInt
+
+
+G = TypeVar("G", bound=GenerationState)
+
+
+class Generational(ABC, Generic[S, G]):
+    """A search that asks for a generation, whole or in pieces, and then learns from it.
+
+    Attributes:
+        settings: Of the method.
+        space: The box that is searched.
+        budget: Evaluations of the planned run.
+        seed: Of all random numbers.
+        generations: How many were learned from.
+        positions: (n, d) the generation under way, (0, d) before the first.
+
+    A method says what its first and next generation are and what it keeps of one; its random
+    numbers are counted by generation, so that they do not depend on the pieces.
+    """
+
+    state_model: ClassVar[type[GenerationState]]
+    schema_version: ClassVar[int] = 1
+
+    def __init__(self, settings: S, space: Space, budget: int, seed: int) -> None:
+        """Create a search that has not been asked yet.
+
+        Args:
+            settings: Of the method.
+            space: The box that is searched.
+            budget: Evaluations of the planned run.
+            seed: Of all random numbers.
+        """
+        self.settings: Final = settings
+        self.space: Final = space
+        self.budget: Final = budget
+        self.seed: Final = seed
+        self._iteration = 0
+        self._evaluations = 0
+        self.generations = 0
+        self.positions: Floats = np.empty((0, space.dimension))
+        self._fitness: list[float] = []
+        self._asked = 0
+
+    @property
+    def iteration(self) -> int:
+        """Number of completed tells."""
+        return self._iteration
+
+    @property
+    def evaluations(self) -> int:
+        """Number of positions that were told, in all."""
+        return self._evaluations
+
+    def ask(self, most: int | None = None) -> Floats:
+        """Give the positions to evaluate next; the same ones again until they are told.
+
+        Args:
+            most: Positions to give, at most, >= 1; what is asked already stays. Default: the
+                settings' `particles`, which also is the limit.
+
+        Returns:
+            (n, d), inside the bounds, in the variables' own units.
+        """
+        told = len(self._fitness)
+        if not self._asked:
+            if told == len(self.positions):
+                self.positions = self.propose()
+                self._fitness, told = [], 0
+            limit = self.settings.particles if most is None else min(most, self.settings.particles)
+            self._asked = min(limit, len(self.positions) - told)
+        return self.positions[told : told + self._asked].copy()
+
+    def tell(self, fitness: Floats) -> None:
+        """Take what the positions last asked for are worth.
+
+        Args:
+            fitness: (n,) of each of them, minimized; +inf for a failed evaluation.
+
+        Raises:
+            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
+        """
+        values = checked_fitness(fitness, self._asked)
+        self._fitness.extend(values.tolist())
+        self._iteration += 1
+        self._evaluations += self._asked
+        self._asked = 0
+        if len(self._fitness) == len(self.positions):
+            self.learn(self.positions, np.array(self._fitness))
+            self.generations += 1
+
+    def dump(self) -> dict[str, Any]:
+        """Give the whole state.
+
+        Returns:
+            JSON-able values with a schema version. JSON prints the shortest text that reads back
+            as the same float, so none loses a bit.
+        """
+        return {
+            "optimizer": self.settings.name,
+            "schema_version": self.schema_version,
+            "iteration": self._iteration,
+            "evaluations": self._evaluations,
+            "generations": self.generations,
+            "positions": self.positions.tolist(),
+            "fitness": worth(self._fitness),
+            "asked": self._asked,
+            **self.memory(),
+        }
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Take on a state.
+
+        Args:
+            state: As `dump` gave it, for the same settings, space, budget and seed.
+
+        Raises:
+            ValueError: It is of another method, version or shape, or outside the bounds; the state
+                before is kept.
+        """
+        name = self.settings.name
+        dumped = parse_state(self.upgrade(state), name, self.state_model)
+        for field, expected in (("optimizer", name), ("schema_version", self.schema_version)):
+            if getattr(dumped, field) != expected:
+                raise ValueError(
+                    f"not a state of {name}: {field}: {getattr(dumped, field)}, not {expected}"
+                )
+        shape = (len(dumped.positions), self.space.dimension)
+        positions = self.inside(matrix(dumped.positions, shape, "positions"), "positions")
+        if len(dumped.fitness) + dumped.asked > len(positions):
+            raise ValueError("asked: more than what is left of the positions")
+        self.recall(dumped)  # type: ignore[arg-type]
+        self._iteration, self._evaluations = dumped.iteration, dumped.evaluations
+        self.generations, self._asked = dumped.generations, dumped.asked
+        self.positions, self._fitness = positions, of_worth(dumped.fitness).tolist()
+
+    def inside(self, positions: Floats, name: str) -> Floats:
+        """Check positions of a dumped state.
+
+        Args:
+            positions: (n, d).
+            name: Of the field, for messages.
+
+        Returns:
+            The positions.
+
+        Raises:
+            ValueError: One is outside the bounds.
+        """
+        if (positions < self.space.low).any() or (positions > self.space.high).any():
+            raise ValueError(f"{name}: outside the bounds of this job")
+        return positions
+
+    @abstractmethod
+    def propose(self) -> Floats:
+        """Make the next generation, of any size >= 1.
+
+        It may depend on settings, space, budget, seed, `generations` and the method's memory.
+
+        Returns:
+            (n, d), inside the bounds.
+        """
+
+    @abstractmethod
+    def learn(self, positions: Floats, fitness: Floats) -> None:
+        """Take a whole generation into the method's memory.
+
+        Args:
+            positions: (n, d) as `propose` made them.
+            fitness: (n,) of each, +inf for a failed evaluation.
+        """
+
+    @abstractmethod
+    def memory(self) -> dict[str, Any]:
+        """Give the method's own fields of its state, JSON-able."""
+
+    @abstractmethod
+    def recall(self, state: G) -> None:
+        """Check and take on the method's own fields of a state.
+
+        Args:
+            state: As it was parsed.
+
+        Raises:
+            ValueError: A shape is another, or something is outside the bounds; nothing is changed.
+        """
+
+    def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
+        """Bring a state of an older version to this one.
+
+        Args:
+            state: Of any version.
+
+        Returns:
+            The same search's state in this version.
+        """
+        return state
+
+
+def worth(fitness: Floats | list[float]) -> Worth:
+    """Write fitness values as JSON takes them.
+
+    Args:
+        fitness: (n,), +inf for a failed evaluation.
+
+    Returns:
+        The values, None for +inf.
+    """
+    return [f if math.isfinite(f) else None for f in map(float, fitness)]
+
+
+def of_worth(values: Worth) -> Floats:
+    """Read fitness values back.
+
+    Args:
+        values: As `worth` writes them.
+
+    Returns:
+        (n,), +inf for None.
+    """
+    return np.array([math.inf if f is None else f for f in values], dtype=np.float64)

@@ -1,0 +1,101 @@
+"""Every search method by name: settings, presets, and how it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Final, Literal, get_args
+
+from services.optimizer.search.optimizer import Optimizer, SearchSettings
+from services.optimizer.search.pso import ParticleSwarm, PsoSettings
+from services.optimizer.search.random_search import RandomSearchSettings
+from services.optimizer.search.replayed import Replayed
+from services.optimizer.search.space import Space
+
+OptimizerSettings = PsoSettings | RandomSearchSettings
+"""Settings of every method; their `name` tells them apart."""
+
+MethodName = Literal["pso", "random"]
+
+OptimizerName = Literal["pso", "pso-thesis", "random"]
+"""What a job may name: a method with its default settings, or a preset."""
+
+Create = Callable[[Any, Space, int, int], Optimizer]
+"""(settings, space, budget [evaluations], seed) -> the optimizer before its first ask."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A search method.
+
+    Attributes:
+        settings: Model of its settings.
+        summary: What it is, with its source.
+        create: Makes one.
+        replays: Whether its state is all that it was told, so that a job of it is bounded.
+        extra: The optional dependencies that it needs, as in `gaitswarm[extra]`; "" if none.
+    """
+
+    settings: type[OptimizerSettings]
+    summary: str
+    create: Create
+    replays: bool = False
+    extra: str = ""
+
+
+LONGEST_REPLAY: Final = 250_000
+"""Most evaluations of a job whose search is replayed when it is resumed."""
+
+
+def _replayed(place: str) -> Create:
+    """How a generator function makes an optimizer; `place` is module:function."""
+    module, _, function = place.partition(":")
+
+    def create(settings: SearchSettings, space: Space, budget: int, seed: int) -> Optimizer:
+        search = getattr(import_module(f"services.optimizer.search.{module}"), function)
+        return Replayed(search, settings, space, budget, seed)
+
+    return create
+
+
+METHODS: Final[dict[MethodName, Method]] = {
+    "pso": Method(
+        PsoSettings,
+        "Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)",
+        ParticleSwarm,
+    ),
+    "random": Method(
+        RandomSearchSettings,
+        "Uniform random designs, each independent of all others: what a search has to beat",
+        _replayed("random_search:random_search"),
+        replays=True,
+    ),
+}
+
+DEFAULT_METHOD: Final[MethodName] = "pso"
+
+_PRESETS: Final[dict[str, OptimizerSettings]] = {
+    "pso-thesis": PsoSettings(inertia_end=0.9),
+}
+
+OPTIMIZERS: Final[dict[str, OptimizerSettings]] = {
+    name: _PRESETS[name] if name in _PRESETS else METHODS[name].settings()
+    for name in get_args(OptimizerName)
+}
+"""Each method by its default settings. `pso`: inertia falls. `pso-thesis`: 0.9 throughout."""
+
+
+def create_search(settings: OptimizerSettings, space: Space, budget: int, seed: int) -> Optimizer:
+    """Create a search.
+
+    Args:
+        settings: Of its method.
+        space: The box that is searched.
+        budget: Evaluations of the planned run.
+        seed: Of all random numbers.
+
+    Returns:
+        The optimizer before its first ask.
+    """
+    return METHODS[settings.name].create(settings, space, budget, seed)

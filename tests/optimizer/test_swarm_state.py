@@ -1,0 +1,116 @@
+"""The particle swarm's state: of every version, of any settings, and what is wrong with it."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from services.optimizer.jobs.spec import create_optimizer
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.optimizer import Optimizer
+
+
+def job(optimizer: dict[str, object], seed: int = 3) -> JobSpec:
+    document = {"optimizer": {"name": "pso", **optimizer}, "iterations": 8, "seed": seed}
+    return JobSpec.model_validate(document)
+
+
+SPEC = job({"particles": 6})
+
+
+def asked(iterations: int, spec: JobSpec = SPEC) -> Optimizer:
+    optimizer = create_optimizer(spec)
+    for _ in range(iterations):
+        optimizer.tell(np.log1p(np.abs(optimizer.ask())).sum(axis=1))
+    optimizer.ask()
+    return optimizer
+
+
+def test_a_refused_state_leaves_the_state_before() -> None:
+    optimizer = asked(1)
+    before, later = optimizer.dump(), asked(2).dump()
+    for field in ("best_positions", "positions"):
+        outside = [[1e9] * len(row) for row in later[field]]
+        with pytest.raises(ValueError, match=f"{field}: outside"):
+            optimizer.load(later | {field: outside})
+    assert optimizer.dump() == before
+
+
+def test_a_state_of_another_swarm_size_is_refused() -> None:
+    larger = asked(0, job({"particles": 7}))
+    with pytest.raises(ValueError, match="positions: expected 6 rows"):
+        create_optimizer(SPEC).load(larger.dump())
+
+
+def first_version(state: dict[str, Any], *, told: bool) -> dict[str, Any]:
+    """The same state as jobs of before stored it: whole swarms, without pieces."""
+    kept = ("optimizer", "iteration", "positions", "velocities", "best_positions", "best_fitness")
+    return {name: state[name] for name in kept} | {"schema_version": 1, "asked": not told}
+
+
+@pytest.mark.parametrize("told", [False, True])
+@pytest.mark.parametrize("iterations", [0, 3])
+def test_a_stored_state_of_the_first_version_goes_on_with_the_same_bits(
+    iterations: int, told: bool
+) -> None:
+    optimizer = asked(iterations)
+    if told:
+        optimizer.tell(np.arange(6.0))
+    stored = json.loads(json.dumps(first_version(optimizer.dump(), told=told)))
+    loaded = create_optimizer(SPEC)
+    loaded.load(stored)
+    assert (loaded.iteration, loaded.evaluations) == (optimizer.iteration, optimizer.evaluations)
+    for _ in range(3):
+        positions = optimizer.ask()
+        assert loaded.ask().tobytes() == positions.tobytes()
+        for each in (optimizer, loaded):
+            each.tell(np.square(positions).sum(axis=1))
+
+
+@given(
+    seed=st.integers(0, 2**63 - 1),
+    particles=st.integers(1, 9),
+    fitness=st.lists(st.one_of(st.floats(0.0, 1e300), st.just(math.inf)), min_size=9, max_size=9),
+    bounds=st.sampled_from(["reflect", "absorb"]),
+    limit=st.floats(0.01, 1.0),
+    social=st.floats(0.0, 10.0),
+)
+@settings(max_examples=60, deadline=None)
+def test_no_settings_and_no_fitness_lead_out_of_the_box_or_off_the_bits(
+    seed: int, particles: int, fitness: list[float], bounds: str, limit: float, social: float
+) -> None:
+    spec = job(
+        {
+            "particles": particles,
+            "bounds": bounds,
+            "velocity_limit": limit,
+            "social": social,
+            "inertia_start": 2.0,
+            "inertia_end": 1.5,
+        },
+        seed=seed,
+    )
+    space = spec.design_space()
+    straight, reloaded = create_optimizer(spec), create_optimizer(spec)
+    for k in range(5):
+        positions = straight.ask()
+        assert (positions >= space.low).all() and (positions <= space.high).all()
+        state = json.loads(json.dumps(reloaded.dump(), allow_nan=False))
+        reloaded = create_optimizer(spec)
+        reloaded.load(state)
+        assert reloaded.ask().tobytes() == positions.tobytes()
+        told = np.roll(np.array(fitness), k)[:particles]
+        straight.tell(told)
+        reloaded.tell(told)
+
+
+def test_inertia_that_rises_is_refused() -> None:
+    with pytest.raises(ValidationError, match="inertia_end must not exceed inertia_start"):
+        job({"inertia_start": 0.4, "inertia_end": 0.5})

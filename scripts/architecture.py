@@ -26,7 +26,7 @@ ROWS: Final = (
     ("services.runtime",),
     ("services.worker", "services.optimizer.service"),
     ("services.optimizer.run", "services.optimizer.analysis"),
-    ("services.optimizer.store",),
+    ("services.optimizer.store", "services.optimizer.tournament"),
     ("services.optimizer.jobs",),
     ("services.optimizer.search", "sim"),
 )

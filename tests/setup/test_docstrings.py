@@ -14,6 +14,7 @@ FILES = (
     "services/optimizer/search/*.py",
     "services/optimizer/jobs/*.py",
     "services/optimizer/analysis/*.py",
+    "services/optimizer/tournament/*.py",
     "services/optimizer/store/*.py",
     "services/optimizer/run/*.py",
     "services/optimizer/service.py",

@@ -1,0 +1,1 @@
+"""Races between search methods, and the functions to race on."""

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
 
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
 from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.service import JobService
+from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore
+from services.optimizer.store.tables import iterations
 from sim.outcome import Status
 from tests.store.examples import Clock, ask, begun, completed
 
@@ -190,3 +194,16 @@ def test_the_whole_history_is_read_piece_by_piece(store: SqlStore) -> None:
 def test_history_after_an_iteration_leaves_out_the_earlier_ones(store: SqlStore) -> None:
     job_id = run(store, *[(1.0, 2.0)] * 4).job.id
     assert [i.index for i, _ in JobService(store).history(job_id, after=1)] == [2, 3]
+
+
+def test_states_are_kept_of_the_last_commit_and_the_next_ask_alone(
+    store: SqlStore, database_url: str
+) -> None:
+    job_id = run(store, (4.0, 1.0), (3.0, 1.0), (2.0, 1.0)).job.id
+    with (
+        closing(connect(parse_url(database_url))) as database,
+        database.transaction(write=False) as reading,
+    ):
+        query = select(iterations.c.optimizer_state).where(iterations.c.job_id == job_id)
+        kept = reading.execute(query.order_by(iterations.c.iteration)).scalars().all()
+    assert kept == [{}, {}, ask(2).state, ask(3).state]

@@ -261,6 +261,9 @@ def complete_iteration(
 ) -> None:
     """Fill in the iteration that was asked, and add its evaluations and reevaluation.
 
+    The optimizer's state of the iteration before is cleared: a job goes on from the outstanding ask
+    or, where it is extended, from the last committed one, and states may grow with every iteration.
+
     Args:
         connection: The transaction in which the job was locked.
         job: The job's row.
@@ -288,6 +291,11 @@ def complete_iteration(
             f"iteration {done.iteration} of job {job['id']} was not asked; its next is"
             f" {job['iterations']}"
         )
+    connection.execute(
+        update(iterations)
+        .where(iterations.c.job_id == job["id"], iterations.c.iteration == done.iteration - 1)
+        .values(optimizer_state={})
+    )
     connection.execute(insert(evaluations), evaluation_rows(job["id"], done))
     if done.reevaluation is not None:
         row = reevaluation_row(job["id"], done.iteration, done.reevaluation)

@@ -176,8 +176,8 @@ iterations: Final = Table(
     metadata,
     Column("job_id", Text, nullable=False),
     Column("iteration", Integer, nullable=False),
-    # The ask, stored before it is sent out: (particles, d) positions and the optimizer's dump, which
-    # is {} once a later iteration is committed.
+    # The ask, stored before it is sent out: (particles, d) positions and the optimizer's dump; {}
+    # once a later iteration is committed.
     Column("positions", Document, nullable=False),
     Column("optimizer_state", Document, nullable=False),
     Column("asked_at", UtcDateTime, nullable=False),

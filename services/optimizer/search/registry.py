@@ -7,18 +7,19 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final, Literal, get_args
 
+from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.optimizer import Optimizer, SearchSettings
 from services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.replayed import Replayed
 from services.optimizer.search.space import Space
 
-OptimizerSettings = PsoSettings | RandomSearchSettings
+OptimizerSettings = PatternSearchSettings | PsoSettings | RandomSearchSettings
 """Settings of every method; their `name` tells them apart."""
 
-MethodName = Literal["pso", "random"]
+MethodName = Literal["ps", "pso", "random"]
 
-OptimizerName = Literal["pso", "pso-thesis", "random"]
+OptimizerName = Literal["ps", "pso", "pso-thesis", "random"]
 """What a job may name: a method with its default settings, or a preset."""
 
 Create = Callable[[Any, Space, int, int], Optimizer]
@@ -60,6 +61,12 @@ def _replayed(place: str) -> Create:
 
 
 METHODS: Final[dict[MethodName, Method]] = {
+    "ps": Method(
+        PatternSearchSettings,
+        "Generalized pattern search on a mesh (Torczon 1997; Audet and Dennis 2003)",
+        _replayed("local.pattern_search:pattern_search"),
+        replays=True,
+    ),
     "pso": Method(
         PsoSettings,
         "Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)",

@@ -1,0 +1,1 @@
+"""Searches that improve one design, or a few, from where they are."""

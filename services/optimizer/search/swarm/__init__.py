@@ -1,0 +1,1 @@
+"""Searches by a population whose members learn from one another."""

@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.preference import PREFERENCES, Preference
     from services.optimizer.jobs.tuning import JobSpec
     from services.optimizer.run.coordinator import Backoff
-    from services.optimizer.search.pso import PsoSettings
+    from services.optimizer.search.swarm.pso import PsoSettings
     from sim.calibration.targets import Target, TargetWalk
     from sim.controllers import CONTROLLERS
     from sim.identification.recorded_walk import RecordedWalk
@@ -175,7 +175,7 @@ _MODULES: Final = {
     "services.optimizer.jobs.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.tuning": ("JobSpec",),
-    "services.optimizer.search.pso": ("PsoSettings",),
+    "services.optimizer.search.swarm.pso": ("PsoSettings",),
     "services.optimizer.run.coordinator": ("Backoff",),
     "sim.controllers": ("CONTROLLERS",),
     "sim.calibration.targets": ("Target", "TargetWalk"),

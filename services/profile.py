@@ -13,7 +13,7 @@ from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
-from services.optimizer.search.pso import PsoSettings
+from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
 from services.worker import EvaluatorKind

@@ -13,7 +13,7 @@ import pytest
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim, Job
 from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.search.pso import PsoSettings
+from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import N_OBJECTIVES, Outcome, Status

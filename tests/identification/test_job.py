@@ -12,7 +12,7 @@ from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.spec import Judgement
-from services.optimizer.search.pso import PsoSettings
+from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from services.runtime import open_evaluator, run_embedded

@@ -14,7 +14,7 @@ from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import Job, Progress
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.search.pso import PsoSettings
+from services.optimizer.search.swarm.pso import PsoSettings
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.batch import Walking
 from sim.robot import RobotVariant

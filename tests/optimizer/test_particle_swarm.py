@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.search.pso import ParticleSwarm, PsoSettings, absorb, reflect
 from services.optimizer.search.random_stream import uniform
 from services.optimizer.search.registry import OPTIMIZERS, OptimizerName
 from services.optimizer.search.space import Space
+from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings, absorb, reflect
 from sim.variables import Variable
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]

@@ -26,7 +26,7 @@ from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
-from services.optimizer.search.pso import ParticleSwarm
+from services.optimizer.search.swarm.pso import ParticleSwarm
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
 from sim.errors import RobotFileError

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.search.pso import PsoSettings
+from services.optimizer.search.swarm.pso import PsoSettings
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.controllers.base import LookupTable
 from sim.controllers.mamdani import Shape

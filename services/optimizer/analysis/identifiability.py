@@ -19,7 +19,7 @@ from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.spec import DECISIVE, Spec
-from services.optimizer.search.pso import PsoSettings
+from services.optimizer.search.swarm.pso import PsoSettings
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]

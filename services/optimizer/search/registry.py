@@ -9,17 +9,17 @@ from typing import Any, Final, Literal, get_args
 
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.optimizer import Optimizer, SearchSettings
-from services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.replayed import Replayed
 from services.optimizer.search.space import Space
+from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
 
 OptimizerSettings = PatternSearchSettings | PsoSettings | RandomSearchSettings
 """Settings of every method; their `name` tells them apart."""
 
 MethodName = Literal["ps", "pso", "random"]
 
-OptimizerName = Literal["ps", "pso", "pso-thesis", "random"]
+OptimizerName = Literal["ps", "pso", "pso-constriction", "pso-thesis", "random"]
 """What a job may name: a method with its default settings, or a preset."""
 
 Create = Callable[[Any, Space, int, int], Optimizer]
@@ -83,6 +83,13 @@ METHODS: Final[dict[MethodName, Method]] = {
 DEFAULT_METHOD: Final[MethodName] = "pso"
 
 _PRESETS: Final[dict[str, OptimizerSettings]] = {
+    "pso-constriction": PsoSettings(
+        inertia_start=0.7298,
+        inertia_end=0.7298,
+        cognitive=1.49618,
+        social=1.49618,
+        topology="ring",
+    ),
     "pso-thesis": PsoSettings(inertia_end=0.9),
 }
 
@@ -90,7 +97,11 @@ OPTIMIZERS: Final[dict[str, OptimizerSettings]] = {
     name: _PRESETS[name] if name in _PRESETS else METHODS[name].settings()
     for name in get_args(OptimizerName)
 }
-"""Each method by its default settings. `pso`: inertia falls. `pso-thesis`: 0.9 throughout."""
+"""Each method by its default settings, and presets of `pso`.
+
+`pso` has an inertia that falls, `pso-thesis` one of 0.9 throughout. `pso-constriction` has the
+coefficients of Clerc and Kennedy (2002) in the ring of Bratton and Kennedy (2007).
+"""
 
 
 def create_search(settings: OptimizerSettings, space: Space, budget: int, seed: int) -> Optimizer:

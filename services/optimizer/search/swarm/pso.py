@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, NonNegativeInt, model_validator
 
 from services.optimizer.search.generational import (
     Generational,
@@ -20,19 +20,20 @@ from services.optimizer.search.generational import (
 from services.optimizer.search.optimizer import SearchSettings, matrix
 from services.optimizer.search.random_stream import swarm_uniform
 from services.optimizer.search.space import Space
+from services.optimizer.search.swarm.topology import leaders, random_informants, ring
 
 _SCATTER: Final = 1
 _MOVE: Final = 2
+_INFORM: Final = 4
 """Purposes of random streams: never renumbered, or stored jobs would change their future."""
 
 _INITIAL_VELOCITY: Final = 0.1
 """Share of each variable's range."""
 
 
-class PsoSettings(SearchSettings):
-    """Settings of the particle swarm; defaults are the thesis's, but for an inertia that falls."""
+class SwarmSettings(SearchSettings):
+    """Settings of a swarm's motion, for every method that has one."""
 
-    name: Literal["pso"] = "pso"
     particles: int = Field(default=25, ge=1, le=10_000, description="Size of the swarm.")
     cognitive: float = Field(default=0.5, ge=0.0, le=10.0, description="Pull to a particle's best.")
     social: float = Field(default=1.5, ge=0.0, le=10.0, description="Pull to the swarm's best.")
@@ -47,34 +48,56 @@ class PsoSettings(SearchSettings):
     bounds: Literal["absorb", "reflect"] = Field(
         default="reflect", description="What happens to a particle that leaves the box."
     )
+    topology: Literal["global", "ring", "random"] = Field(
+        default="global",
+        description="Who informs a particle: all, both neighbours, or some that are drawn anew"
+        " when the swarm's best was not improved.",
+    )
+    informants: int = Field(
+        default=3,
+        ge=1,
+        le=100,
+        description="Particles that each one informs, if the topology is random.",
+    )
 
     @model_validator(mode="after")
-    def _inertia_falls(self) -> PsoSettings:
+    def _inertia_falls(self) -> Self:
         if self.inertia_end > self.inertia_start:
             raise ValueError("inertia_end must not exceed inertia_start: inertia never rises")
         return self
 
 
+class PsoSettings(SwarmSettings):
+    """Settings of the particle swarm; defaults are the thesis's, but for an inertia that falls."""
+
+    name: Literal["pso"] = "pso"
+
+
 class _SwarmState(GenerationState):
-    """What `dump` writes. best_fitness: None where a particle has not succeeded yet."""
+    """What `dump` writes. best_fitness: None where a particle has not succeeded yet.
+
+    informed_since: the generation by whose random numbers informants are drawn.
+    """
 
     velocities: list[Row]
     best_positions: list[Row]
     best_fitness: Worth
+    informed_since: NonNegativeInt = 0
 
 
-class ParticleSwarm(Generational[PsoSettings, _SwarmState]):
+class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
     """A swarm that remembers each particle's best, the `pso` of job specs.
 
     It moves in the continuous box, in the variables' own units; whoever evaluates a position
-    rounds its integer variables. A velocity is the change of position in one iteration, in the
-    same units.
+    rounds its integer variables. So a particle keeps its velocity while it crosses the width of an
+    integer, and does not freeze there. A velocity is the change of position in one iteration, in
+    the same units.
     """
 
     state_model = _SwarmState
     schema_version = 2
 
-    def __init__(self, settings: PsoSettings, space: Space, budget: int, seed: int) -> None:
+    def __init__(self, settings: SwarmSettings, space: Space, budget: int, seed: int) -> None:
         """Create a swarm that has not been asked yet.
 
         Args:
@@ -88,6 +111,7 @@ class ParticleSwarm(Generational[PsoSettings, _SwarmState]):
         self._velocities = np.zeros((settings.particles, space.dimension))
         self._best_positions = np.tile(space.low, (settings.particles, 1))
         self._best_fitness = np.full(settings.particles, np.inf)
+        self._informed_since = 0
 
     def propose(self) -> NDArray[np.float64]:
         """Scatter the swarm, or move it on.
@@ -104,20 +128,24 @@ class ParticleSwarm(Generational[PsoSettings, _SwarmState]):
             positions: (particles, d) of the swarm.
             fitness: (particles,) of each, +inf for a failed evaluation.
         """
+        if not fitness.min() < self._best_fitness.min():
+            self._informed_since = self.generations + 1
         better = fitness < self._best_fitness
         self._best_positions[better] = positions[better]
         self._best_fitness[better] = fitness[better]
 
     def memory(self) -> dict[str, Any]:
-        """Give velocities and bests."""
-        return {
+        """Give velocities and bests, and since when informants are what they are."""
+        memory = {
             "velocities": self._velocities.tolist(),
             "best_positions": self._best_positions.tolist(),
             "best_fitness": worth(self._best_fitness),
         }
+        drawn = self.settings.topology == "random"
+        return memory | {"informed_since": self._informed_since} if drawn else memory
 
     def recall(self, state: _SwarmState) -> None:
-        """Take on velocities and bests.
+        """Take on what `memory` gave.
 
         Args:
             state: as it was parsed.
@@ -134,6 +162,7 @@ class ParticleSwarm(Generational[PsoSettings, _SwarmState]):
             raise ValueError(f"best_fitness: {len(state.best_fitness)} values, not {shape[0]}")
         self._best_positions = self.inside(best, "best_positions")
         self._velocities, self._best_fitness = velocities, of_worth(state.best_fitness)
+        self._informed_since = state.informed_since
 
     def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
         """Bring a state of version 1, which knew whole swarms only, to this one.
@@ -177,9 +206,9 @@ class ParticleSwarm(Generational[PsoSettings, _SwarmState]):
         known = np.isfinite(self._best_fitness)
         to_own_best = np.where(known[:, np.newaxis], self._best_positions - positions, 0.0)
         velocities += settings.cognitive * own * to_own_best
-        if known.any():
-            leader = self._best_positions[int(np.argmin(self._best_fitness))]
-            velocities += settings.social * swarm * (leader - positions)
+        leader = self._leaders()
+        to_leader = self._best_positions[leader] - positions
+        velocities += settings.social * swarm * np.where(known[leader, np.newaxis], to_leader, 0.0)
         fastest = settings.velocity_limit * space.span
         velocities = np.clip(velocities, -fastest, fastest)
         at_bounds = absorb if settings.bounds == "absorb" else reflect
@@ -187,6 +216,22 @@ class ParticleSwarm(Generational[PsoSettings, _SwarmState]):
             positions + velocities, velocities, space.low, space.high
         )
         return moved
+
+    def _leaders(self) -> NDArray[np.intp]:
+        """(particles,) the best of those that inform each one."""
+        particles, fitness = self.settings.particles, self._best_fitness
+        if self.settings.topology == "global":
+            return np.full(particles, np.argmin(fitness))
+        if self.settings.topology == "ring":
+            return leaders(ring(particles), fitness)
+        draws = swarm_uniform(
+            self.seed,
+            _INFORM,
+            iteration=self._informed_since,
+            particles=particles,
+            count=self.settings.informants,
+        )
+        return leaders(random_informants(draws), fitness)
 
     def _inertia(self) -> float:
         """Linear from the first to the last iteration of the plan, then it stays."""

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 
 FILES = (
     "sim/**/*.py",
-    "services/optimizer/search/*.py",
+    "services/optimizer/search/**/*.py",
     "services/optimizer/jobs/*.py",
     "services/optimizer/analysis/*.py",
     "services/optimizer/tournament/*.py",

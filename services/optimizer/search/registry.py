@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final, Literal, get_args
 
+from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.optimizer import Optimizer, SearchSettings
 from services.optimizer.search.random_search import RandomSearchSettings
@@ -14,12 +15,24 @@ from services.optimizer.search.replayed import Replayed
 from services.optimizer.search.space import Space
 from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
 
-OptimizerSettings = PatternSearchSettings | PsoSettings | RandomSearchSettings
+OptimizerSettings = NelderMeadSettings | PatternSearchSettings | PsoSettings | RandomSearchSettings
 """Settings of every method; their `name` tells them apart."""
 
-MethodName = Literal["ps", "pso", "random"]
+MethodName = Literal[
+    "nelder-mead",
+    "ps",
+    "pso",
+    "random",
+]
 
-OptimizerName = Literal["ps", "pso", "pso-constriction", "pso-thesis", "random"]
+OptimizerName = Literal[
+    "nelder-mead",
+    "ps",
+    "pso",
+    "pso-constriction",
+    "pso-thesis",
+    "random",
+]
 """What a job may name: a method with its default settings, or a preset."""
 
 Create = Callable[[Any, Space, int, int], Optimizer]
@@ -61,6 +74,12 @@ def _replayed(place: str) -> Create:
 
 
 METHODS: Final[dict[MethodName, Method]] = {
+    "nelder-mead": Method(
+        NelderMeadSettings,
+        "Simplex of Nelder and Mead (1965), adaptive coefficients (Gao and Han 2012), restarts",
+        _replayed("local.nelder_mead:nelder_mead"),
+        replays=True,
+    ),
     "ps": Method(
         PatternSearchSettings,
         "Generalized pattern search on a mesh (Torczon 1997; Audet and Dennis 2003)",

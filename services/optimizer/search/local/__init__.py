@@ -1,1 +1,1 @@
-"""Searches that improve one design, or a few, from where they are."""
+"""Searches that go from a point to a better one near it."""

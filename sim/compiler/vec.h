@@ -37,9 +37,10 @@ typedef dvec wide[HALVES];
 /* Not every source uses all of them. */
 #define OPERATION static inline __attribute__((unused))
 
-#define SPLAT(x) ((vec){0} + (real)(x))
-#define ISPLAT(x) ((ivec){0} + (integer)(x))
-#define DSPLAT(x) ((dvec){0} + (double)(x))
+/* Less zero is x itself, and so no operation; plus zero is none of -0. */
+#define SPLAT(x) ((real)(x) - (vec){0})
+#define ISPLAT(x) ((integer)(x) - (ivec){0})
+#define DSPLAT(x) ((double)(x) - (dvec){0})
 
 OPERATION vec vec_select(ivec mask, vec a, vec b)
 {
@@ -119,12 +120,30 @@ OPERATION dvec dvec_floor(dvec a)
   return nearest - (dvec)((nearest > a) & (divec)DSPLAT(1.0));
 }
 
-/* Half h of a vector of reals as doubles, and back. */
+/* A whole number as an integer, and back; it is below 2^51 in size. */
+OPERATION divec dvec_whole(dvec a)
+{
+  return (divec)(a + DSPLAT(DOUBLE_ROUNDER)) - (divec)DSPLAT(DOUBLE_ROUNDER);
+}
+
+OPERATION dvec dvec_of(divec a)
+{
+  return (dvec)(a + (divec)DSPLAT(DOUBLE_ROUNDER)) - DSPLAT(DOUBLE_ROUNDER);
+}
+
+/* Half h of a vector of reals as doubles, and back. GCC widens eight floats in two halves unless it is
+   told the instruction. */
 OPERATION dvec vec_widened(const vec *x, int h)
 {
   hvec half;
   memcpy(&half, (const char *)x + (size_t)h * sizeof half, sizeof half);
+#if defined(SINGLE) && defined(__AVX512F__) && DOUBLES == 8
+  return (dvec)_mm512_cvtps_pd((__m256)half);
+#elif defined(SINGLE) && defined(__AVX__) && DOUBLES == 4
+  return (dvec)_mm256_cvtps_pd((__m128)half);
+#else
   return __builtin_convertvector(half, dvec);
+#endif
 }
 
 OPERATION void vec_narrow(vec *x, int h, dvec value)

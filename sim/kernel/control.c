@@ -86,11 +86,13 @@ static dvec clamp(dvec x, dvec low, dvec high) { return dvec_min(dvec_max(x, low
 
 static dvec half_up(dvec x) { return dvec_floor(x + DSPLAT(0.5)); }
 
-/* Nearest multiple of step, halves away from the lower one. */
+/* Nearest multiple of step, halves away from the lower one. x is whole, so that the half that is
+   added keeps the quotient clear of whole numbers by more than the product's rounding. */
 static dvec coarsen(dvec x, int64_t step)
 {
   if (step == 1) return x;
-  return dvec_floor((x + DSPLAT(step / 2)) / DSPLAT(step)) * DSPLAT(step);
+  const double middle = (double)(step / 2) + 0.5, inverse = 1.0 / (double)step;
+  return dvec_floor((x + DSPLAT(middle)) * DSPLAT(inverse)) * DSPLAT(step);
 }
 
 static dvec place(const Axis *a, int h, dvec x)
@@ -106,16 +108,16 @@ typedef struct {
 /* All joints at once: lanes' numbers are written and read apart, which stalls if it follows at once. */
 static void look_up(const Tables *t, const Readings *r, wide *output)
 {
-  wide at[NJ];
+  divec at[NJ][HALVES];
   for (int j = 0; j < NJ; j++)
     for (int h = 0; h < HALVES; h++)
-      at[j][h] = place(&t->error, h, r->error[j][h]) + place(&t->current, h, r->current[j][h]) +
-                 place(&t->velocity, h, r->change[j][h]);
+      at[j][h] = dvec_whole(place(&t->error, h, r->error[j][h]) +
+                            place(&t->current, h, r->current[j][h]) +
+                            place(&t->velocity, h, r->change[j][h]));
   for (int j = 0; j < NJ; j++)
-    for (int k = 0; k < LANES; k++)
-      OF_LANE(output[j], k) = t->values[k][(int64_t)OF_LANE(at[j], k)];
+    for (int k = 0; k < LANES; k++) OF_LANE(at[j], k) = t->values[k][OF_LANE(at[j], k)];
   for (int j = 0; j < NJ; j++)
-    for (int h = 0; h < HALVES; h++) output[j][h] *= t->output_gain[h];
+    for (int h = 0; h < HALVES; h++) output[j][h] = dvec_of(at[j][h]) * t->output_gain[h];
 }
 
 /* A diverged lane reads nonsense; the bounds keep it inside the tables. */

@@ -108,7 +108,8 @@ static void begin_ticks(Lanes *s, const Coding *c)
 static void control_tick(Lanes *s, const Coding *c)
 {
   const vec *current = s->filtered ? s->sensed : s->current;
-  wide desired[NJ], counts[NJ];
+  divec desired[NJ][HALVES];
+  wide counts[NJ];
   Readings readings;
   for (int k = 0; k < LANES; k++) {
     const Walker *w = s->walker[k];
@@ -121,7 +122,7 @@ static void control_tick(Lanes *s, const Coding *c)
     const vec absolute = vec_abs(current[j]);
     for (int h = 0; h < HALVES; h++)
       read_joint(&readings, &s->control, c, j, h, encoder(s, j, h), vec_widened(&absolute, h),
-                 desired[j][h]);
+                 dvec_of(desired[j][h]));
   }
   control(&s->control, c, &readings, s->begins, counts);
   for (int j = 0; j < NJ; j++)
@@ -207,11 +208,18 @@ static void drift(Lanes *s, int h, double steps)
 
 static void round_of_steps(Lanes *s, const Coding *c)
 {
-  vec q[NQ], integrands[N_INTEGRANDS], largest;
+  vec integrands[N_INTEGRANDS], largest;
+#ifdef SINGLE
+  vec q[NQ];
+#else
+  const vec *const q = *s->q;
+#endif
   for (int h = 0; h < HALVES; h++) drift(s, h, 0.5);
   for (int64_t left = c->substeps; left-- > 0;) {
+#ifdef SINGLE
     for (int i = 0; i < NQ; i++)
       for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[i][h]);
+#endif
     kick(q, s->v, s->internal, s->duty, s->disturbance, s->p, c->robot, s->current, integrands,
          &largest, &s->landing);
     for (int h = 0; h < HALVES; h++) drift(s, h, left ? 1.0 : 0.5);

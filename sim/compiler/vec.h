@@ -152,54 +152,47 @@ OPERATION void vec_narrow(vec *x, int h, dvec value)
   memcpy((char *)x + (size_t)h * sizeof half, &half, sizeof half);
 }
 
-/* sin and cos: reduction to [-pi/4, pi/4] with pi/2 in three parts (Cody and Waite), then Taylor
-   polynomials whose remainder is below half an ulp there: to x^17 and x^18 in doubles, to x^9 and
-   x^10 in floats. Joint angles are a few radians; beyond 1e5 rad (in floats 1e4 rad) accuracy is
-   lost, and such a walk has long diverged. */
-#ifdef SINGLE
-#define HALF_PI_1 0x1.92p+0
-#define HALF_PI_2 0x1.fb4p-12
-#define HALF_PI_3 0x1.4442d2p-24
-#else
-#define HALF_PI_1 0x1.921fb54400000p+0
-#define HALF_PI_2 0x1.0b4611a600000p-34
-#define HALF_PI_3 0x1.3198a2e037073p-69
-#endif
-
+/* sin and cos: reduction to [-pi/4, pi/4] with pi/2 in two parts (in floats three; Cody and Waite),
+   of which products are rounded with their sums only. Then polynomials: in doubles those of Sun's
+   fdlibm to x^13 and x^14, within 2^-58; in floats Taylor's to x^9 and x^10, whose remainder is below
+   half an ulp. Joint angles are a few radians; beyond 1e5 rad (in floats 1e4 rad) accuracy is lost,
+   and such a walk has long diverged. */
 OPERATION void vec_sincos(vec x, vec *sine, vec *cosine)
 {
   const vec rounded = vec_fma(x, SPLAT(0x1.45f306dc9c883p-1), SPLAT(ROUNDER));
   const ivec quadrant = (ivec)rounded;
   const vec n = rounded - SPLAT(ROUNDER);
-  vec y = vec_fnma(n, SPLAT(HALF_PI_1), x);
-  y = vec_fnma(n, SPLAT(HALF_PI_2), y);
-  y = vec_fnma(n, SPLAT(HALF_PI_3), y);
-  const vec z = y * y;
 #ifdef SINGLE
+  vec y = vec_fnma(n, SPLAT(0x1.92p+0), x);
+  y = vec_fnma(n, SPLAT(0x1.fb4p-12), y);
+  y = vec_fnma(n, SPLAT(0x1.4442d2p-24), y);
+  const vec z = y * y;
   vec s = SPLAT(1.0 / 362880.0);
-#else
-  vec s = SPLAT(1.0 / 355687428096000.0);
-  s = vec_fma(s, z, SPLAT(-1.0 / 1307674368000.0));
-  s = vec_fma(s, z, SPLAT(1.0 / 6227020800.0));
-  s = vec_fma(s, z, SPLAT(-1.0 / 39916800.0));
-  s = vec_fma(s, z, SPLAT(1.0 / 362880.0));
-#endif
   s = vec_fma(s, z, SPLAT(-1.0 / 5040.0));
   s = vec_fma(s, z, SPLAT(1.0 / 120.0));
   s = vec_fma(s, z, SPLAT(-1.0 / 6.0));
-  s = vec_fma(y, z * s, y);
-#ifdef SINGLE
   vec c = SPLAT(-1.0 / 3628800.0);
-#else
-  vec c = SPLAT(-1.0 / 6402373705728000.0);
-  c = vec_fma(c, z, SPLAT(1.0 / 20922789888000.0));
-  c = vec_fma(c, z, SPLAT(-1.0 / 87178291200.0));
-  c = vec_fma(c, z, SPLAT(1.0 / 479001600.0));
-  c = vec_fma(c, z, SPLAT(-1.0 / 3628800.0));
-#endif
   c = vec_fma(c, z, SPLAT(1.0 / 40320.0));
   c = vec_fma(c, z, SPLAT(-1.0 / 720.0));
   c = vec_fma(c, z, SPLAT(1.0 / 24.0));
+#else
+  vec y = vec_fnma(n, SPLAT(0x1.921fb54442d18p+0), x);
+  y = vec_fnma(n, SPLAT(0x1.1a62633145c07p-54), y);
+  const vec z = y * y;
+  vec s = SPLAT(1.58969099521155010221e-10);
+  s = vec_fma(s, z, SPLAT(-2.50507602534068634195e-08));
+  s = vec_fma(s, z, SPLAT(2.75573137070700676789e-06));
+  s = vec_fma(s, z, SPLAT(-1.98412698298579493134e-04));
+  s = vec_fma(s, z, SPLAT(8.33333333332248946124e-03));
+  s = vec_fma(s, z, SPLAT(-1.66666666666666324348e-01));
+  vec c = SPLAT(-1.13596475577881948265e-11);
+  c = vec_fma(c, z, SPLAT(2.08757232129817482790e-09));
+  c = vec_fma(c, z, SPLAT(-2.75573143513906633035e-07));
+  c = vec_fma(c, z, SPLAT(2.48015872894767294178e-05));
+  c = vec_fma(c, z, SPLAT(-1.38888888888741095749e-03));
+  c = vec_fma(c, z, SPLAT(4.16666666666666019037e-02));
+#endif
+  s = vec_fma(y, z * s, y);
   c = vec_fnma(z, vec_fnma(z, c, SPLAT(0.5)), SPLAT(1.0));
   const ivec odd = -(quadrant & 1);
   const ivec sign_s = (quadrant & 2) << (8 * sizeof(real) - 2);

@@ -1,9 +1,12 @@
 """Articulated-body algorithm of a floating-base robot, as symbols.
 
 Featherstone's algorithm (Rigid Body Dynamics Algorithms, 2008, table 9.4), a limb at a time: what
-a limb passes to the body, the body's acceleration, and what that makes of the limb. Spatial
-quantities are pairs (linear, angular) in the frame of their own link, as in Pinocchio, which is the
-oracle that this is tested against.
+a limb passes to the body, the body's acceleration, and what that makes of the limb. What velocities
+do to accelerations is carried from the body to the feet first, as in the recursive Newton-Euler
+algorithm (ibid., table 5.1); what remains is linear in the accelerations of body and joints.
+Spatial quantities are pairs (linear, angular) in the frame of their own link, as in Pinocchio,
+which is the oracle that this is tested against; linear accelerations are those of points, though,
+not what they seem to be in a moving frame.
 """
 
 from __future__ import annotations
@@ -11,7 +14,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sim.kernel.inertia import Force, Inertia, Motion
+from sim.kernel.inertia import (
+    Force,
+    Inertia,
+    Motion,
+    RigidBody,
+    angular_acceleration_tensor,
+)
+from sim.kernel.rotation import Rotation
 from sim.kernel.spatial import (
     Matrix,
     Scalar,
@@ -20,9 +30,12 @@ from sim.kernel.spatial import (
     apply,
     cross,
     dot,
+    inverse,
+    minus,
+    mirrored,
     multiply,
-    rotation_about,
     scale,
+    subtract,
     transpose,
 )
 
@@ -35,14 +48,14 @@ class Link:
         axis: unit axis in the link's frame.
         rotation: to the frame before it, at the joint's angle.
         offset: of the joint in the frame before it [m].
-        inertia: in the link's frame.
+        body: in the link's frame.
         rate: of the joint [rad/s].
     """
 
     axis: Vector
-    rotation: Matrix
+    rotation: Rotation
     offset: Vector
-    inertia: Inertia
+    body: RigidBody
     rate: Scalar
 
 
@@ -54,13 +67,21 @@ class LinkState:
         velocity: in the link's frame.
         up: the ground's normal in the link's frame.
         ahead: the world's x axis in the link's frame.
+        gravity: that of free fall, in the link's frame [m/s2].
         height: of the link's origin over ground [m].
+        bias: acceleration of the link's origin, and alpha, while neither the body nor a joint
+            accelerates.
+        tensor: likewise [alpha]x + [omega]x^2: times a point's place in the link it is what the
+            point's acceleration has beside the origin's [1/s2].
     """
 
     velocity: Motion
     up: Vector
     ahead: Vector
+    gravity: Vector
     height: Scalar
+    bias: Motion
+    tensor: Matrix
 
     def carries(self, link: Link) -> LinkState:
         """State of a link that hangs on this one.
@@ -71,17 +92,43 @@ class LinkState:
         Returns:
             Its state.
         """
-        inverse = transpose(link.rotation)
+        own = link.rotation.outwards
         v, w = self.velocity.linear, self.velocity.angular
+        turning = scale(link.rate, link.axis)
+        angular = add(own(w), turning)
+        alpha = add(own(self.bias.angular), cross(angular, turning))
         return LinkState(
-            velocity=Motion(
-                apply(inverse, add(v, cross(w, link.offset))),
-                add(apply(inverse, w), scale(link.rate, link.axis)),
-            ),
-            up=apply(inverse, self.up),
-            ahead=apply(inverse, self.ahead),
+            velocity=Motion(own(add(v, cross(w, link.offset))), angular),
+            up=own(self.up),
+            ahead=own(self.ahead),
+            gravity=own(self.gravity),
             height=self.height + dot(self.up, link.offset),
+            bias=Motion(own(add(self.bias.linear, apply(self.tensor, link.offset))), alpha),
+            tensor=angular_acceleration_tensor(angular, alpha),
         )
+
+    def gain_at(self, point: Vector) -> Vector:
+        """What the bias adds to a point's velocity as the link itself sees it.
+
+        Args:
+            point: In the link's frame [m].
+
+        Returns:
+            In the axes of the link, which turn with it [m/s2].
+        """
+        v, w = self.velocity.linear, self.velocity.angular
+        return subtract(add(self.bias.linear, cross(self.bias.angular, point)), cross(w, v))
+
+    def force(self, body: RigidBody) -> Force:
+        """Force that the bias takes.
+
+        Args:
+            body: Of the link.
+
+        Returns:
+            In its frame.
+        """
+        return body.force(self.velocity.angular, self.bias, self.tensor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,34 +136,14 @@ class Passed:
     """What a joint's acceleration depends on, beside that of the frame before it.
 
     Attributes:
-        column: articulated inertia times the joint's axis.
+        column: articulated inertia times the joint's axis, in the frame before it.
         pivot: inverse of the inertia about the joint [1/(kg m2)].
-        free: acceleration of the joint while the frame before it does not accelerate [rad/s2].
-        coriolis: acceleration of the link that comes with its velocity.
+        free: acceleration of the joint while the frame before it has its bias only [rad/s2].
     """
 
     column: Force
     pivot: Scalar
     free: Scalar
-    coriolis: Motion
-
-
-def bias_force(inertia: Inertia, velocity: Motion) -> Force:
-    """Force that keeps a body's velocity in its own frame.
-
-    Args:
-        inertia: Of the body.
-        velocity: In its frame.
-
-    Returns:
-        v x* I v.
-    """
-    momentum = inertia.times(velocity)
-    v, w = velocity.linear, velocity.angular
-    return Force(
-        cross(w, momentum.linear),
-        add(cross(v, momentum.linear), cross(w, momentum.angular)),
-    )
 
 
 def inward(
@@ -138,35 +165,25 @@ def inward(
         external: Force on the last link in its frame.
 
     Returns:
-        Articulated inertia and bias force that the carrying frame feels, and what `outward` needs.
+        Articulated inertia, and force that the bias takes, as the carrying frame feels them, and
+        what `outward` needs.
     """
-    inertia, force, passed = None, None, []
+    inertia, force, passed = resistance, Force((0.0,) * 3, (0.0,) * 3).less(external), []
     for link, state, torque, rotor in reversed(
         list(zip(links, states, torques, armature, strict=True))
     ):
-        bias = bias_force(link.inertia, state.velocity)
-        if inertia is None or force is None:
-            inertia, force = link.inertia.plus(resistance), bias.less(external)
-        else:
-            inertia, force = link.inertia.plus(inertia), bias.plus(force)
-        turning = scale(link.rate, link.axis)
-        coriolis = Motion(
-            cross(state.velocity.linear, turning),
-            cross(state.velocity.angular, turning),
-        )
+        inertia = link.body.inertia().plus(inertia)
+        force = state.force(link.body).plus(force)
         column = Force(apply(inertia.coupling, link.axis), apply(inertia.angular, link.axis))
         pivot = 1.0 / (dot(link.axis, column.angular) + rotor)
-        force = force.plus(inertia.times(coriolis))
         free = pivot * (torque - dot(link.axis, force.angular))
-        passed.append(Passed(column, pivot, free, coriolis))
         # What the joint passes on, put together in the frame before it.
         above = column.in_parent(link.rotation, link.offset)
+        passed.append(Passed(above, pivot, free))
         scaled = Force(scale(pivot, above.linear), scale(pivot, above.angular))
         inertia = inertia.in_parent(link.rotation, link.offset).less_outer(scaled, above)
         driven = Force(scale(free, above.linear), scale(free, above.angular))
         force = force.in_parent(link.rotation, link.offset).plus(driven)
-    assert inertia is not None  # noqa: S101 - a chain has links
-    assert force is not None  # noqa: S101
     return inertia, force, tuple(reversed(passed))
 
 
@@ -176,7 +193,8 @@ def outward(links: Sequence[Link], passed: Sequence[Passed], carrier: Motion) ->
     Args:
         links: As for `inward`.
         passed: By `inward`.
-        carrier: Acceleration of the frame that carries the chain, relative to free fall.
+        carrier: Acceleration of the frame that carries the chain, relative to free fall and to its
+            bias.
 
     Returns:
         By joint [rad/s2].
@@ -184,69 +202,35 @@ def outward(links: Sequence[Link], passed: Sequence[Passed], carrier: Motion) ->
     joints = []
     acceleration = carrier
     for link, by in zip(links, passed, strict=True):
-        inverse = transpose(link.rotation)
-        linear = apply(inverse, add(acceleration.linear, cross(acceleration.angular, link.offset)))
-        angular = apply(inverse, acceleration.angular)
+        linear, angular = acceleration.linear, acceleration.angular
         joint = by.free - by.pivot * (
             dot(by.column.linear, linear) + dot(by.column.angular, angular)
         )
+        own = link.rotation.outwards
         acceleration = Motion(
-            add(linear, by.coriolis.linear),
-            add(angular, by.coriolis.angular, scale(joint, link.axis)),
+            own(add(linear, cross(angular, link.offset))),
+            add(own(angular), scale(joint, link.axis)),
         )
         joints.append(joint)
     return tuple(joints)
 
 
-def rotation_at(rest: Matrix, axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
-    """Rotation of a link to the frame before it.
-
-    Args:
-        rest: At angle zero.
-        axis: Constant unit axis.
-        sine: Of the angle.
-        cosine: Of the angle.
-
-    Returns:
-        At the angle.
-    """
-    return multiply(rest, rotation_about(axis, sine, cosine))
-
-
 def free_acceleration(inertia: Inertia, force: Force) -> Motion:
-    """Motion a with inertia a = -force, by an unrolled LDL^T factorisation.
+    """Motion a with inertia a = -force, by blocks: the angular part from a Schur complement.
 
     Args:
         inertia: Articulated inertia of the whole robot as its body feels it.
-        force: Bias force, likewise.
+        force: That the bias takes, likewise.
 
     Returns:
-        Acceleration of the body, relative to free fall.
+        Acceleration of the body, relative to free fall and to its bias.
     """
-    rows: list[list[Scalar]] = [[*inertia.linear[i], *inertia.coupling[i]] for i in range(3)] + [
-        [*transpose(inertia.coupling)[i], *inertia.angular[i]] for i in range(3)
-    ]
-    n = len(rows)
-    lower: list[list[Scalar]] = [[0.0] * n for _ in range(n)]
-    pivots: list[Scalar] = []
-    inverses: list[Scalar] = []
-    for j in range(n):
-        pivot = rows[j][j]
-        for k in range(j):
-            pivot = pivot - lower[j][k] * lower[j][k] * pivots[k]
-        pivots.append(pivot)
-        inverses.append(1.0 / pivot)
-        for i in range(j + 1, n):
-            entry = rows[j][i]
-            for k in range(j):
-                entry = entry - lower[i][k] * lower[j][k] * pivots[k]
-            lower[i][j] = entry * inverses[j]
-    x = [-value for value in (*force.linear, *force.angular)]
-    for i in range(n):
-        for k in range(i):
-            x[i] = x[i] - lower[i][k] * x[k]
-    x = [value * inverse for value, inverse in zip(x, inverses, strict=True)]
-    for i in reversed(range(n)):
-        for k in range(i + 1, n):
-            x[i] = x[i] - lower[k][i] * x[k]
-    return Motion((x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    light = inverse(inertia.linear)
+    ratio = multiply(light, inertia.coupling)
+    coupled = transpose(inertia.coupling)
+    about_centre = mirrored(minus(inertia.angular, multiply(coupled, ratio)))
+    pushed = apply(light, force.linear)
+    moment = subtract(apply(coupled, pushed), force.angular)
+    angular = apply(inverse(about_centre), moment)
+    x, y, z = add(pushed, apply(ratio, angular))
+    return Motion((-x, -y, -z), angular)

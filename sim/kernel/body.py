@@ -6,8 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import casadi as ca
 
-from sim.kernel.articulated_body import LinkState, bias_force, free_acceleration
-from sim.kernel.inertia import Force, Inertia, Motion
+from sim.kernel.articulated_body import LinkState, free_acceleration
+from sim.kernel.inertia import (
+    Force,
+    Inertia,
+    Motion,
+    RigidBody,
+    angular_acceleration_tensor,
+)
 from sim.kernel.spatial import (
     Scalar,
     Vector,
@@ -17,32 +23,39 @@ from sim.kernel.spatial import (
     dot,
     rotation_of,
     scale,
+    subtract,
+    transpose,
 )
 
 Scalars = tuple[Scalar, ...]
 
 
-def body_state(q: Sequence[Scalar], v: Sequence[Scalar]) -> LinkState:
+def body_state(q: Sequence[Scalar], v: Sequence[Scalar], gravity: Sequence[Scalar]) -> LinkState:
     """Where the body is and how it moves.
 
     Args:
         q: Position and quaternion x y z w first.
         v: Twist in the body's own frame first.
+        gravity: In the world [m/s2].
 
     Returns:
         Its state.
     """
     attitude = rotation_of(q[3:7])
+    w, nothing = _triple(v[3:6]), (0.0, 0.0, 0.0)
     return LinkState(
-        velocity=Motion(_triple(v[0:3]), _triple(v[3:6])),
+        velocity=Motion(_triple(v[0:3]), w),
         up=attitude[2],
         ahead=attitude[0],
+        gravity=apply(transpose(attitude), _triple(gravity)),
         height=q[2],
+        bias=Motion(nothing, nothing),
+        tensor=angular_acceleration_tensor(w, nothing),
     )
 
 
-def body_inertia(p: Mapping[str, Sequence[Scalar]]) -> Inertia:
-    """Inertia of the body with its load.
+def body_of(p: Mapping[str, Sequence[Scalar]]) -> RigidBody:
+    """The body with its load.
 
     Args:
         p: Parameters by name, as `parameters.Layout` says.
@@ -52,29 +65,26 @@ def body_inertia(p: Mapping[str, Sequence[Scalar]]) -> Inertia:
     """
     xx, yy, zz, xy, xz, yz = p["base_inertia"]
     tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    return Inertia.of_body(p["base_mass"][0], _triple(p["base_moment"]), tensor)
+    return RigidBody(p["base_mass"][0], _triple(p["base_moment"]), tensor)
 
 
-def solved(
-    state: LinkState, inertia: Inertia, force: Force, p: Mapping[str, Sequence[Scalar]]
-) -> tuple[Motion, Motion]:
+def solved(state: LinkState, inertia: Inertia, force: Force) -> tuple[Motion, Motion]:
     """The body's acceleration under all limbs.
 
     Args:
         state: Of the body.
-        inertia: Sum of what the limbs pass to it.
-        force: Likewise.
-        p: Run-time parameters.
+        inertia: Of the body, and what the limbs pass to it.
+        force: That the bias takes, likewise.
 
     Returns:
-        Acceleration relative to free fall, which `limb.after` wants, and the true one.
+        Acceleration relative to free fall, which `limb.after` wants, and the rate of the body's
+        twist in its own frame.
     """
-    own = body_inertia(p)
-    falling = free_acceleration(own.plus(inertia), bias_force(own, state.velocity).plus(force))
-    left = cross(state.up, state.ahead)
-    x, y, z = p["gravity"]
-    gravity = add(scale(x, state.ahead), scale(y, left), scale(z, state.up))
-    return falling, Motion(add(falling.linear, gravity), falling.angular)
+    falling = free_acceleration(inertia, force)
+    v, w = state.velocity.linear, state.velocity.angular
+    return falling, Motion(
+        subtract(add(falling.linear, state.gravity), cross(w, v)), falling.angular
+    )
 
 
 def body_integrands(

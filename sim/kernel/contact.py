@@ -73,21 +73,20 @@ class Foot:
         """
         return (1.0 - self.touching) * (self.penetration > self.rising * time)
 
-    def sliding(self, limit: Scalar, slip: Scalar, timestep: Scalar) -> Scalar:
+    def sliding(self, drag: Scalar, timestep: Scalar) -> Scalar:
         """How sure it is that a sliding foot still slides after a step.
 
         A friction that does not depend on the speed must not be taken as constant over a step in
         which it may bring the foot to rest: the step would turn the foot round.
 
         Args:
-            limit: The friction [N].
-            slip: Speed [m/s].
+            drag: The whole friction per speed [N s/m].
             timestep: [s].
 
         Returns:
             1 for sure, 0 if the friction may stop the foot.
         """
-        return ca.fmax(1.0 - limit * timestep * self.mobility / slip, 0.0)
+        return ca.fmax(1.0 - drag * (timestep * self.mobility), 0.0)
 
     def resisting(self, sideways: Scalar, further: Scalar = 0.0) -> Matrix:
         """How a force at the foot falls as the foot moves faster.
@@ -182,12 +181,12 @@ def linear_zone(
     zone = ground["slip_velocity"]
     # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
     squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
-    slip = ca.sqrt(ca.fmax(squared, zone * zone))
+    pace = 1.0 / ca.sqrt(ca.fmax(squared, zone * zone))
     limit = ground["friction"] * foot.normal
-    drag = limit / slip
+    drag = limit * pace
     force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
-    constant = (squared > zone * zone) * foot.sliding(limit, slip, timestep)
-    further = -constant * drag / (slip * slip)
+    constant = (squared > zone * zone) * foot.sliding(drag, timestep)
+    further = -constant * drag * (pace * pace)
     return Reaction(force, foot.resisting(drag, further))
 
 
@@ -268,13 +267,14 @@ def dead_zone(
     width = ca.fmax(ground["slip_velocity"] - threshold, 1e-9)
     squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
     slip = ca.sqrt(ca.fmax(squared, threshold * threshold))
-    share = ca.fmin((slip - threshold) / width, 1.0)
+    pace, steepness = 1.0 / slip, 1.0 / width
+    share = ca.fmin((slip - threshold) * steepness, 1.0)
     limit = ground["friction"] * foot.normal
-    drag = limit * share / slip
+    drag = limit * share * pace
     force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
     steep = (squared > threshold * threshold) * (slip < threshold + width)
-    slope = limit * steep / width - drag
-    further = foot.sliding(limit, slip, timestep) * slope / (slip * slip)
+    slope = limit * steep * steepness - drag
+    further = foot.sliding(limit * pace, timestep) * slope * (pace * pace)
     return Reaction(force, foot.resisting(drag, further))
 
 

@@ -28,7 +28,12 @@ _UNARY: Final[dict[str, str]] = {
 
 
 def emit_c(
-    function: Any, name: str, uniform: Container[str] = (), *, in_place: bool = False
+    function: Any,
+    name: str,
+    uniform: Container[str] = (),
+    *,
+    added: Container[str] = (),
+    in_place: bool = False,
 ) -> str:
     """C source of `static void <name>(const vec *i0, ..., vec *o0, ...)`.
 
@@ -40,6 +45,7 @@ def emit_c(
         function: A CasADi function of scalars (`SX`).
         name: Of the C function.
         uniform: Names of inputs that all walkers share: `const double *` in place of `const vec *`.
+        added: Names of outputs that are added to what is there.
         in_place: Whether outputs are written when all inputs have been read.
 
     Returns:
@@ -48,7 +54,7 @@ def emit_c(
     Raises:
         SimulationError: An operation of the function has no rule.
     """
-    return _Emitter(function, uniform, in_place=in_place).source(name)
+    return _Emitter(function, uniform, added, in_place=in_place).source(name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +92,16 @@ def _value(name: str, uses: _Uses) -> str:
 
 
 class _Emitter:
-    def __init__(self, function: Any, uniform: Container[str], *, in_place: bool) -> None:
+    def __init__(
+        self,
+        function: Any,
+        uniform: Container[str],
+        added: Container[str],
+        *,
+        in_place: bool,
+    ) -> None:
         self._in_place = in_place
+        self._added = [function.name_out(k) in added for k in range(function.n_out())]
         self._outputs: list[str] = []
         self._function = function
         self._uniform = [function.name_in(k) in uniform for k in range(function.n_in())]
@@ -151,7 +165,8 @@ class _Emitter:
         if op == "OP_OUTPUT":
             output, element = self._function.instruction_output(k)
             lines = self._outputs if self._in_place else self._lines
-            lines.append(f"o{output}[{element}] = {operands[0]};")
+            assign = "+=" if self._added[output] else "="
+            lines.append(f"o{output}[{element}] {assign} {operands[0]};")
         elif not uses.fused(f"t{k}"):
             self._lines.append(f"const vec t{k} = {self._result(k, op, operands, uses)};")
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sim.kernel.rotation import Rotation
 from sim.kernel.spatial import (
     Matrix,
     Scalar,
@@ -28,56 +29,21 @@ from sim.kernel.spatial import (
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """Rigid or articulated inertia in a link's frame: force = linear a + coupling alpha,
+    """Articulated inertia in a link's frame: force = linear a + coupling alpha,
     moment = coupling^T a + angular alpha.
 
     Attributes:
         linear: [kg].
         coupling: [kg m].
         angular: [kg m2].
-        rigid: mass [kg] and first moment [kg m] of a rigid body, which is cheaper to move: its
-            linear part is isotropic, its coupling a mere vector. None for an articulated inertia.
     """
 
     linear: Matrix
     coupling: Matrix
     angular: Matrix
-    rigid: tuple[Scalar, Vector] | None = None
-
-    @classmethod
-    def of_body(cls, mass: Scalar, moment: Vector, angular: Matrix) -> Inertia:
-        """Inertia of a rigid body.
-
-        Args:
-            mass: [kg].
-            moment: First moment m c [kg m].
-            angular: Rotational inertia about the link's origin [kg m2].
-
-        Returns:
-            The same as a spatial inertia.
-        """
-        diagonal = ((mass, 0.0, 0.0), (0.0, mass, 0.0), (0.0, 0.0, mass))
-        return cls(diagonal, transpose(skew(moment)), angular, rigid=(mass, moment))
-
-    def times(self, motion: Motion) -> Force:
-        """Inertia times motion.
-
-        Args:
-            motion: Of the link, in its frame.
-
-        Returns:
-            Momentum of a velocity, force of an acceleration.
-        """
-        return Force(
-            add(apply(self.linear, motion.linear), apply(self.coupling, motion.angular)),
-            add(
-                apply(transpose(self.coupling), motion.linear),
-                apply(self.angular, motion.angular),
-            ),
-        )
 
     def plus(self, other: Inertia) -> Inertia:
-        """Sum, no longer known to be rigid.
+        """Sum.
 
         Args:
             other: In the same frame.
@@ -122,7 +88,7 @@ class Inertia:
             mirrored(minus(self.angular, outer(scaled.angular, column.angular))),
         )
 
-    def in_parent(self, rotation: Matrix, offset: Vector) -> Inertia:
+    def in_parent(self, rotation: Rotation, offset: Vector) -> Inertia:
         """The same seen from the parent's frame.
 
         Args:
@@ -132,21 +98,84 @@ class Inertia:
         Returns:
             The inertia there.
         """
-        inverse = transpose(rotation)
-        angular = mirrored(multiply(multiply(rotation, self.angular), inverse))
-        if self.rigid is None:
-            linear = mirrored(multiply(multiply(rotation, self.linear), inverse))
-            coupling = multiply(multiply(rotation, self.coupling), inverse)
-            rigid = None
-        else:
-            mass, moment = self.rigid
-            linear, turned = self.linear, apply(rotation, moment)
-            coupling = transpose(skew(turned))
-            rigid = (mass, add(turned, scale(mass, offset)))
+        angular = mirrored(rotation.tensor_inwards(self.angular))
+        linear = mirrored(rotation.tensor_inwards(self.linear))
+        coupling = rotation.tensor_inwards(self.coupling)
         lever = skew(offset)
         shifted = minus(coupling, multiply(linear, lever))
         moved = minus(angular, multiply(transpose(coupling), lever))
-        return Inertia(linear, shifted, mirrored(plus(moved, multiply(lever, shifted))), rigid)
+        return Inertia(linear, shifted, mirrored(plus(moved, multiply(lever, shifted))))
+
+
+@dataclass(frozen=True, slots=True)
+class RigidBody:
+    """A body's mass and where it is, in the body's own frame.
+
+    Attributes:
+        mass: [kg].
+        moment: first moment m c [kg m].
+        angular: rotational inertia about the frame's origin [kg m2].
+    """
+
+    mass: Scalar
+    moment: Vector
+    angular: Matrix
+
+    def inertia(self) -> Inertia:
+        """The same as a spatial inertia.
+
+        Returns:
+            The inertia.
+        """
+        mass = self.mass
+        diagonal = ((mass, 0.0, 0.0), (0.0, mass, 0.0), (0.0, 0.0, mass))
+        return Inertia(diagonal, transpose(skew(self.moment)), self.angular)
+
+    def force(self, angular_velocity: Vector, acceleration: Motion, tensor: Matrix) -> Force:
+        """Force that makes the body move so (Newton's and Euler's equations).
+
+        Args:
+            angular_velocity: omega [rad/s].
+            acceleration: Of the frame's origin, and alpha.
+            tensor: [alpha]x + [omega]x^2, by `angular_acceleration_tensor`.
+
+        Returns:
+            m a + tensor (m c), and I alpha + omega x I omega + m c x a.
+        """
+        linear = add(scale(self.mass, acceleration.linear), apply(tensor, self.moment))
+        w, alpha, inertia = angular_velocity, acceleration.angular, self.angular
+        turning = []
+        # I alpha + omega x I omega, component by component: its products are the tensor's.
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            turning.append(
+                inertia[i][i] * alpha[i]
+                + (inertia[k][k] - inertia[j][j]) * (w[j] * w[k])
+                + inertia[j][k] * (tensor[j][j] - tensor[k][k])
+                + inertia[i][k] * tensor[j][i]
+                - inertia[i][j] * tensor[k][i]
+            )
+        x, y, z = turning
+        return Force(linear, add((x, y, z), cross(self.moment, acceleration.linear)))
+
+
+def angular_acceleration_tensor(velocity: Vector, acceleration: Vector) -> Matrix:
+    """What gives the acceleration of a body's points against one of them, by their offsets.
+
+    Args:
+        velocity: omega of the body [rad/s].
+        acceleration: alpha [rad/s2].
+
+    Returns:
+        [alpha]x + [omega]x^2 (Angeles, Fundamentals of Robotic Mechanical Systems).
+    """
+    x, y, z = velocity
+    a, b, c = acceleration
+    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
+    return (
+        (-(yy + zz), xy - c, xz + b),
+        (xy + c, -(xx + zz), yz - a),
+        (xz - b, yz + a, -(xx + yy)),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +225,7 @@ class Force:
         """
         return Force(subtract(self.linear, other.linear), subtract(self.angular, other.angular))
 
-    def in_parent(self, rotation: Matrix, offset: Vector) -> Force:
+    def in_parent(self, rotation: Rotation, offset: Vector) -> Force:
         """The same seen from the parent's frame.
 
         Args:
@@ -206,5 +235,5 @@ class Force:
         Returns:
             The force there.
         """
-        linear = apply(rotation, self.linear)
-        return Force(linear, add(apply(rotation, self.angular), cross(offset, linear)))
+        linear = rotation.inwards(self.linear)
+        return Force(linear, add(rotation.inwards(self.angular), cross(offset, linear)))

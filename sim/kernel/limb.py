@@ -15,11 +15,12 @@ from typing import Final
 import casadi as ca
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.articulated_body import Link, LinkState, Passed, inward, outward, rotation_at
+from sim.kernel.articulated_body import Link, LinkState, Passed, inward, outward
 from sim.kernel.contact import FRICTION, foot_on_ground
 from sim.kernel.gearhead import shaft_torque, static_friction, static_friction_slope
-from sim.kernel.inertia import Force, Inertia, Motion
+from sim.kernel.inertia import Force, Inertia, Motion, RigidBody
 from sim.kernel.parameters import CONTACT_LAWS
+from sim.kernel.rotation import Rotation
 from sim.kernel.spatial import Matrix, Scalar, Vector, add, apply, cross, dot, scale, subtract
 from sim.robot.description import ContactLaw
 from sim.robot.limbs import Limb, LimbJoint
@@ -36,13 +37,11 @@ class Environment:
 
     Attributes:
         timestep: [s].
-        gravity: in the world [m/s2].
         supply: voltage of the battery under load [V].
         displaced: whether disturbances are angles, 1 or 0; for backlash only.
     """
 
     timestep: Scalar
-    gravity: Vector
     supply: Scalar
     displaced: Scalar = 0.0
 
@@ -96,6 +95,7 @@ class Held:
         cosines: likewise.
         passed: by `articulated_body.inward`.
         drives: by joint.
+        armature: of the rotors, with half a step's damping [kg m2].
         landing: 1 if the foot may come down within `LANDING_HORIZON`, else 0.
         torques: that the gearheads pass to the links, before the step; without backlash with what
             turns the rotors themselves [N m].
@@ -106,6 +106,7 @@ class Held:
     cosines: Scalars
     passed: tuple[Passed, ...]
     drives: tuple[Drive, ...]
+    armature: Scalars
     landing: Scalar
     torques: Scalars
     spins: Scalars = ()
@@ -117,7 +118,7 @@ class Before:
 
     Attributes:
         inertia: articulated, in the body's frame.
-        force: bias, in the body's frame.
+        force: that the bias takes, in the body's frame.
         held: for `after`.
         motor_rates: after the step, with backlash.
         carried: after the step.
@@ -192,7 +193,7 @@ def before(
         spins = ()
         torques = [d.torque + more for d, more in zip(drives, state.disturbance, strict=True)]
         armature = [j.armature + half * d.damping for j, d in zip(limb.joints, drives, strict=True)]
-    passed_on = tuple(torques)
+    passed_on, rotors = tuple(torques), tuple(armature)
     for k, (angle, rate) in enumerate(zip(state.angles, state.rates, strict=True)):
         obstacle = p["jam_stiffness"][k] * (angle - p["jam_angle"][k]) + p["jam_damping"][k] * rate
         torques[k] = torques[k] - obstacle
@@ -201,13 +202,10 @@ def before(
     foot = foot_on_ground(states[-1], limb.foot, ground, limb.mobility)
     reaction = FRICTION[law](foot, ground, state.carried, environment.timestep)
     resistance = _scaled(half, reaction.resistance)
-    # Accelerations are relative to free fall until the end; the foot's resistance is not.
-    falling = add(
-        scale(environment.gravity[0], foot.ahead),
-        scale(environment.gravity[1], foot.left),
-        scale(environment.gravity[2], foot.up),
-    )
-    push = subtract(reaction.force, apply(resistance, falling))
+    # Accelerations are relative to free fall until the end; the foot's resistance is not. A damper
+    # keeps its direction in the axes of the tibia.
+    gain = add(states[-1].gain_at(limb.foot), states[-1].gravity)
+    push = subtract(reaction.force, apply(resistance, gain))
     inertia, force, passed = inward(
         links,
         states,
@@ -220,7 +218,16 @@ def before(
     return Before(
         inertia,
         force,
-        Held(sines, cosines, passed, drives, foot.lands_within(LANDING_HORIZON), passed_on, spins),
+        Held(
+            sines,
+            cosines,
+            passed,
+            drives,
+            rotors,
+            foot.lands_within(LANDING_HORIZON),
+            passed_on,
+            spins,
+        ),
         tuple(rate + dt * spin for rate, spin in zip(state.motor_rates, spins, strict=True)),
         reaction.internal_state,
         (
@@ -257,12 +264,12 @@ def after(
     currents, loads = [], []
     for k, (joint, drive) in enumerate(zip(limb.joints, held.drives, strict=True)):
         spin = held.spins[k] if held.spins else accelerations[k]
-        currents.append(drive.current - (half * joint.torque * joint.conductance) * spin)
+        currents.append(drive.current - (joint.torque * joint.conductance) * (half * spin))
         if held.spins:
             loads.append(held.torques[k])
         else:
             # M_L = r K_M I - B omega - J r^2 domega.
-            loads.append(held.torques[k] - (half * drive.damping + joint.armature) * spin)
+            loads.append(held.torques[k] - held.armature[k] * spin)
     powers = [d.voltage * current for d, current in zip(held.drives, currents, strict=True)]
     sizes = [ca.fabs(current) for current in currents]
     largest = sizes[0]
@@ -310,18 +317,18 @@ def _links(limb: Limb, sines: Scalars, cosines: Scalars, rates: Sequence[Scalar]
     return [
         Link(
             axis=joint.axis,
-            rotation=rotation_at(joint.rotation, joint.axis, sine, cosine),
+            rotation=Rotation(joint.rotation, joint.axis, sine, cosine),
             offset=joint.offset,
-            inertia=_inertia(joint),
+            body=_body(joint),
             rate=joint.sign * rate,
         )
         for joint, sine, cosine, rate in zip(limb.joints, sines, cosines, rates, strict=True)
     ]
 
 
-def _inertia(joint: LimbJoint) -> Inertia:
+def _body(joint: LimbJoint) -> RigidBody:
     xx, yy, zz, xy, xz, yz = joint.angular
-    return Inertia.of_body(joint.mass, joint.moment, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+    return RigidBody(joint.mass, joint.moment, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
 
 def _drives(

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from sim.kernel.body import body_integrands, body_state, drifted, solved
+from sim.kernel.body import body_integrands, body_of, body_state, drifted, solved
 from sim.kernel.electrical import supply_voltage
 from sim.kernel.limb import After, Before, Environment, LimbState, after, before
 from sim.kernel.parameters import Layout, internal_state_size
@@ -185,9 +185,8 @@ def _step(
         s.p["supply_voltage"][0],
         s.p["supply_resistance"][0],
     )
-    x, y, z = s.p["gravity"]
-    environment = Environment(timestep, (x, y, z), supply, *s.p["displaced"])
-    body = body_state(s.q, s.v)
+    environment = Environment(timestep, supply, *s.p["displaced"])
+    body, own = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)
     befores = [
         before(
             limb,
@@ -212,10 +211,10 @@ def _step(
         )
         for k, limb in enumerate(limbs)
     ]
-    inertia, force = befores[0].inertia, befores[0].force
-    for limb in befores[1:]:
+    inertia, force = own.inertia(), body.force(own)
+    for limb in befores:
         inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
-    falling, true = solved(body, inertia, force, s.p)
+    falling, true = solved(body, inertia, force)
     afters = [
         after(limb, found.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
         for k, (limb, found) in enumerate(zip(limbs, befores, strict=True))

@@ -13,7 +13,8 @@ from typing import Any, Final
 import casadi as ca
 import numpy as np
 
-from sim.kernel.body import body_integrands, body_state, solved
+from sim.kernel.articulated_body import LinkState
+from sim.kernel.body import body_integrands, body_of, body_state, solved
 from sim.kernel.electrical import supply_voltage
 from sim.kernel.emit_c import emit_c
 from sim.kernel.inertia import Force, Inertia, Motion
@@ -25,9 +26,6 @@ from sim.kernel.tree import leaves, mapped
 from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.limbs import Limb, limbs_of
-
-_BODY: Final = 13
-"""Numbers of the body's state: twist, up, ahead, height."""
 
 _PASSED: Final = 27
 """Numbers that a limb passes to the body: an inertia (6 + 9 + 6), and a force (6)."""
@@ -71,7 +69,9 @@ class _Pieces:
         self._text: list[str] = []
 
     def text(self) -> str:
-        before_body = self._emit("before_limbs", self._before_limbs(), ["body", "&supply"])
+        before_body = self._emit(
+            "before_limbs", self._before_limbs(), ["body", "gathered", "&supply"]
+        )
         solve = self._emit("solve_body", self._solve_body(), ["falling", "v", "of_body"])
         limb_calls = self._limb_pieces()
         counts = [len(kind.numbers_of(limb)) for limb, kind in self._by_limb()]
@@ -88,7 +88,7 @@ class _Pieces:
                     kinds=", ".join(str(self._distinct.index(kind)) for kind in self._kinds),
                     before_limbs=before_body,
                     solve_body=solve,
-                    body=_BODY,
+                    body=len(_body_numbers()),
                     passed=_PASSED,
                     tallies=_N_TALLIES,
                     before_calls="\n".join(call for call, _ in limb_calls),
@@ -122,7 +122,7 @@ class _Pieces:
             limb = next(limb for limb, its in self._by_limb() if its == kind)
             first, second, held = self._limb_functions(limb, kind)
             self._held = max(self._held, held)
-            a = self._emit(f"before_{number}", first, ["passed", "held[l]", "spun", "carried"])
+            a = self._emit(f"before_{number}", first, ["gathered", "held[l]", "spun", "carried"])
             b = self._emit(
                 f"after_{number}", second, ["v + 6 + 3 * l", "current + 3 * l", "tallies"]
             )
@@ -132,7 +132,9 @@ class _Pieces:
     def _emit(self, name: str, piece: tuple[Any, Sequence[str]], outputs: Sequence[str]) -> str:
         """Adds a function's text; returns its call."""
         function, arguments = piece
-        self._text.append(emit_c(function, name, (_CONSTANTS,), in_place="tallies" in outputs))
+        self._text.append(
+            emit_c(function, name, (_CONSTANTS,), added=("added",), in_place="tallies" in outputs)
+        )
         return f"{name}({', '.join([*arguments, *outputs])});"
 
     def _p(self, name: str, size: int | None = None) -> _Input:
@@ -147,11 +149,16 @@ class _Pieces:
         return f"{internal} + {start} + {size} * l"
 
     def _function(
-        self, inputs: Mapping[str, _Input], outputs: Sequence[Sequence[Scalar]], symbols: Any
+        self,
+        inputs: Mapping[str, _Input],
+        outputs: Sequence[Sequence[Scalar]],
+        symbols: Any,
+        added: int | None = None,
     ) -> tuple[Any, list[str]]:
+        """A function and its arguments in C; one of its outputs may be added to what is there."""
         vectors = [ca.vertcat(*o) if o else ca.SX(0, 1) for o in outputs]
         names = list(inputs)
-        outs = [f"out{k}" for k in range(len(vectors))]
+        outs = ["added" if k == added else f"out{k}" for k in range(len(vectors))]
         function = ca.Function(
             "piece", [symbols[name] for name in names], vectors, names, outs, {"cse": True}
         )
@@ -166,6 +173,10 @@ class _Pieces:
             "rates": _Input(n, f"internal + {n}" if self._robot.has_backlash else "v + 6"),
             "source": self._p("supply_voltage"),
             "internal": self._p("supply_resistance"),
+            **{
+                name: self._p(name)
+                for name in ("gravity", "base_mass", "base_moment", "base_inertia")
+            },
             _CONSTANTS: _Input(2 * n, "robot"),
         }
         symbols, s = _symbols(inputs)
@@ -177,22 +188,21 @@ class _Pieces:
             s["source"][0],
             s["internal"][0],
         )
-        state = list(leaves(body_state(s["q"], s["v"])))
-        return self._function(inputs, [state, [supply]], symbols)
+        state, body = body_state(s["q"], s["v"], s["gravity"]), body_of(s)
+        numbers = [leaf for leaf in leaves(state) if _varies(leaf)]
+        gathered = [*_triangles(body.inertia()), *leaves(state.force(body))]
+        return self._function(inputs, [numbers, gathered, [supply]], symbols)
 
     def _solve_body(self) -> tuple[Any, list[str]]:
         inputs = {
-            "body": _Input(_BODY, "body"),
+            "body": _Input(len(_body_numbers()), "body"),
             "passed": _Input(_PASSED, "gathered"),
-            **{
-                name: self._p(name)
-                for name in ("base_mass", "base_moment", "base_inertia", "gravity", "timestep")
-            },
+            "timestep": self._p("timestep"),
         }
         symbols, s = _symbols(inputs)
         state = _body_of(s["body"])
         inertia, force = _passed_of(s["passed"])
-        falling, true = solved(state, inertia, force, s)
+        falling, true = solved(state, inertia, force)
         dt = s["timestep"][0]
         faster = [old + dt * rate for old, rate in zip(s["body"][:6], leaves(true), strict=True)]
         outputs = [list(leaves(falling)), faster, body_integrands(state, true, dt)]
@@ -206,7 +216,7 @@ class _Pieces:
         rates = _Input(n, "v + 6 + 3 * l")
         timestep = self._p("timestep")
         inputs = {
-            "body": _Input(_BODY, "body"),
+            "body": _Input(len(_body_numbers()), "body"),
             "supply": _Input(1, "&supply"),
             "angles": _Input(n, "q + 7 + 3 * l"),
             "rates": rates,
@@ -217,7 +227,6 @@ class _Pieces:
             "carried": _Input(
                 CONTACT_LAWS[self._law].internal_state_size, self._carried("internal")
             ),
-            "gravity": self._p("gravity"),
             "timestep": timestep,
             "displaced": self._p("displaced"),
             **{name: self._p(name, size) for name, size in self._layout.by_limb.items()},
@@ -225,26 +234,23 @@ class _Pieces:
         }
         symbols, s = _symbols(inputs)
         symbolic = kind.symbolic(limb, s[_CONSTANTS])
-        x, y, z = s["gravity"]
         found = before(
             symbolic,
             self._law,
             _body_of(s["body"]),
             LimbState(**{f.name: s[f.name] for f in fields(LimbState)}),
-            Environment(s["timestep"][0], (x, y, z), s["supply"][0], *s["displaced"]),
+            Environment(s["timestep"][0], s["supply"][0], *s["displaced"]),
             {name: s[name] for name in self._layout.by_limb},
         )
         cut = [leaf for leaf in leaves(found.held) if _varies(leaf)]
-        passed = [*_triangles(found.inertia), *leaves(found.force)]
-        first = self._function(inputs, [passed, cut, found.motor_rates, found.carried], symbols)
-        inputs = {
+        later = {
             "held": _Input(len(cut), "held[l]"),
             "falling": _Input(6, "falling"),
             "rates": rates,
             "timestep": timestep,
             _CONSTANTS: constants,
         }
-        symbols, s = _symbols(inputs)
+        symbols_later, s = _symbols(later)
         left = iter(s["held"])
         held: Held = mapped(found.held, lambda leaf: next(left) if _varies(leaf) else leaf)
         linear, angular = s["falling"][:3], s["falling"][3:]
@@ -255,8 +261,20 @@ class _Pieces:
             s["rates"],
             s["timestep"][0],
         )
-        second = self._function(inputs, [done.rates, done.currents, done.tallies], symbols)
-        return first, second, len(cut)
+        outputs: list[Sequence[Scalar]] = [done.rates, done.currents, done.tallies]
+        # Not all that a limb knows is asked for later.
+        read = {x.element_hash() for o in outputs for x in ca.symvar(ca.vertcat(*o))}
+        kept = [k for k, x in enumerate(s["held"]) if x.element_hash() in read]
+        symbols_later["held"] = ca.vertcat(*(s["held"][k] for k in kept))
+        second = self._function(later, outputs, symbols_later)
+        passed = [*_triangles(found.inertia), *leaves(found.force)]
+        before_body: list[Sequence[Scalar]] = [
+            passed,
+            [cut[k] for k in kept],
+            found.motor_rates,
+            found.carried,
+        ]
+        return self._function(inputs, before_body, symbols, added=0), second, len(kept)
 
 
 def _symbols(inputs: Mapping[str, _Input]) -> tuple[dict[str, Any], dict[str, tuple[Scalar, ...]]]:
@@ -270,10 +288,19 @@ def _varies(leaf: Scalar) -> bool:
     return isinstance(leaf, ca.SX) and not leaf.is_constant()
 
 
-def _body_of(numbers: Sequence[Scalar]) -> Any:
-    still = body_state((0.0,) * 7, (0.0,) * 6)
+def _any_body() -> LinkState:
+    q, v, gravity = (ca.SX.sym("any", size) for size in (7, 6, 3))
+    return body_state(*([x[k] for k in range(x.numel())] for x in (q, v, gravity)))
+
+
+def _body_numbers() -> list[Scalar]:
+    """What of the body's state is no constant."""
+    return [leaf for leaf in leaves(_any_body()) if _varies(leaf)]
+
+
+def _body_of(numbers: Sequence[Scalar]) -> LinkState:
     left = iter(numbers)
-    return mapped(still, lambda _: next(left))
+    return mapped(_any_body(), lambda leaf: next(left) if _varies(leaf) else leaf)
 
 
 def _triangles(inertia: Inertia) -> list[Scalar]:
@@ -306,14 +333,13 @@ static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec
                  vec *largest, vec *landing)
 {{
   static const int start[{limbs}] = {{ {starts} }}, kind[{limbs}] = {{ {kinds} }};
-  vec body[{body}], supply, held[{limbs}][{held}], passed[{passed}], gathered[{passed}];
+  vec body[{body}], supply, held[{limbs}][{held}], gathered[{passed}];
   vec spun[{joints}], carried[4], falling[6], of_body[3], tallies[{tallies}], total[5];
   {before_limbs}
   for (int l = 0; l < {limbs}; l++) {{
     switch (kind[l]) {{
 {before_calls}
     }}
-    for (int i = 0; i < {passed}; i++) gathered[i] = l ? gathered[i] + passed[i] : passed[i];
 {copies}
   }}
   {solve_body}

@@ -124,6 +124,13 @@ def mirrored(m: Matrix) -> Matrix:
     )
 
 
+def inverse(m: Matrix) -> Matrix:
+    """m^-1 of a symmetric m by its adjugate: one division."""
+    columns = cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])
+    share = 1.0 / dot(m[0], columns[0])
+    return mirrored(_rows([scale(share, column) for column in columns]))
+
+
 def rotation_about(axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
     """Rodrigues' formula.
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from sim.kernel.articulated_body import LinkState
-from sim.kernel.body import body_inertia, body_state
+from sim.kernel.body import body_of, body_state
 from sim.kernel.limb import links_at
 from sim.kernel.parameters import Floats, gravity_on, pack_parameters
 from sim.kernel.physics_step import physics_model
@@ -52,7 +52,11 @@ def _symbolic_tree(robot: Robot) -> Any:
     inputs = ca.SX.sym("q", 7 + robot.n_joints), ca.SX.sym("v", 6 + robot.n_joints)
     q, v = ([s[k] for k in range(s.numel())] for s in inputs)
     # The model itself has no use for the links' x and y; height is its own.
-    states, positions, inertias = [body_state(q, v)], [(q[0], q[1], q[2])], [body_inertia(p)]
+    states, positions, bodies = (
+        [body_state(q, v, p["gravity"])],
+        [(q[0], q[1], q[2])],
+        [body_of(p)],
+    )
     for n, limb in enumerate(limbs_of(robot)):
         angles, rates = q[7 + 3 * n : 10 + 3 * n], v[6 + 3 * n : 9 + 3 * n]
         at, state = positions[0], states[0]
@@ -60,17 +64,15 @@ def _symbolic_tree(robot: Robot) -> Any:
             at, state = add(at, apply(_to_world(state), link.offset)), state.carries(link)
             states.append(state)
             positions.append(at)
-            inertias.append(link.inertia)
+            bodies.append(link.body)
     rotations = [_to_world(state) for state in states]
     kinetic, rotors, mass, moment = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
-    for inertia, state, rotation, at in zip(inertias, states, rotations, positions, strict=True):
-        momentum = inertia.times(state.velocity)
-        kinetic += 0.5 * dot(state.velocity.linear, momentum.linear)
-        kinetic += 0.5 * dot(state.velocity.angular, momentum.angular)
-        assert inertia.rigid is not None
-        own, first_moment = inertia.rigid
-        mass += own
-        moment = add(moment, scale(own, at), apply(rotation, first_moment))
+    for body, state, rotation, at in zip(bodies, states, rotations, positions, strict=True):
+        linear, angular = state.velocity.linear, state.velocity.angular
+        kinetic += 0.5 * body.mass * dot(linear, linear) + dot(linear, cross(angular, body.moment))
+        kinetic += 0.5 * dot(angular, apply(body.angular, angular))
+        mass += body.mass
+        moment = add(moment, scale(body.mass, at), apply(rotation, body.moment))
     for armature, rate in zip(robot.actuators().armature.tolist(), v[6:], strict=True):
         rotors += 0.5 * armature * rate * rate
     outputs = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, get_args
+from typing import Any, Final, get_args
 
 import casadi as ca
 import numpy as np
@@ -39,6 +39,20 @@ AHEAD, UP = TURNED[0], TURNED[2]
 """The world's x axis and the ground's normal in the link's frame."""
 
 
+def link_at(velocity: Any, up: Any, ahead: Any, height: Any) -> LinkState:
+    """A link that does not turn; its origin over the ground [m] and velocity [m/s]."""
+    still = (0.0, 0.0, 0.0)
+    return LinkState(
+        velocity=Motion(velocity, still),
+        up=up,
+        ahead=ahead,
+        gravity=still,
+        height=height,
+        bias=Motion(still, still),
+        tensor=(still, still, still),
+    )
+
+
 class Ground:
     """A law of contact as numbers: a foot 2 mm deep at a velocity of the link in its own frame."""
 
@@ -46,7 +60,7 @@ class Ground:
         v, depth = ca.SX.sym("v", 3), ca.SX.sym("depth")
         ahead, up = (tuple(axis.tolist()) for axis in (AHEAD, UP))
         height = GROUND["sole"] - depth - sum(a * b for a, b in zip(up, AT, strict=True))
-        link = LinkState(Motion((v[0], v[1], v[2]), (0.0, 0.0, 0.0)), up, ahead, height)
+        link = link_at((v[0], v[1], v[2]), up, ahead, height)
         self.foot = foot_on_ground(link, AT, GROUND, mobility)
         carried = (0.0005, -0.0002)[: CONTACT_LAWS[law].internal_state_size]
         reaction = FRICTION[law](self.foot, GROUND, carried, timestep)
@@ -136,7 +150,7 @@ def test_friction_that_may_stop_a_foot_within_a_step_is_taken_by_its_secant(
 def test_a_foot_slides_for_sure_if_its_friction_takes_little_of_its_speed_in_a_step() -> None:
     def sliding(mobility: float) -> float:
         foot = Ground("karnopp", mobility).foot
-        return float(ca.evalf(foot.sliding(limit=10.0, slip=0.1, timestep=1e-3)))
+        return float(ca.evalf(foot.sliding(drag=10.0 / 0.1, timestep=1e-3)))
 
     # A force of 10 N changes the speed of 1 kg by 0.01 m/s in a millisecond.
     assert [sliding(mobility) for mobility in (0.0, 1.0, 5.0, 10.0, 20.0)] == pytest.approx(
@@ -152,9 +166,7 @@ def test_a_foot_slides_for_sure_if_its_friction_takes_little_of_its_speed_in_a_s
 def test_a_foot_in_the_air_lands_that_falls_far_enough_in_time(
     height: float, rising: float, lands: bool
 ) -> None:
-    link = LinkState(
-        Motion((0.1, 0.0, rising), (0.0, 0.0, 0.0)), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.01 + height
-    )
+    link = link_at((0.1, 0.0, rising), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.01 + height)
     foot = foot_on_ground(
         link, (0.0, 0.0, 0.0), {"sole": 0.01, "stiffness": 1.0, "damping": 1.0}, 1.0
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -22,15 +22,21 @@ Floats = NDArray[np.float64]
 WIDTHS = [target(), Target(4, "x86-64-v3"), Target(2, "")]
 
 
-def compiled(function: Any, wanted: Target) -> Callable[[Floats], Floats]:
-    """From numbers of many walkers, (walkers, inputs), to what a function makes of them."""
+def compiled(
+    function: Any, wanted: Target, *, start: float = 0.0, added: Sequence[str] = ()
+) -> Callable[[Floats], Floats]:
+    """From numbers of many walkers, (walkers, inputs), to what a function makes of them.
+
+    start: what is in the place of the outputs before.
+    """
     inputs, outputs = function.numel_in(0), function.numel_out(0)
     source = vector_header() + (
-        f"{emit_c(function, 'step')}"
+        f"{emit_c(function, 'step', added=added)}"
         "void all(const double *in, double *out, int64_t n) {\n"
         f"  for (int64_t at = 0; at < n; at += LANES) {{ vec x[{inputs}], y[{outputs}];\n"
         f"    for (int i = 0; i < {inputs}; i++) for (int k = 0; k < LANES; k++)\n"
         f"      x[i][k] = in[(at + k) * {inputs} + i];\n"
+        f"    for (int i = 0; i < {outputs}; i++) y[i] = SPLAT({start});\n"
         "    step(x, y);\n"
         f"    for (int i = 0; i < {outputs}; i++) for (int k = 0; k < LANES; k++)\n"
         f"      out[(at + k) * {outputs} + i] = y[i][k]; }} }}\n"
@@ -106,6 +112,18 @@ def test_everything_that_is_emitted_has_the_same_bits_at_every_vector_width() ->
     assert len(set(found)) == 1
     exact = np.array(function.map(64)(numbers.T)).T
     np.testing.assert_allclose(np.frombuffer(found[0]).reshape(exact.shape), exact, rtol=1e-13)
+
+
+def test_an_output_may_be_added_to_what_is_there() -> None:
+    x: Any = ca.SX.sym("x", 2)
+    a, b = x.elements()
+    function = ca.Function("f", [x], [ca.vertcat(a * b, -a)], ["x"], ["sums"])
+    numbers = np.random.default_rng(6).normal(size=(64, 2))
+    expected = np.array([numbers[:, 0] * numbers[:, 1], -numbers[:, 0]]).T
+    found = compiled(function, target(), start=3.0)(numbers)
+    np.testing.assert_array_equal(found, expected)
+    found = compiled(function, target(), start=3.0, added=["sums"])(numbers)
+    np.testing.assert_array_equal(found, 3.0 + expected)
 
 
 def test_an_operation_without_a_rule_is_refused_by_name() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -15,6 +16,7 @@ from sim.robot import Robot
 from sim.robot.limbs import Limb, LimbJoint, limbs_of
 
 
+@lru_cache(maxsize=64)
 def robot_constants(robot: Robot) -> NDArray[np.float64]:
     """What a kernel reads of its robot beside the run-time parameters.
 
@@ -22,7 +24,7 @@ def robot_constants(robot: Robot) -> NDArray[np.float64]:
         robot: The robot.
 
     Returns:
-        Motors' conductances and r K_M by joint, then the numbers of every limb.
+        Motors' conductances and r K_M by joint, then the numbers of every limb; read-only.
     """
     limbs = limbs_of(robot)
     joints = [joint for limb in limbs for joint in limb.joints]
@@ -30,7 +32,9 @@ def robot_constants(robot: Robot) -> NDArray[np.float64]:
     numbers = [joint.conductance for joint in joints] + [joint.torque for joint in joints]
     for limb, kind in zip(limbs, kinds, strict=True):
         numbers += kind.numbers_of(limb)
-    return np.array(numbers)
+    constants = np.array(numbers)
+    constants.flags.writeable = False
+    return constants
 
 
 _DATA: Final = tuple(f.name for f in fields(LimbJoint) if f.name not in ("axis", "sign"))

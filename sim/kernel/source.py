@@ -32,6 +32,7 @@ _deriving: Final = threading.Lock()
 """CasADi's symbols are made by one thread at a time."""
 
 
+@lru_cache(maxsize=128)
 def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
     """All that a kernel's source depends on, without deriving it.
 

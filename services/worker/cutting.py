@@ -64,6 +64,7 @@ def cut(
     lanes: int,
     pace: Pace | None = None,
     together: bool = True,
+    shared: bool = False,
 ) -> tuple[Chunk, ...]:
     """Cut an iteration into chunks, longest first.
 
@@ -78,13 +79,16 @@ def cut(
         lanes: How many walkers the kernel steps together, present or not.
         pace: Of the iterations before; None if there was none.
         together: Whether walks of several cases can be computed in one task.
+        shared: Whether slots that are done take over walks of others', so that no short chunks are
+            needed for the end.
 
     Returns:
         The chunks; every design of every case is in one.
     """
     pace = pace or Pace()
     if together and slots < len(durations):
-        return _across_cases(tuple(durations), designs, slots, lanes, pace)
+        rounds = _ROUND_SHARES[:1] if shared else _ROUND_SHARES
+        return _across_cases(tuple(durations), designs, slots, lanes, pace, rounds)
     return _by_case(durations, designs, slots, lanes, pace)
 
 
@@ -109,7 +113,12 @@ def _by_case(
 
 
 def _across_cases(
-    durations: tuple[float, ...], designs: int, slots: int, lanes: int, pace: Pace
+    durations: tuple[float, ...],
+    designs: int,
+    slots: int,
+    lanes: int,
+    pace: Pace,
+    round_shares: tuple[float, ...],
 ) -> tuple[Chunk, ...]:
     """The cut that should end first of several, which leave more or less for the end.
 
@@ -126,7 +135,7 @@ def _across_cases(
     shortest = min(max(shortest, block), longest)
     cuts = [
         _cut_walks(durations, designs, lanes, _rounds(total, slots, share, shortest, longest))
-        for share in _ROUND_SHARES
+        for share in round_shares
     ]
     return min(cuts, key=lambda chunks: _seconds(chunks, slots, pace))
 

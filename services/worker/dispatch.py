@@ -102,11 +102,13 @@ class Dispatcher:
     Attributes:
         slots: Tasks that run at the same time.
         lanes: Tells how many designs the compiled kernel of a precision steps at once.
+        shared: Whether tasks that run at the same time share their walks, as they do in threads.
         totals: Of all tasks whose answers were of use.
     """
 
     slots: int
     lanes: Callable[[Precision], int]
+    shared: bool = False
     totals: TaskTotals = field(default_factory=TaskTotals)
     _queue: FairQueue[Work] = field(default_factory=FairQueue)
     _changed: threading.Condition = field(default_factory=threading.Condition)
@@ -241,6 +243,7 @@ class Dispatcher:
             lanes=lanes,
             pace=self._paces.get(request.job_id),
             together=all(isinstance(case, WalkingCase) for case in request.cases),
+            shared=self.shared and is_compiled,
         )
 
     def _note_pace(self, batch: Batch) -> None:

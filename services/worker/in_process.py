@@ -34,7 +34,7 @@ class InProcessEvaluator:
         if slots < 1:
             raise ValueError(f"cpus must be at least 1, it is {slots}")
         self._kernels = KernelBuilder()
-        self._dispatcher = Dispatcher(slots, simulate.lanes)
+        self._dispatcher = Dispatcher(slots, simulate.lanes, shared=True)
         self._threads = [
             threading.Thread(target=self._work, name=f"walks-{k}", daemon=True)
             for k in range(slots)

@@ -86,7 +86,7 @@ class Task:
                 [self.designs[part.start : part.stop] for part in self.parts],
                 kernel_time,
             )
-        seconds = time.perf_counter() - begun
+        seconds = time.perf_counter() - begun - kernel_time.waited
         return Answer(
             self.provenance, outcomes, platform.node(), seconds, kernel_time, table_time.seconds
         )
@@ -101,7 +101,7 @@ class Answer:
         outcomes: Of the parts; None if the provenance is not what the task asks for, so that
             nothing was computed.
         host: Name of the machine.
-        seconds: That the task took there [s].
+        seconds: That the task took there, but for waiting for other threads [s].
         kernel_time: Of these, and how the kernels' lanes were used.
         table_seconds: Of these, that fuzzy tables took [s].
     """

@@ -40,11 +40,14 @@ class KernelTime:
     """What calls of kernels took, of those who ask for it.
 
     Attributes:
-        seconds: wall time in the calls, added to [s].
+        seconds: wall time in the calls but for `waited`, added to [s].
+        waited: time in the calls that went by until other threads had ended walks that they had
+            taken over, added to [s].
         lane_use: of all of them.
     """
 
     seconds: float = 0.0
+    waited: float = 0.0
     lane_use: LaneUse = field(default_factory=LaneUse)
 
 
@@ -94,7 +97,8 @@ def _computed(walks: Sequence[WantedWalk], kernel_time: KernelTime) -> list[Walk
         setups = [walks[index].setup for index in indices]
         begun = time.perf_counter()
         results = kernel.walk(setups, coding, log=log)
-        kernel_time.seconds += time.perf_counter() - begun
+        kernel_time.seconds += time.perf_counter() - begun - results.waited
+        kernel_time.waited += results.waited
         kernel_time.lane_use += results.lane_use
         found.update(zip(indices, results, strict=True))
     return [found[index] for index in range(len(walks))]

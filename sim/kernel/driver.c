@@ -4,6 +4,8 @@
    internal state begins with the motors' angles, which the encoders see, and their rates.
    Positions and sums are doubles, whatever a real is. The Python twin is reference.py. */
 
+#include <sched.h>
+
 #define NQ (7 + NJ)
 #define NV (6 + NJ)
 #define N_INTEGRANDS 8
@@ -30,12 +32,29 @@ typedef struct {
   int64_t status;
 } Walker;
 
+/* The walks of one call, in their order. Field by field as in sharing.py. */
+typedef struct Call {
+  Walker *walkers;
+  int64_t n, begun;
+  int64_t left;   /* that have not ended, in whose lanes they may be; atomic */
+  int64_t number; /* of the calls of its pool, in the order in which they came */
+  struct Call *following;
+} Call;
+
+/* Calls with walks that have not begun, in the order in which they came. */
+typedef struct {
+  int64_t busy;  /* a lock, held for some ten instructions; atomic */
+  int64_t calls; /* that have come so far; atomic */
+  Call *first;   /* atomic */
+} Pool;
+
 /* The lanes: whom each of them walks and how far, and their states. A lane whose walk has ended,
    and to which no other came, computes on; its walker has its results. A lane's control tick takes
    one round of physics steps; one in which a foot may come down takes several rounds of short ones,
    while other lanes are ahead. */
 typedef struct {
   Walker *walker[LANES];
+  Call *call[LANES];
   int walking[LANES];
   int64_t tick[LANES], rounds_left[LANES];
   divec begins[HALVES]; /* lanes at the beginning of a control tick */
@@ -55,9 +74,50 @@ typedef struct {
   int64_t walked, computed;
 } LaneUse;
 
-/* A walker at its start, and nothing left of who was in the lane before. */
-static void enter(Lanes *s, int k, Walker *w)
+static void lock(Pool *p)
 {
+  while (__atomic_exchange_n(&p->busy, 1, __ATOMIC_ACQUIRE)) sched_yield();
+}
+
+static void unlock(Pool *p) { __atomic_store_n(&p->busy, 0, __ATOMIC_RELEASE); }
+
+int64_t gaitswarm_left(const Call *call) { return __atomic_load_n(&call->left, __ATOMIC_ACQUIRE); }
+
+/* The call becomes the last one of the pool. */
+static void offer(Pool *p, Call *call)
+{
+  Call **at = &p->first;
+  lock(p);
+  while (*at) at = &(*at)->following;
+  __atomic_store_n(at, call, __ATOMIC_RELAXED);
+  call->number = __atomic_fetch_add(&p->calls, 1, __ATOMIC_RELAXED);
+  unlock(p);
+}
+
+/* The call whose next walk begins: a thread's own, then the first of those numbered below a bound.
+   NULL if there is none. */
+static Call *begin_walk(Pool *p, Call *own, int64_t bound, Walker **w)
+{
+  Call **at = &p->first, *found;
+  if (!__atomic_load_n(at, __ATOMIC_RELAXED)) return NULL;
+  lock(p);
+  if (own->begun < own->n)
+    while (*at != own) at = &(*at)->following;
+  found = *at;
+  if (found && found->number < bound) {
+    *w = &found->walkers[found->begun++];
+    if (found->begun == found->n) __atomic_store_n(at, found->following, __ATOMIC_RELAXED);
+  } else {
+    found = NULL;
+  }
+  unlock(p);
+  return found;
+}
+
+/* A walker at its start, and nothing left of who was in the lane before. */
+static void enter(Lanes *s, int k, Call *call, Walker *w)
+{
+  s->call[k] = call;
   s->walker[k] = w;
   s->walking[k] = 1;
   s->tick[k] = 0;
@@ -85,6 +145,8 @@ static void leave(Lanes *s, int k, int64_t status)
   for (int i = 0; i < NQ; i++) w->end[i] = OF_LANE(s->q[i], k);
   w->peak_current = s->peak[k];
   s->walking[k] = 0;
+  /* The last that is done to another call's memory. */
+  __atomic_sub_fetch(&s->call[k]->left, 1, __ATOMIC_RELEASE);
 }
 
 static dvec encoder(const Lanes *s, int j, int h) { return BACKLASH ? s->motor[j][h] : s->q[7 + j][h]; }
@@ -253,19 +315,30 @@ static int end_round(Lanes *s)
   return walked;
 }
 
-/* Any number of walkers, in order; when a walk ends, the next walker enters its lane. */
-void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding, LaneUse *use)
+/* A lane whose walk has ended gets the next one; or, if there is none, one of the thread's own call
+   that does not count: the memory of another call may be gone by now. */
+static void fill(Lanes *s, int k, Pool *pool, Call *own, int64_t bound)
+{
+  Walker *w = own->walkers;
+  Call *call = begin_walk(pool, own, bound, &w);
+  if (!call && s->call[k] == own) return;
+  enter(s, k, call ? call : own, w);
+  s->walking[k] = call != NULL;
+}
+
+/* All walks of a call, in order; when a walk ends, the next one enters its lane. When all have begun,
+   lanes are filled with walks of other calls of the pool that came before the own one had ended.
+   Returns how many of the call's walks are in other threads' lanes yet. */
+int64_t gaitswarm_walk(Pool *pool, Call *own, const Coding *coding, LaneUse *use)
 {
   Lanes s;
-  int64_t next = n < LANES ? n : LANES;
-  int walking = n > 0;
+  int64_t bound = INT64_MAX;
+  int walking = 1;
   memset(use, 0, sizeof *use);
-  if (!walking) return;
+  if (!own->n) return 0;
   memset(&s, 0, sizeof s);
-  for (int k = 0; k < LANES; k++) {
-    enter(&s, k, &walkers[k < n ? k : 0]);
-    s.walking[k] = k < n;
-  }
+  offer(pool, own);
+  for (int k = 0; k < LANES; k++) fill(&s, k, pool, own, bound);
   while (walking) {
     begin_ticks(&s, coding);
     if (s.filtered) unfiltered(s.sensed, s.current, s.smoothing);
@@ -274,12 +347,15 @@ void gaitswarm_walk(Walker *walkers, int64_t n, const Coding *coding, LaneUse *u
     round_of_steps(&s, coding);
     use->walked += end_round(&s);
     use->computed += LANES;
+    if (bound == INT64_MAX && !gaitswarm_left(own))
+      bound = __atomic_load_n(&pool->calls, __ATOMIC_RELAXED);
     walking = 0;
     for (int k = 0; k < LANES; k++) {
-      if (!s.walking[k] && next < n) enter(&s, k, &walkers[next++]);
+      if (!s.walking[k]) fill(&s, k, pool, own, bound);
       walking |= s.walking[k];
     }
   }
+  return gaitswarm_left(own);
 }
 
 int64_t gaitswarm_lanes(void) { return LANES; }
@@ -294,3 +370,5 @@ int64_t gaitswarm_size_of_coding(void) { return sizeof(Coding); }
 int64_t gaitswarm_size_of_table(void) { return sizeof(Table); }
 int64_t gaitswarm_size_of_walker(void) { return sizeof(Walker); }
 int64_t gaitswarm_size_of_lane_use(void) { return sizeof(LaneUse); }
+int64_t gaitswarm_size_of_call(void) { return sizeof(Call); }
+int64_t gaitswarm_size_of_pool(void) { return sizeof(Pool); }

@@ -20,14 +20,13 @@ from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.kinds import robot_constants
 from sim.kernel.lanes import plan_lanes
 from sim.kernel.parameters import Layout, internal_state_size
+from sim.kernel.sharing import STRUCTURES, Pool
 from sim.kernel.source import kernel_identity, kernel_source
 from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkResults, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
 
 Floats = NDArray[np.float64]
-
-_pointer = ctypes.POINTER
 
 
 class _Coding(ctypes.Structure):
@@ -88,16 +87,7 @@ class _Walker(ctypes.Structure):
     ]
 
 
-class _LaneUse(ctypes.Structure):
-    _fields_ = [("walked", ctypes.c_int64), ("computed", ctypes.c_int64)]
-
-
-_STRUCTURES: Final = {
-    "coding": _Coding,
-    "table": _Table,
-    "walker": _Walker,
-    "lane_use": _LaneUse,
-}
+_STRUCTURES: Final = {"coding": _Coding, "table": _Table, "walker": _Walker, **STRUCTURES}
 """By their names in the library's functions that tell their sizes."""
 
 
@@ -177,13 +167,8 @@ class NativeKernel:
         self._integrands = int(library.gaitswarm_integrands())
         self._log_width = 13 + 3 * self._joints + self.internal_state_size
         self._check(robot.description.name)
-        library.gaitswarm_walk.argtypes = [
-            _pointer(_Walker),
-            ctypes.c_int64,
-            _pointer(_Coding),
-            _pointer(_LaneUse),
-        ]
-        library.gaitswarm_walk.restype = None
+        library.gaitswarm_walk.restype = library.gaitswarm_left.restype = ctypes.c_int64
+        self._pools: dict[Coding, Pool] = {}
 
     def _check(self, robot: str) -> None:
         """What is passed across the border must mean the same on both sides."""
@@ -213,6 +198,9 @@ class NativeKernel:
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """All walks, `lanes` at a time: where one ends, the next one of `plan_lanes` begins.
+
+        Concurrent calls without logs share their walks: what a thread's lanes have room for at the
+        end, it takes over from another call, and waits for what others have taken over from it.
 
         Args:
             setups: Walks of this kernel's robot.
@@ -257,8 +245,10 @@ class NativeKernel:
             walker.end = end_at + k * end.strides[0]
             walker.log = None if record is None else record.ctypes.data
         coded = (getattr(coding, name) for name in _CODED)
-        packed, use = _Coding(*coded, self._constants.ctypes.data), _LaneUse()
-        self._library.gaitswarm_walk(walkers, n, ctypes.byref(packed), ctypes.byref(use))
+        packed = _Coding(*coded, self._constants.ctypes.data)
+        # Somebody waits for a log, as a rule: it is not held up by other walks.
+        pool = Pool(self._library) if log else self._pools.setdefault(coding, Pool(self._library))
+        use, waited = pool.walk(walkers, packed, (addresses, sums, end, logs))
         ended = sorted(zip(order, walkers, strict=True), key=lambda pair: pair[0])
         return WalkResults(
             tuple(
@@ -266,6 +256,7 @@ class NativeKernel:
                 for k, w in ended
             ),
             LaneUse(walked=int(use.walked), computed=int(use.computed)),
+            waited,
         )
 
 

@@ -260,12 +260,16 @@ class WalkResults(Sequence[WalkResult]):
 
     Args:
         results: Of the walks.
-        lane_use: Of the call.
+        lane_use: Of the lanes of the thread that made the call, whosever walks they had.
+        waited: How long the thread waited for walks that others had taken over [s].
     """
 
-    def __init__(self, results: tuple[WalkResult, ...], lane_use: LaneUse) -> None:
+    def __init__(
+        self, results: tuple[WalkResult, ...], lane_use: LaneUse, waited: float = 0.0
+    ) -> None:
         self._results = results
         self.lane_use = lane_use
+        self.waited = waited
 
     def __len__(self) -> int:
         return len(self._results)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
+import gc
+import weakref
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ from sim.assembly import control_steps, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.kernel.native import NativeKernel, native_kernel
 from sim.kernel.reference import reference_kernel
+from sim.kernel.sharing import LaneCounts, Pool
 from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot
@@ -185,11 +189,92 @@ def test_the_interpreter_has_one_lane_which_is_never_idle() -> None:
 
 
 @pytest.mark.slow
-def test_walks_of_many_threads_have_the_bits_of_walks_one_after_the_other() -> None:
+@pytest.mark.parametrize("log", [True, False])
+def test_walks_of_many_threads_have_the_bits_of_walks_one_after_the_other(log: bool) -> None:
     kernel, coding = kernel_and_coding(VARIANTS["stick"])
     setups = varied_walks(kernel, VARIANTS["stick"], kernel.lanes + 3)
-    one_after_the_other = [bits(result) for result in kernel.walk(setups, coding, log=True)]
+    one_after_the_other = kernel.walk(setups, coding, log=log)
+    expected = [bits(result) for result in one_after_the_other]
     with ThreadPoolExecutor(8) as pool:
-        calls = [pool.submit(kernel.walk, setups, coding, log=True) for _ in range(24)]
+        calls = [pool.submit(kernel.walk, setups, coding, log=log) for _ in range(24)]
+        walked = 0
         for call in calls:
-            assert [bits(result) for result in call.result()] == one_after_the_other
+            assert [bits(result) for result in call.result()] == expected
+            walked += call.result().lane_use.walked
+    assert walked == 24 * one_after_the_other.lane_use.walked
+
+
+def taken_over(kernel: NativeKernel, coding: Coding, *, log: bool) -> int:
+    """Rounds that a call of one walk walks for another one, which has many at the same time."""
+    long, brief = still_walk(1000, 0.2), still_walk(50, 0.2)
+    alone = kernel.walk([long], coding, log=log).lane_use.walked
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(kernel.walk, [brief] * (400 * kernel.lanes), coding, log=log)
+        own = kernel.walk([long], coding, log=log).lane_use.walked
+        assert own + other.result().lane_use.walked == alone + 20_000 * kernel.lanes
+    return own - alone
+
+
+def test_lanes_that_a_call_leaves_free_take_over_walks_of_another_thread() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    # Threads may come late on a busy machine: once in several tries they walk at the same time.
+    assert any(taken_over(kernel, coding, log=False) for _ in range(20))
+
+
+@pytest.mark.slow
+def test_a_call_takes_over_no_walks_of_calls_that_came_after_its_own_walks_had_ended() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    walk, own = still_walk(1000, 0.2), still_walk(1500, 0.2)
+    earlier, later = [walk] * (20 * kernel.lanes), [walk] * (60 * kernel.lanes)
+    of_earlier = kernel.walk(earlier, coding, log=False).lane_use.walked
+    alone = kernel.walk([own], coding, log=False).lane_use.walked
+
+    def walk_later() -> None:
+        # A call with logs takes nothing over, and so lasts as long as its walk.
+        kernel.walk([still_walk(5000, 0.2)], coding, log=True)
+        kernel.walk(later, coding, log=False)
+
+    def takes_over_of_the_earlier_alone() -> bool:
+        with ThreadPoolExecutor(2) as pool:
+            pool.submit(kernel.walk, earlier, coding, log=False)
+            pool.submit(walk_later)
+            walked = kernel.walk([own], coding, log=False).lane_use.walked
+            return alone < walked <= alone + of_earlier
+
+    # Threads may come late on a busy machine.
+    assert any(takes_over_of_the_earlier_alone() for _ in range(3))
+
+
+def test_walks_whose_logs_are_waited_for_are_not_held_up_by_others() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    assert [taken_over(kernel, coding, log=True) for _ in range(3)] == [0, 0, 0]
+
+
+class Interrupted:
+    """A kernel's library in which another thread walks on when a call is interrupted."""
+
+    def __init__(self) -> None:
+        self.walking = True
+
+    def gaitswarm_walk(self, *_: object) -> None:
+        if self.walking:
+            raise KeyboardInterrupt
+
+    def gaitswarm_left(self, _: object) -> int:
+        return int(self.walking)
+
+
+def test_memory_of_an_interrupted_call_is_kept_until_other_threads_have_done_with_it() -> None:
+    library = Interrupted()
+    pool = Pool(cast("ctypes.CDLL", library))
+    owner, coding, walkers = np.empty(1), LaneCounts(), (ctypes.c_double * 2)()
+    written_to = weakref.ref(owner)
+    with pytest.raises(KeyboardInterrupt):
+        pool.walk(walkers, coding, [owner])
+    del owner
+    gc.collect()
+    assert written_to() is not None
+    library.walking = False
+    pool.walk(walkers, coding, None)
+    gc.collect()
+    assert written_to() is None

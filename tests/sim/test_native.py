@@ -330,10 +330,12 @@ def test_a_library_whose_structures_differ_is_refused_with_its_name(robot: Robot
         "size_of_table": 64,
         "size_of_walker": 272,
         "size_of_lane_use": 16,
+        "size_of_call": 48,
+        "size_of_pool": 24,
     }
 
     def made_of(sizes: dict[str, int]) -> NativeKernel:
-        source = "void gaitswarm_walk(void) {}\n" + "\n".join(
+        source = "void gaitswarm_walk(void) {}\nvoid gaitswarm_left(void) {}\n" + "\n".join(
             f"int gaitswarm_{name}(void) {{ return {size}; }}" for name, size in sizes.items()
         )
         library = load_library("border-check", source.encode(), lambda: source)

@@ -45,11 +45,20 @@ def end_of_last_slot(chunks: Sequence[Chunk], slots: int) -> float:
     lanes=st.sampled_from([1, 2, 4, 8, 16]),
     pace=PACES,
     together=st.booleans(),
+    shared=st.booleans(),
 )
 def test_every_design_of_every_case_is_in_one_chunk(
-    durations: list[float], designs: int, slots: int, lanes: int, pace: Pace, together: bool
+    durations: list[float],
+    designs: int,
+    slots: int,
+    lanes: int,
+    pace: Pace,
+    together: bool,
+    shared: bool,
 ) -> None:
-    chunks = cut(durations, designs, slots=slots, lanes=lanes, pace=pace, together=together)
+    chunks = cut(
+        durations, designs, slots=slots, lanes=lanes, pace=pace, together=together, shared=shared
+    )
     for case in range(len(durations)):
         own = sorted((p.start, p.stop) for c in chunks for p in c.parts if p.case == case)
         assert [start for start, _ in own] == [0, *(stop for _, stop in own[:-1])]
@@ -100,6 +109,15 @@ def test_the_more_the_paces_differ_the_more_is_left_for_short_tasks_at_the_end()
         for spread in (0.0, 0.5)
     )
     assert uneven[-1].cost < 0.5 * even[-1].cost
+
+
+@pytest.mark.parametrize("slots", [1, 2, 4])
+@pytest.mark.parametrize("spread", [0.0, 0.05, 0.5])
+def test_slots_that_take_over_walks_of_each_other_have_one_task_each(
+    slots: int, spread: float
+) -> None:
+    pace = Pace(1e-3, 5e-3, spread)
+    assert len(cut(DURATIONS, 25, slots=slots, lanes=8, pace=pace, shared=True)) == slots
 
 
 @pytest.mark.parametrize("slots", [1, 2, 8])

@@ -85,6 +85,19 @@ class SpecOptions:
         ),
     ] = None
     seed: Annotated[int | None, typer.Option(help="Source of all randomness.")] = None
+    start_from: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID[,ID]|FILE.csv",
+            help="Begin with the best designs of earlier jobs, or with those of a file.",
+        ),
+    ] = None
+    start_count: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Designs to begin with [default: of jobs the 5 best, of a file all]."
+        ),
+    ] = None
     preference: Annotated[
         str | None, typer.Option(help="How objectives are weighed: A, B, C or chapter-3 (eq. 3.1).")
     ] = None

@@ -12,6 +12,7 @@ from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from cli.options import SpecOptions
+    from gaitswarm.start import StartFile
     from services.optimizer.jobs.documents import AnySpec
 
 LARGEST_FILE: Final = 1 << 20
@@ -63,8 +64,28 @@ def build_spec(options: SpecOptions) -> AnySpec:
         optimizer = chosen.get("optimizer", data.get("optimizer", {}))
         chosen["optimizer"] = with_particles(optimizer, particles)
     with_gait = chosen.pop("with_gait", False)
-    spec = parse_spec(data | chosen)
+    file = _add_start(chosen, data)
+    try:
+        spec = parse_spec(data | chosen)
+    except InvalidRequest as error:
+        raise (error if file is None else file.located(error)) from error
     return _searching_gait(spec) if with_gait else spec
+
+
+def _add_start(chosen: dict[str, Any], data: Mapping[str, Any]) -> StartFile | None:
+    """Put what the options say of the start into `chosen`; the file that they name, if any."""
+    source, count = chosen.pop("start_from", None), chosen.pop("start_count", None)
+    if source is None and count is None:
+        return None
+    if source is None:
+        raise InvalidRequest("goes with --start-from, which says where from", field="start-count")
+    if "start" in data:
+        raise InvalidRequest("the spec has a start of its own; choose one", field="start-from")
+    from gaitswarm.start import StartFile, start_from
+
+    found = start_from(source, count)
+    chosen["start"] = found.designs if isinstance(found, StartFile) else found
+    return found if isinstance(found, StartFile) else None
 
 
 def _searching_gait(spec: AnySpec) -> AnySpec:

@@ -119,7 +119,7 @@ def optimize(
         ray_address: A Ray cluster that runs already, for all walks.
         on_iteration: Called after each iteration is committed, for progress.
         **options: Fields laid over the spec, see `SpecOptions`: name, robot, controller,
-            scenarios, variables, fixed, preference, optimizer, particles, iterations, seed,
+            scenarios, variables, fixed, preference, optimizer, particles, iterations, seed, start,
             precision.
 
     Returns:

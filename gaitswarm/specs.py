@@ -11,10 +11,12 @@ from typing import Any, TypeAlias, TypedDict, cast
 from pydantic import ValidationError
 
 from gaitswarm.errors import InvalidRequest, invalid_request
+from gaitswarm.start import StartFile, start_from
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.optimizer_choice import optimizer_settings
 from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.start import EarlierJobs
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.registry import OptimizerName, OptimizerSettings
 from sim.controllers import ControllerName
@@ -35,6 +37,10 @@ ScenarioInput: TypeAlias = str | Scenario | Document
 
 PreferenceInput: TypeAlias = PreferenceName | Preference | Document
 """A, B or C of table 4.5, chapter-3 (eq. 3.1), or one's own."""
+
+StartInput: TypeAlias = str | os.PathLike[str] | Sequence[Document] | EarlierJobs | Document
+"""Designs by name; a CSV file of them; or earlier jobs, by their ids separated by commas or as the
+document of `EarlierJobs`."""
 
 SpecInput: TypeAlias = Spec | Document
 """A job of any kind, as object or as document."""
@@ -59,6 +65,9 @@ class SpecOptions(TypedDict, total=False):
         particles: Designs of one iteration, in place of `optimizer`'s.
         iterations: Budget: iterations of the swarm.
         seed: Source of all randomness; the same seed gives the same bits.
+        start: Designs that are judged first, and that the search begins with if its method can:
+            values by name, a CSV file, or the ids of earlier jobs, separated by commas, for their
+            five best; `{"jobs": [ID, ...], "count": N}` for another number.
         precision: Of the numbers of the search's physics; what is reported as best is judged in
             double.
     """
@@ -74,6 +83,7 @@ class SpecOptions(TypedDict, total=False):
     particles: int
     iterations: int
     seed: int
+    start: StartInput
     precision: Precision
 
 
@@ -101,11 +111,17 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     if "particles" in given:
         settings = given.get("optimizer", document.get("optimizer", {}))
         given["optimizer"] = with_particles(settings, given.pop("particles"))
+    file = None
+    if isinstance(given.get("start"), str | os.PathLike):
+        source = start_from(given["start"])
+        file = source if isinstance(source, StartFile) else None
+        given["start"] = source.designs if isinstance(source, StartFile) else source
     document |= given
     try:
         return SPECS.validate_python(document)
     except ValidationError as error:
-        raise invalid_request(error, document) from error
+        refused = invalid_request(error, document)
+        raise (refused if file is None else file.located(refused)) from error
 
 
 def with_particles(optimizer: object, particles: object) -> object:

@@ -14,6 +14,7 @@ from services.optimizer.analysis.identifiability import (
     identifiability,
 )
 from services.optimizer.analysis.ranking import RankedJob, rank
+from services.optimizer.analysis.start import started
 from services.optimizer.errors import InvalidRequest, ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
@@ -72,8 +73,10 @@ class JobService:
         """
         spec.check_can_be_simulated()
         spec.check_recordings(self.recording)
+        if request is None:
+            request = spec.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
-            spec,
+            started(spec, self.job, self.columns),
             provenance=self.provenance(spec),
             idempotency_key=idempotency_key,
             request=request,
@@ -95,7 +98,7 @@ class JobService:
         spec.check_can_be_simulated()
         spec.check_recordings(self.recording)
         return self.store.create_claimed_job(
-            spec,
+            started(spec, self.job, self.columns),
             runner_name(),
             lease_seconds=EMBEDDED_LEASE_SECONDS,
             provenance=self.provenance(spec),
@@ -141,8 +144,8 @@ class JobService:
         spec.check_can_be_simulated()
         spec.check_recordings(self.recording)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
-        earlier = [job for job in self.store.jobs(limit=_EARLIER).items if job.readable]
-        return estimate(spec, cases, earlier, self._rates)
+        others = [job for job in self.store.jobs(limit=_EARLIER).items if job.readable]
+        return estimate(started(spec, self.job, self.columns), cases, others, self._rates)
 
     def job(self, job_id: str) -> Job:
         """Read a job.

@@ -124,6 +124,46 @@ class DesignSpace:
         held = np.array([value for _, value in self.fixed], dtype=np.float64)
         return np.hstack([self.box.designs(positions), np.tile(held, (len(positions), 1))])
 
+    def positions(self, designs: Sequence[Mapping[str, float | str]]) -> NDArray[np.float64]:
+        """Points of the box for designs as people give them, of which `designs` gives them back.
+
+        Args:
+            designs: k designs: values by name, of a categorical variable a choice's name or index.
+
+        Returns:
+            (k, d), inside the bounds.
+
+        Raises:
+            ValueError: A design is none of this space; the message begins with its index and the
+                variable, and says the way out.
+        """
+        held = {v.name: value for v, (_, value) in zip(self._held, self.fixed, strict=True)}
+        rows = []
+        for index, design in enumerate(designs):
+            for name, value in design.items():
+                if name in held:
+                    self._check_held(f"{index}.{name}", name, value, held[name])
+                elif name not in self.names:
+                    raise ValueError(
+                        f"{index}.{name}: no variable of this job, which searches"
+                        f" {', '.join(v.name for v in self.variables)}; leave it out"
+                    )
+            rows.append([_searched(index, v, design) for v in self.variables])
+        return self.box.positions(np.array(rows).reshape(len(rows), len(self.variables)))
+
+    @property
+    def _held(self) -> tuple[Variable, ...]:
+        """The variables that are fixed, with all of their choices."""
+        return self.catalogue[len(self.variables) :]
+
+    def _check_held(self, where: str, name: str, value: float | str, held: float) -> None:
+        known = next(variable for variable in self._held if variable.name == name)
+        if _number(where, known, value) != held:
+            raise ValueError(
+                f"{where}: {value} is not what this job holds it at, {known.shown(held)}; leave it"
+                " out, or change `fixed`"
+            )
+
     def simulated(self, designs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Designs as the simulator takes them, which knows every choice of its catalogue.
 
@@ -158,8 +198,9 @@ class DesignSpace:
     @property
     def shown_fixed(self) -> dict[str, float | str]:
         """The fixed values as people read them, by name."""
-        held = self.catalogue[len(self.variables) :]
-        return {v.name: v.shown(value) for v, (_, value) in zip(held, self.fixed, strict=True)}
+        return {
+            v.name: v.shown(value) for v, (_, value) in zip(self._held, self.fixed, strict=True)
+        }
 
     def corners(self) -> Iterator[dict[str, float]]:
         """What is simulated at the lower and at the upper ends of all bounds, by variable."""
@@ -195,6 +236,29 @@ def _held(
         except ValueError as error:
             raise ValueError(f"fixed: {error}") from error
     return tuple(held)
+
+
+def _searched(index: int, variable: Variable, design: Mapping[str, float | str]) -> float:
+    """The number of a searched variable in a design."""
+    where = f"{index}.{variable.name}"
+    if variable.name not in design:
+        raise ValueError(f"{where}: missing; a design gives every variable that is searched")
+    number = _number(where, variable, design[variable.name])
+    if variable.kind == "integer" and not number.is_integer():
+        raise ValueError(f"{where}: {number:g} is no whole number")
+    if not variable.low <= number <= variable.high:
+        raise ValueError(
+            f"{where}: {number:g} is outside the bounds {variable.low:g} to {variable.high:g};"
+            " widen them in `variables`, or leave the design out"
+        )
+    return number
+
+
+def _number(where: str, variable: Variable, value: float | str) -> float:
+    try:
+        return variable.number(value)
+    except ValueError as error:
+        raise ValueError(f"{where}: {str(error).removeprefix(f'{variable.name}: ')}") from error
 
 
 def _checked(entry: str | Variable, known: Variable) -> Variable:

@@ -21,6 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
+from services.optimizer.jobs.start import EarlierJobs, StartChoice
 from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.search.registry import (
     DEFAULT_METHOD,
@@ -118,6 +119,13 @@ class Spec(BaseModel):
     seed: int = Field(
         default=1, ge=0, lt=2**63, description="Source of all randomness; same seed, same bits."
     )
+    start: StartChoice = Field(
+        default=(),
+        description="Designs that are judged first, and that the search begins with if its method"
+        " can: a list of them, or the best of earlier jobs, which are looked up when the job is"
+        " submitted. They count as part of the budget.",
+        examples=[{"jobs": ["k2q7zr5dm9xw"], "count": 5}],
+    )
     precision: Precision = Field(
         default="double",
         description="Of the numbers of the search's physics: `double`, or `single`, which is about"
@@ -137,6 +145,34 @@ class Spec(BaseModel):
                 f" judges {LONGEST_REPLAY} designs at most, not {self.budget}"
             )
         return self
+
+    @model_validator(mode="after")
+    def _can_start(self) -> Self:
+        self.start_positions()
+        return self
+
+    def start_positions(self) -> Floats:
+        """Where the search begins.
+
+        Returns:
+            (k, d) positions; none while earlier jobs are named that were not looked up yet.
+
+        Raises:
+            ValueError: A start design is none of this job, or there are more than its budget; names
+                the design and the variable. A spec that was validated raises nothing.
+        """
+        if isinstance(self.start, EarlierJobs) or not self.start:
+            return np.empty((0, 0))
+        if len(self.start) > self.budget:
+            raise ValueError(
+                f"start: {len(self.start)} designs are more than the budget of {self.budget}; give"
+                " fewer, or more iterations"
+            )
+        space = self.design_space()
+        try:
+            return space.positions(self.start)
+        except ValueError as error:
+            raise ValueError(f"start.{error}") from error
 
     @abstractmethod
     def design_space(self) -> DesignSpace:
@@ -290,4 +326,6 @@ def create_optimizer(spec: Spec) -> Optimizer:
     Returns:
         The optimizer before its first ask.
     """
-    return create_search(spec.optimizer, spec.design_space().box, spec.budget, spec.seed)
+    return create_search(
+        spec.optimizer, spec.design_space().box, spec.budget, spec.seed, spec.start_positions()
+    )

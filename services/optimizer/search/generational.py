@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, NonNegativeInt
 from services.optimizer.search.optimizer import (
     SearchSettings,
     checked_fitness,
+    checked_start,
     matrix,
     parse_state,
 )
@@ -69,6 +70,9 @@ class Generational(ABC, Generic[S, G]):
 
     A method says what its first and next generation are and what it keeps of one; its random
     numbers are counted by generation, so that they do not depend on the pieces.
+
+    Start positions take the places of the first members of the first generation. Where there are
+    more of them than members, all are asked for, and the best are the generation.
     """
 
     state_model: ClassVar[type[GenerationState]]
@@ -93,6 +97,12 @@ class Generational(ABC, Generic[S, G]):
         self.positions: Floats = np.empty((0, space.dimension))
         self._fitness: list[float] = []
         self._asked = 0
+        self._start: Floats = np.empty((0, space.dimension))
+
+    @property
+    def members(self) -> int:
+        """Size of the first generation, where start positions are more than that."""
+        return self.settings.particles
 
     @property
     def iteration(self) -> int:
@@ -103,6 +113,19 @@ class Generational(ABC, Generic[S, G]):
     def evaluations(self) -> int:
         """Number of positions that were told, in all."""
         return self._evaluations
+
+    def start_from(self, positions: Floats) -> None:
+        """Put positions in the places of the first members.
+
+        Args:
+            positions: (k, d), in the variables' own units.
+
+        Raises:
+            ValueError: One is outside the bounds or of another dimension, or something was asked
+                for already.
+        """
+        begun = bool(self._evaluations or len(self.positions))
+        self._start = checked_start(positions, self.space, begun=begun)
 
     def ask(self, most: int | None = None) -> Floats:
         """Give the positions to evaluate next; the same ones again until they are told.
@@ -117,7 +140,7 @@ class Generational(ABC, Generic[S, G]):
         told = len(self._fitness)
         if not self._asked:
             if told == len(self.positions):
-                self.positions = self.propose()
+                self.positions = self.propose() if self.generations else self._first()
                 self._fitness, told = [], 0
             limit = self.settings.particles if most is None else min(most, self.settings.particles)
             self._asked = min(limit, len(self.positions) - told)
@@ -138,6 +161,8 @@ class Generational(ABC, Generic[S, G]):
         self._evaluations += self._asked
         self._asked = 0
         if len(self._fitness) == len(self.positions):
+            if not self.generations and len(self._start) > self.members:
+                self._keep_the_best()
             self.learn(self.positions, np.array(self._fitness))
             self.generations += 1
 
@@ -164,7 +189,7 @@ class Generational(ABC, Generic[S, G]):
         """Take on a state.
 
         Args:
-            state: As `dump` gave it, for the same settings, space, budget and seed.
+            state: As `dump` gave it, for the same settings, space, budget, seed and start.
 
         Raises:
             ValueError: It is of another method, version or shape, or outside the bounds; the state
@@ -185,6 +210,18 @@ class Generational(ABC, Generic[S, G]):
         self._iteration, self._evaluations = dumped.iteration, dumped.evaluations
         self.generations, self._asked = dumped.generations, dumped.asked
         self.positions, self._fitness = positions, of_worth(dumped.fitness).tolist()
+
+    def _first(self) -> Floats:
+        """The first generation with the start positions in it."""
+        proposed = self.propose()
+        return np.vstack([self._start, proposed[len(self._start) :]])
+
+    def _keep_the_best(self) -> None:
+        """Of more start positions than members; the earlier of equals, in their order."""
+        order = np.argsort(np.array(self._fitness), kind="stable")[: self.members]
+        kept = np.sort(order)
+        self.positions = self.positions[kept]
+        self._fitness = [self._fitness[k] for k in kept.tolist()]
 
     def inside(self, positions: Floats, name: str) -> Floats:
         """Check positions of a dumped state.

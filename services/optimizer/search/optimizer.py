@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from services.optimizer.search.space import Space
+
 
 class SearchSettings(BaseModel):
     """What the settings of every method have."""
@@ -29,11 +31,13 @@ class Optimizer(Protocol):
     tell(f) asked at k      idle at k + 1   -
     dump()  any             unchanged       JSON-able state, exact to the bit
 
-    It is a function of its settings, space, budget and seed, and of what it was told: equal state,
-    equal future. The path does not depend on how many positions an ask was allowed to give: what is
-    asked in pieces is learned from when it is whole. It never ends by itself; a method that has
-    converged starts anew from elsewhere. A fitness of +inf (a failed evaluation) never becomes a
-    best.
+    `start_from` comes before all of these, if at all.
+
+    It is a function of its settings, space, budget, seed and start, and of what it was told: equal
+    state, equal future. The path does not depend on how many positions an ask was allowed to give:
+    what is asked in pieces is learned from when it is whole. It never ends by itself; a method that
+    has converged starts anew from elsewhere. A fitness of +inf (a failed evaluation) never becomes
+    a best.
     """
 
     @property
@@ -43,6 +47,17 @@ class Optimizer(Protocol):
     @property
     def evaluations(self) -> int:
         """Number of positions that were told, in all."""
+
+    def start_from(self, positions: NDArray[np.float64]) -> None:
+        """Begin with positions that are known to be good: they are the first that are asked for.
+
+        Args:
+            positions: (k, d), in the variables' own units; of none the search begins as ever.
+
+        Raises:
+            ValueError: One is outside the bounds or of another dimension, or something was asked
+                for already.
+        """
 
     def ask(self, most: int | None = None) -> NDArray[np.float64]:
         """Give the positions to evaluate next; the same ones again until they are told.
@@ -76,7 +91,7 @@ class Optimizer(Protocol):
         """Take on a state.
 
         Args:
-            state: as `dump` gave it, for the same settings, space, budget and seed.
+            state: as `dump` gave it, for the same settings, space, budget, seed and start.
 
         Raises:
             ValueError: it is of another method, version or shape, or outside the bounds; the state
@@ -104,6 +119,31 @@ def checked_fitness(fitness: NDArray[np.float64], asked: int) -> NDArray[np.floa
     if np.isnan(fitness).any() or np.isneginf(fitness).any():
         raise ValueError("fitness must be finite, or +inf for a failed evaluation")
     return np.array(fitness, dtype=np.float64)
+
+
+def checked_start(
+    positions: NDArray[np.float64], space: Space, *, begun: bool
+) -> NDArray[np.float64]:
+    """Check the positions that a search is to begin with.
+
+    Args:
+        positions: Those of `Optimizer.start_from`.
+        space: The box that is searched.
+        begun: Whether something was asked for already.
+
+    Returns:
+        (k, d), a copy.
+
+    Raises:
+        ValueError: One is outside the bounds or of another dimension, or the search has begun.
+    """
+    if begun:
+        raise ValueError("start_from() after ask(): the search has begun already")
+    if positions.ndim != 2 or positions.shape[1] != space.dimension:
+        raise ValueError(f"start: shape {positions.shape}, not (k, {space.dimension})")
+    if not ((positions >= space.low) & (positions <= space.high)).all():
+        raise ValueError("start: outside the bounds of this job")
+    return np.array(positions, dtype=np.float64)
 
 
 M = TypeVar("M", bound=BaseModel)

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final, Literal, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.optimizer import Optimizer, SearchSettings
@@ -14,6 +17,8 @@ from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.replayed import Replayed
 from services.optimizer.search.space import Space
 from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
+
+Floats = NDArray[np.float64]
 
 OptimizerSettings = NelderMeadSettings | PatternSearchSettings | PsoSettings | RandomSearchSettings
 """Settings of every method; their `name` tells them apart."""
@@ -48,6 +53,8 @@ class Method:
         summary: What it is, with its source.
         create: Makes one.
         replays: Whether its state is all that it was told, so that a job of it is bounded.
+        uses_start: Whether it learns from the designs that a job starts from. One that does not
+            evaluates them first, and then goes on as if there had been none.
         extra: The optional dependencies that it needs, as in `gaitswarm[extra]`; "" if none.
     """
 
@@ -55,6 +62,7 @@ class Method:
     summary: str
     create: Create
     replays: bool = False
+    uses_start: bool = False
     extra: str = ""
 
 
@@ -90,6 +98,7 @@ METHODS: Final[dict[MethodName, Method]] = {
         PsoSettings,
         "Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)",
         ParticleSwarm,
+        uses_start=True,
     ),
     "random": Method(
         RandomSearchSettings,
@@ -123,7 +132,13 @@ coefficients of Clerc and Kennedy (2002) in the ring of Bratton and Kennedy (200
 """
 
 
-def create_search(settings: OptimizerSettings, space: Space, budget: int, seed: int) -> Optimizer:
+def create_search(
+    settings: OptimizerSettings,
+    space: Space,
+    budget: int,
+    seed: int,
+    start: Floats | None = None,
+) -> Optimizer:
     """Create a search.
 
     Args:
@@ -131,8 +146,15 @@ def create_search(settings: OptimizerSettings, space: Space, budget: int, seed: 
         space: The box that is searched.
         budget: Evaluations of the planned run.
         seed: Of all random numbers.
+        start: (k, d) positions to begin with, in the variables' own units; None for none.
 
     Returns:
         The optimizer before its first ask.
+
+    Raises:
+        ValueError: A start position is outside the bounds.
     """
-    return METHODS[settings.name].create(settings, space, budget, seed)
+    optimizer = METHODS[settings.name].create(settings, space, budget, seed)
+    if start is not None and len(start):
+        optimizer.start_from(start)
+    return optimizer

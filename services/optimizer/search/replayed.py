@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Generator
@@ -14,7 +15,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt
 
 from services.optimizer.search.generational import Worth, of_worth, worth
-from services.optimizer.search.optimizer import SearchSettings, checked_fitness, parse_state
+from services.optimizer.search.optimizer import (
+    SearchSettings,
+    checked_fitness,
+    checked_start,
+    parse_state,
+)
 from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.space import Space
 
@@ -28,8 +34,30 @@ S = TypeVar("S", bound=SearchSettings)
 Search = Callable[[S, Space, int, RandomNumbers], Proposals]
 """A method: (settings, space, budget [evaluations], random numbers) -> proposals.
 
-It draws on nothing else, so that what it was told makes it the same again.
+It draws on nothing else, so that what it was told makes it the same again. A method that makes use
+of start positions has a fifth argument `start`, of type `Start | None`, None by default.
 """
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """Positions that were evaluated before a method begins.
+
+    Attributes:
+        positions: (k, d), inside the bounds, k >= 1.
+        fitness: (k,) of each, +inf for a failed evaluation.
+    """
+
+    positions: Floats
+    fitness: Floats
+
+    @property
+    def best_first(self) -> tuple[Floats, Floats]:
+        """Positions and fitness of those that did not fail, the best first."""
+        order = np.argsort(self.fitness, kind="stable")
+        order = order[np.isfinite(self.fitness[order])]
+        return self.positions[order], self.fitness[order]
+
 
 _SEARCH: Final = 3
 """Purpose of random streams: never renumbered, or stored jobs would change their future."""
@@ -91,12 +119,17 @@ class Replayed:
             seed: Of all random numbers.
         """
 
-        def start(budget: int) -> Proposals:
-            return search(settings, space, budget, RandomNumbers(seed, _SEARCH))
+        def begin(budget: int, start: Floats) -> Proposals:
+            random = RandomNumbers(seed, _SEARCH)
+            if len(start):
+                return _after(start, search, settings, space, budget, random)
+            return search(settings, space, budget, random)
 
-        self._start: Final[Callable[[int], Proposals]] = start
+        self._begin: Final[Callable[[int, Floats], Proposals]] = begin
         self._settings: Final = settings
+        self._space: Final = space
         self._place: Final = repr((settings.model_dump_json(), space.axes, seed))
+        self._start = np.empty((0, space.dimension))
         self._budget = budget
         self._iteration = 0
         self._asked = 0
@@ -112,6 +145,20 @@ class Replayed:
     def evaluations(self) -> int:
         """Number of positions that were told, in all."""
         return len(self._told)
+
+    def start_from(self, positions: Floats) -> None:
+        """Ask for these before the method begins.
+
+        Args:
+            positions: (k, d), in the variables' own units.
+
+        Raises:
+            ValueError: One is outside the bounds or of another dimension, or something was asked
+                for already.
+        """
+        begun = bool(self._told or self._asked)
+        self._start = checked_start(positions, self._space, begun=begun)
+        self._course = None
 
     def ask(self, most: int | None = None) -> Floats:
         """Give the positions to evaluate next; the same ones again until they are told.
@@ -168,7 +215,7 @@ class Replayed:
         """Take on a state.
 
         Args:
-            state: As `dump` gave it, for the same settings, space, budget and seed.
+            state: As `dump` gave it, for the same settings, space, budget, seed and start.
 
         Raises:
             ValueError: It is of another method or version, or more is asked for than the method
@@ -190,14 +237,15 @@ class Replayed:
         return self._course
 
     def _replay(self) -> _Course:
-        proposals = self._start(self._budget)
+        proposals = self._begin(self._budget, self._start)
         course = _Course(proposals, _proposal(next(proposals)), [])
         course.tell(np.array(self._told))
         return course
 
     def _key(self) -> bytes:
-        place = f"{self._place} {self._budget}".encode()
-        return blake2b(place + np.array(self._told).tobytes(), digest_size=16).digest()
+        place = f"{self._place} {self._budget} {len(self._start)}".encode()
+        told = np.array(self._told).tobytes()
+        return blake2b(place + self._start.tobytes() + told, digest_size=16).digest()
 
 
 class _UnderWay:
@@ -221,6 +269,33 @@ class _UnderWay:
 
 
 _UNDER_WAY: Final = _UnderWay()
+
+
+def uses_start(search: Callable[..., Proposals]) -> bool:
+    """Whether a method makes use of start positions, or goes on as if there had been none.
+
+    Args:
+        search: The method.
+
+    Returns:
+        True where it has an argument for them.
+    """
+    return "start" in inspect.signature(search).parameters
+
+
+def _after(
+    start: Floats,
+    search: Callable[..., Proposals],
+    settings: SearchSettings,
+    space: Space,
+    budget: int,
+    random: RandomNumbers,
+) -> Proposals:
+    """Start positions, and then the method."""
+    fitness = yield start
+    left = max(budget - len(start), 1)
+    known = {"start": Start(start, fitness)} if uses_start(search) else {}
+    yield from search(settings, space, left, random, **known)
 
 
 def _proposal(positions: Floats) -> Floats:

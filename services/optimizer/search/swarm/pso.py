@@ -154,7 +154,9 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
             ValueError: a shape is another, or something is outside the bounds.
         """
         shape = self._best_positions.shape
-        if len(state.positions) not in (0, shape[0]):
+        # The first generation may be of more start positions than there are particles.
+        asked = shape[0] if state.generations else max(shape[0], len(self._start))
+        if len(state.positions) not in (0, asked):
             raise ValueError(f"positions: expected {shape[0]} rows of {shape[1]} numbers")
         velocities = matrix(state.velocities, shape, "velocities")
         best = matrix(state.best_positions, shape, "best_positions")

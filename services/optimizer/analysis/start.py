@@ -1,0 +1,87 @@
+"""The best designs of earlier jobs, as the start of a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import chain, zip_longest
+
+import numpy as np
+
+from services.optimizer.errors import GaitswarmError, InvalidRequest
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.start import EarlierJobs
+
+Design = dict[str, float | str]
+
+
+def started(
+    spec: Spec,
+    job_of: Callable[[str], Job],
+    columns_of: Callable[[Job], EvaluationColumns],
+) -> Spec:
+    """Look up the designs that a job starts from, if it names earlier jobs.
+
+    Args:
+        spec: Of the new job.
+        job_of: Id -> job.
+        columns_of: Job -> all that it evaluated.
+
+    Returns:
+        The spec with designs in place of the jobs: of each job the best by its own fitness, then
+        the second of each, and so on, without repeats. Of other variables than the new job searches
+        they say nothing.
+
+    Raises:
+        InvalidRequest: A job that is not there, that has no design yet or none that fits; names its
+            place in `start`.
+    """
+    if not isinstance(spec.start, EarlierJobs):
+        return spec
+    searched = tuple(variable.name for variable in spec.design_space().variables)
+    ranked = []
+    for index, job_id in enumerate(spec.start.jobs):
+        try:
+            job = job_of(job_id)
+            found = list(_best(job, columns_of(job), searched, spec.start.count))
+            if not found:
+                raise InvalidRequest(f"job {job_id} has no design that has not failed")
+            _check(spec, found)
+        except (GaitswarmError, ValueError) as error:
+            raise InvalidRequest(str(error), field=f"start.jobs.{index}") from error
+        ranked.append(found)
+    designs = [design for design in chain(*zip_longest(*ranked)) if design is not None]
+    different = list({tuple(design.items()): design for design in designs}.values())
+    start = tuple(different[: spec.start.count])
+    if len(start) > spec.budget:
+        raise InvalidRequest(
+            f"{len(start)} designs are more than the budget of {spec.budget}; lower it, or give"
+            " more iterations",
+            field="start.count",
+        )
+    return spec.model_copy(update={"start": start})
+
+
+def _best(
+    job: Job, columns: EvaluationColumns, searched: tuple[str, ...], count: int
+) -> Iterator[Design]:
+    """The best different designs of a job; its values of what the new job searches."""
+    space, seen = job.spec.design_space(), set[tuple[float | str, ...]]()
+    for row in np.argsort(columns.fitness, kind="stable").tolist():
+        if len(seen) == count or not np.isfinite(columns.fitness[row]):
+            return
+        shown = space.shown(columns.designs[row].tolist())
+        design = {name: shown[name] for name in searched if name in shown}
+        if tuple(design.values()) not in seen:
+            seen.add(tuple(design.values()))
+            yield design
+
+
+def _check(spec: Spec, designs: list[Design]) -> None:
+    try:
+        spec.design_space().positions(designs)
+    except ValueError as error:
+        place, _, problem = str(error).partition(": ")
+        number, _, name = place.partition(".")
+        raise ValueError(f"{name} of its best design no. {int(number) + 1}: {problem}") from error

@@ -34,6 +34,22 @@ def test_the_engines_benchmark_says_what_each_contestant_computes_and_what_is_ti
     for what, figure in speed:
         if figure == "throughput":
             assert speed[what, "throughput"] < speed[what, "latency"]
+    # A shorter step makes a second of the robot's time cost more, not a step.
+    for row in rows:
+        assert row["real_time_factor"] == pytest.approx(1e6 / row["rate"] / row["us_per_step"])
+        ratio = rows[0]["real_time_factor"] / row["real_time_factor"]
+        assert row["times_the_kernel"] == pytest.approx(ratio)
+    rates = {row["rate"] for row in rows if "its own contacts" in row["what"]}
+    assert rates == {2_500, 5_000, 10_000}
+
+
+@pytest.mark.slow
+def test_the_accuracy_benchmark_finds_our_step_nearer_to_a_fine_one_than_mujocos() -> None:
+    done = python("-m", "benchmarks.step_accuracy", "--rates", "2500", "--json")
+    assert done.returncode == 0, done.stderr
+    ours, mujocos = json.loads(done.stdout)
+    assert (ours["rate"], mujocos["rate"]) == (2_500, 2_500)
+    assert max(ours["percent"]) < max(mujocos["percent"]) < 5.0
 
 
 @pytest.mark.slow

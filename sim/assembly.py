@@ -191,11 +191,15 @@ def plan_walk(
     if robot.has_backlash:
         internal_state[:n_joints] = joints
     displaced = noise is not None and noise.kind == "angle"
+    start = np.concatenate([base, joints])
+    parameters = pack_parameters(robot, scenario, timestep, start=joints, displaced=displaced)
+    for shared in (start, internal_state, parameters, codes):
+        shared.flags.writeable = False
     return partial(
         WalkSetup,
-        np.concatenate([base, joints]),
+        start,
         internal_state,
-        pack_parameters(robot, scenario, timestep, start=joints, displaced=displaced),
+        parameters,
         codes,
         fall_height=0.5 * scenario.hip_height,
         energy=robot.description.supply.energy,

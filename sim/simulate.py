@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +33,9 @@ from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Sta
 from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
 from sim.robot.robot import with_shafts
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+
+_PLANS_KEPT: Final = 16
+"""Scenarios whose walks are planned once; most take a quarter of a megabyte."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,12 +184,16 @@ def _simulating(
         key = tuple(gait.values())
         if key not in plans:
             walked = with_gait(scenario, gait)
-            plans[key] = plan_walk(
-                machine,
-                walked,
-                timestep,
-                noise,
-                trajectory=None if planner is None else desired_angles(planner, walked),
+            plans[key] = (
+                _plan_of_scenario(machine, walked, timestep)
+                if not gait and noise is None and planner is None
+                else plan_walk(
+                    machine,
+                    walked,
+                    timestep,
+                    noise,
+                    trajectory=None if planner is None else desired_angles(planner, walked),
+                )
             )
         plan = plans[key]
         if plan is not None:
@@ -199,6 +208,14 @@ def _simulating(
     return Simulation(
         Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
     )
+
+
+@lru_cache(maxsize=_PLANS_KEPT)
+def _plan_of_scenario(
+    robot: Robot, scenario: Scenario, timestep: float
+) -> Callable[[ControlLaw], WalkSetup] | None:
+    """Walks in the scenario's own gait, which all tasks of a job begin with."""
+    return plan_walk(robot, scenario, timestep)
 
 
 def check_reach(

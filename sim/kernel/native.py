@@ -7,6 +7,7 @@ import dataclasses
 import struct
 import threading
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,7 +23,15 @@ from sim.kernel.lanes import plan_lanes
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.sharing import STRUCTURES, Pool
 from sim.kernel.source import kernel_identity, kernel_source
-from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkResults, WalkSetup
+from sim.kernel.walk import (
+    Coding,
+    LaneUse,
+    Precision,
+    WalkResult,
+    WalkResults,
+    WalkSetup,
+    check_gains,
+)
 from sim.outcome import Status
 from sim.robot import Robot
 
@@ -212,8 +221,10 @@ class NativeKernel:
 
         Raises:
             SimulationInputError: An array of a setup has not the shape that this kernel reads, or
-                a control law asks for an inference rather than a table.
+                a control law asks for an inference rather than a table, or has too large a gain.
         """
+        for law in {id(s.control_law): s.control_law for s in setups}.values():
+            check_gains(law)
         for setup in setups:
             setup.check(
                 joints=self._joints,
@@ -226,7 +237,7 @@ class NativeKernel:
         walkers = (_Walker * n)()
         addresses = _Addresses()
         sums_at, end_at = int(sums.ctypes.data), int(end.ctypes.data)
-        order = plan_lanes([setup.ticks for setup in setups], self.lanes).order
+        order = _order(tuple(setup.ticks for setup in setups), self.lanes)
         for walker, k in zip(walkers, order, strict=True):
             setup, record = setups[k], logs[k]
             walker.q0 = addresses.of(setup.start, np.float64)
@@ -258,6 +269,12 @@ class NativeKernel:
             LaneUse(walked=int(use.walked), computed=int(use.computed)),
             waited,
         )
+
+
+@lru_cache(maxsize=64)
+def _order(ticks: tuple[int, ...], lanes: int) -> tuple[int, ...]:
+    """Planned once: the tasks of one iteration have walks as long as those of the next."""
+    return plan_lanes(ticks, lanes).order
 
 
 def text_size(library: bytes) -> int | None:

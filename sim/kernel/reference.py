@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from sim.controllers.base import ControlLaw
 from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
 from sim.kernel.physics_step import INTEGRANDS, PhysicsModel, physics_model
-from sim.kernel.walk import CODE_LIMIT, Coding, LaneUse, WalkResult, WalkResults, WalkSetup
+from sim.kernel.walk import (
+    CODE_LIMIT,
+    Coding,
+    LaneUse,
+    WalkResult,
+    WalkResults,
+    WalkSetup,
+    check_gains,
+)
 from sim.outcome import Status
 from sim.robot import Robot
 
@@ -45,6 +53,7 @@ class ReferenceKernel:
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """All walks, one after the other."""
         for setup in setups:
+            check_gains(setup.control_law)
             setup.check(
                 joints=self._model.kick.numel_in(3),
                 internal_state=self.internal_state_size,

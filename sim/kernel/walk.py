@@ -164,7 +164,7 @@ class WalkSetup:
         return len(self.desired)
 
     def check(self, *, joints: int, internal_state: int, parameters: int) -> None:
-        """Refuse arrays that a kernel of these sizes would read beyond their ends, and large gains.
+        """Refuse arrays that a kernel of these sizes would read beyond their ends.
 
         Args:
             joints: J, the robot's driven joints.
@@ -172,10 +172,8 @@ class WalkSetup:
             parameters: P, length of the parameter vector.
 
         Raises:
-            SimulationInputError: An array has another shape, or a gain leads beyond the integers
-                of the controllers; the message names it.
+            SimulationInputError: An array has another shape; the message names it.
         """
-        _check_gains(self.control_law)
         ticks = max(self.ticks, 1)
         wanted: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
             "start": (self.start, (7 + joints,)),
@@ -192,8 +190,15 @@ class WalkSetup:
                 )
 
 
-def _check_gains(law: ControlLaw) -> None:
-    """With these the compiled kernel's arithmetic is exact, and never leaves a table."""
+def check_gains(law: ControlLaw) -> None:
+    """Refuse gains with which the compiled kernel's arithmetic is not exact, or leaves a table.
+
+    Args:
+        law: That is to run.
+
+    Raises:
+        SimulationInputError: A gain leads beyond the controllers' integers; the message names it.
+    """
     largest = {
         "proportional_gain": law.proportional_gain * CODE_LIMIT,
         "integral_gain": law.integral_gain * CODE_LIMIT,

@@ -67,6 +67,28 @@ def test_walks_of_other_kernels_have_calls_of_their_own(calls: list[int]) -> Non
     assert bits(outcome) == bits(laws.run(np.array([[0.0], [1.0], [0.0]])))
 
 
+def test_all_tasks_of_a_scenario_share_one_plan_that_nobody_can_write_to(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[WalkSetup] = []
+    walk = NativeKernel.walk
+
+    def noted(
+        kernel: NativeKernel, setups: Sequence[WalkSetup], coding: Coding, *, log: bool
+    ) -> Sequence[WalkResult]:
+        seen.extend(setups)
+        return walk(kernel, setups, coding, log=log)
+
+    monkeypatch.setattr(NativeKernel, "walk", noted)
+    for designs in (GAINS[:1], GAINS[1:2]):
+        CASES[0].run(designs)
+    first, second = seen
+    assert first.control_law is not second.control_law
+    for name in ("start", "internal_state", "parameters", "desired"):
+        array = getattr(first, name)
+        assert array is getattr(second, name) and not array.flags.writeable
+
+
 class NoWalk:
     """A case that has no walks to share."""
 

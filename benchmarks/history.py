@@ -44,7 +44,7 @@ def variants(store: Store, job: Job) -> dict[str, tuple[Callable[[], object], fl
         "read again": (lambda: cache.columns(job), 1.0),
         "judge one by one": (lambda: judge(part.objectives, part.failed, preference), scale),
         "rank all at once": (lambda: rank(columns, preference, top=20), 1.0),
-        "distribution": (lambda: distribution(columns, space, particles), 1.0),
+        "distribution": (lambda: distribution(columns, space), 1.0),
         "list 200 jobs": (lambda: store.jobs(limit=200), 1.0),
         "list by name, search": (
             lambda: store.jobs(limit=50, search="short", order=JobOrder.NAME),

@@ -76,9 +76,10 @@ class Embedded:
         with (
             stop_on_signals(stop),
             show_progress(
-                iterations=job.spec.iterations,
                 particles=job.spec.optimizer.particles,
-                done=job.progress.iterations,
+                iterations_planned=job.spec.iterations,
+                iterations=job.progress.iterations,
+                evaluations=job.progress.evaluations,
             ) as progress,
         ):
             best = job.progress.best_fitness
@@ -88,12 +89,14 @@ class Embedded:
                 if done.best is not None:
                     _, found = done.best
                     best = found if best is None else min(best, found)
-                progress.iteration(done.iteration, best, done.evaluate_seconds)
+                progress.iteration(done.iteration, len(done.fitness), best, done.evaluate_seconds)
 
             def followed(iteration: Iteration) -> None:
                 nonlocal best
                 best = iteration.best_so_far
-                progress.iteration(iteration.index, best, iteration.evaluate_seconds)
+                progress.iteration(
+                    iteration.index, iteration.designs, best, iteration.evaluate_seconds
+                )
 
             try:
                 run_embedded(
@@ -216,7 +219,7 @@ def ended(job: JobView, place: str) -> JobEnded:
 
 
 def _explain_interruption(job: JobView, place: str) -> None:
-    done = f"after {job.iterations} of {job.iterations_planned} iterations"
+    done = f"after {job.spent}"
     if job.state is JobState.RUNNING:
         note(
             f"job {job.id} goes on in another process, {done}; follow it with\n"

@@ -18,37 +18,47 @@ if TYPE_CHECKING:
 
     from gaitswarm.jobs.port import Jobs
     from gaitswarm.views import StateView
+    from gaitswarm.views.budget import Spent
 
 _LINE_SECONDS: Final = 2.0
 """Plain lines come at most this often, and for the last iteration."""
 
 
+_LABELS: Final = {"iterations": "iteration", "designs": "design"}
+
+
 class Progress(Protocol):
     """Told about every committed iteration."""
 
-    def iteration(self, index: int, best_so_far: float | None, seconds: float) -> None:
-        """index: from 0; seconds: spent on its evaluation."""
+    def iteration(
+        self, index: int, designs: int, best_so_far: float | None, seconds: float
+    ) -> None:
+        """index: from 0; designs: judged in it; seconds: spent on their evaluation."""
 
     def remark(self, text: str) -> None:
         """One line of news."""
 
 
 @contextmanager
-def show_progress(*, iterations: int, particles: int, done: int = 0) -> Iterator[Progress]:
+def show_progress(
+    *, particles: int, iterations_planned: int, iterations: int = 0, evaluations: int = 0
+) -> Iterator[Progress]:
     """Progress of one job on stderr.
 
-    iterations: the job's budget; particles: evaluations in each; done: committed already.
+    particles: designs of one iteration, at most; iterations_planned: the budget, in iterations of
+    so many; iterations, evaluations: committed already.
     """
+    pace = _Pace(particles, iterations_planned, iterations, evaluations)
     console = stderr_console()
     if not console.is_terminal:
-        yield _Lines(iterations, particles)
+        yield _Lines(pace)
         return
 
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
     from rich.progress import Progress as RichProgress
 
     bar = RichProgress(
-        TextColumn("iteration"),
+        TextColumn("{task.description}"),
         MofNCompleteColumn(),
         BarColumn(),
         TextColumn("best {task.fields[best]}"),
@@ -57,8 +67,16 @@ def show_progress(*, iterations: int, particles: int, done: int = 0) -> Iterator
         console=console,
     )
     with bar:
-        task = bar.add_task("", total=iterations, completed=done, best="–", rate="", left="")
-        yield _Live(bar, task, _Pace(iterations, particles))
+        spent = pace.spent
+        task = bar.add_task(
+            _LABELS[spent.unit],
+            total=spent.planned,
+            completed=spent.done,
+            best="–",
+            rate="",
+            left="",
+        )
+        yield _Live(bar, task, pace)
 
 
 def watch_with_progress(jobs: Jobs, job_id: str) -> None:
@@ -67,12 +85,14 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
 
     job = jobs.job(job_id)
     with show_progress(
-        iterations=job.iterations_planned, particles=job.spec.optimizer.particles
+        particles=job.spec.optimizer.particles, iterations_planned=job.iterations_planned
     ) as progress:
         last: StateView | None = None
         for event in jobs.follow(job_id):
             if isinstance(event, IterationView):
-                progress.iteration(event.index, event.best_so_far, event.evaluate_seconds)
+                progress.iteration(
+                    event.index, event.designs, event.best_so_far, event.evaluate_seconds
+                )
             else:
                 last = event
                 progress.remark(f"job {event.id} is {event.state.value}")
@@ -101,20 +121,41 @@ def _check_success(last: StateView | None) -> None:
 
 
 class _Pace:
-    """Rate and rest, from the iterations seen."""
+    """Budget spent, rate and rest, from the iterations seen."""
 
-    def __init__(self, iterations: int, particles: int) -> None:
-        self.iterations = iterations
+    def __init__(
+        self, particles: int, iterations_planned: int, iterations: int, evaluations: int
+    ) -> None:
         self._particles = particles
+        self._planned = iterations_planned
+        self._iterations = iterations
+        self._evaluations = evaluations
         self._seen = 0
         self._seconds = 0.0
 
-    def saw(self, index: int, seconds: float) -> tuple[float, float]:
+    @property
+    def spent(self) -> Spent:
+        from gaitswarm.views.budget import budget_spent
+
+        return budget_spent(
+            self._iterations,
+            self._evaluations,
+            particles=self._particles,
+            iterations_planned=self._planned,
+        )
+
+    @property
+    def ended(self) -> bool:
+        return self._evaluations >= self._planned * self._particles
+
+    def saw(self, index: int, designs: int, seconds: float) -> tuple[float, float]:
         """(evaluations per second, seconds left) after this iteration."""
-        self._seen += 1
+        self._iterations = index + 1
+        self._evaluations += designs
+        self._seen += designs
         self._seconds += seconds
-        each = max(self._seconds / self._seen, 1e-9)
-        return self._particles / each, max(0, self.iterations - index - 1) * each
+        rate = self._seen / max(self._seconds, 1e-9)
+        return rate, max(0, self._planned * self._particles - self._evaluations) / rate
 
 
 class _Live:
@@ -123,11 +164,16 @@ class _Live:
         self._task = task
         self._pace = pace
 
-    def iteration(self, index: int, best_so_far: float | None, seconds: float) -> None:
-        rate, left = self._pace.saw(index, seconds)
+    def iteration(
+        self, index: int, designs: int, best_so_far: float | None, seconds: float
+    ) -> None:
+        rate, left = self._pace.saw(index, designs, seconds)
+        spent = self._pace.spent
         self._bar.update(
             self._task,
-            completed=index + 1,
+            description=_LABELS[spent.unit],
+            completed=spent.done,
+            total=spent.planned,
             best=number(best_so_far),
             rate=f"{rate:.1f} evaluations/s",
             left=f"{duration(left)} left",
@@ -138,21 +184,28 @@ class _Live:
 
 
 class _Lines:
-    def __init__(self, iterations: int, particles: int) -> None:
-        self._pace = _Pace(iterations, particles)
+    def __init__(self, pace: _Pace) -> None:
+        self._pace = pace
         self._next = 0.0
 
-    def iteration(self, index: int, best_so_far: float | None, seconds: float) -> None:
-        rate, left = self._pace.saw(index, seconds)
+    def iteration(
+        self, index: int, designs: int, best_so_far: float | None, seconds: float
+    ) -> None:
+        rate, left = self._pace.saw(index, designs, seconds)
         now = time.monotonic()
-        last = index + 1 == self._pace.iterations
-        if now < self._next and not last:
+        if now < self._next and not self._pace.ended:
             return
         self._next = now + _LINE_SECONDS
         note(
-            f"iteration {index + 1}/{self._pace.iterations}: best {number(best_so_far)},"
+            f"{self._place(index)}: best {number(best_so_far)},"
             f" {rate:.1f} evaluations/s, {duration(left)} left"
         )
 
     def remark(self, text: str) -> None:
         note(text)
+
+    def _place(self, index: int) -> str:
+        spent = self._pace.spent
+        if spent.unit == "iterations":
+            return f"iteration {spent.done}/{spent.planned}"
+        return f"iteration {index + 1}, {spent.done}/{spent.planned} {spent.unit}"

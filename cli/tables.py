@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
         JobSummaryView,
         JobView,
         ObjectiveView,
+        OptimizerView,
         RankingView,
         ScenarioResultView,
         SimulatedScenarioView,
@@ -56,9 +58,22 @@ def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
             job.id,
             Text(job.name or MISSING),
             Text(job.state.value, style=_STYLES.get(job.state.value, "")),
-            f"{job.iterations}/{job.iterations_planned}",
+            _spent(job),
             number(job.best_fitness),
             f"{job.created_at:%Y-%m-%d %H:%M}",
+        )
+    return table
+
+
+def optimizers_table(optimizers: Iterable[OptimizerView]) -> Table:
+    """One row a name; settings as they are by default."""
+    table = Table("name", "description", "settings", box=None)
+    for optimizer in optimizers:
+        settings = optimizer.settings.model_dump(exclude={"name"})
+        table.add_row(
+            optimizer.name,
+            Text(optimizer.description),
+            Text("\n".join(f"{name} {json.dumps(value)}" for name, value in settings.items())),
         )
     return table
 
@@ -208,7 +223,7 @@ def print_job(job: JobView) -> None:
         "name": job.name or MISSING,
         "state": job.state.value,
         "error": job.error,
-        "iterations": f"{job.iterations} of {job.iterations_planned}",
+        "iterations": _iterations(job),
         "evaluations": f"{job.evaluations} of {job.evaluations_planned}",
         "speed": None
         if job.evaluations_per_second is None
@@ -227,6 +242,18 @@ def print_job(job: JobView) -> None:
     console.print(table)
     if job.best is not None:
         print_best(job.best, job)
+
+
+def _spent(job: JobSummaryView) -> str:
+    spent = job.spent
+    unit = "" if spent.unit == "iterations" else f" {spent.unit}"
+    return f"{spent.done}/{spent.planned}{unit}"
+
+
+def _iterations(job: JobView) -> str:
+    if job.spent.unit == "iterations":
+        return f"{job.iterations} of {job.iterations_planned}"
+    return f"{job.iterations}, of {job.particles} designs at most"
 
 
 def print_best(best: BestView, job: JobView) -> None:

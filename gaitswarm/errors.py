@@ -69,7 +69,7 @@ class Interrupted(KeyboardInterrupt):
         self.job = job
         left = "goes on elsewhere" if job.state == "running" else "was given back"
         super().__init__(
-            f"job {job.id} {left} after {job.iterations} of {job.iterations_planned} iterations;"
+            f"job {job.id} {left} after {job.spent};"
             f" go on with gaitswarm.optimize(resume={job.id!r}, db={db!r})"
         )
 

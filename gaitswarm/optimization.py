@@ -15,7 +15,7 @@ from gaitswarm.jobs.embedded import Workers, check_same
 from gaitswarm.jobs.open import open as open_database
 from gaitswarm.specs import SpecInput, SpecOptions, chosen_spec
 from gaitswarm.tables import EvaluationTable, Table
-from gaitswarm.views import BestView, IterationView, JobView
+from gaitswarm.views import BestView, IterationView, JobView, OptimizerView, optimizer_views
 from services.optimizer.jobs.job import JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind
@@ -52,8 +52,9 @@ class OptimizationResult:
         """The iterations as a table.
 
         Returns:
-            One row an iteration: index, best, mean, median, worst, best_so_far (fitness, minimized,
-            NaN where every design failed), failed (designs) and evaluate_seconds [s].
+            One row an iteration: index, designs (judged in it), best, mean, median, worst,
+            best_so_far (fitness, minimized, NaN where every design failed), failed (designs) and
+            evaluate_seconds [s].
         """
         columns: dict[str, NDArray[Any]] = {
             name: np.array([getattr(i, name) for i in self.iterations], dtype=kind)
@@ -77,6 +78,7 @@ class OptimizationResult:
 
 _CONVERGENCE = {
     "index": np.int64,
+    "designs": np.int64,
     "best": np.float64,
     "mean": np.float64,
     "median": np.float64,
@@ -156,6 +158,15 @@ def optimize(
         if job.state is not JobState.SUCCEEDED:
             raise JobEnded(job)
         return OptimizationResult(job, tuple(jobs.iterations(job.id)), jobs.url)
+
+
+def optimizers() -> list[OptimizerView]:
+    """List the search methods, and presets of them, that `optimizer` may name.
+
+    Returns:
+        Each with its description, its settings and their JSON schema.
+    """
+    return optimizer_views()
 
 
 def _checked(spec: AnySpec) -> AnySpec:

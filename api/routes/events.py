@@ -30,12 +30,12 @@ router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
 
 _STREAM: Final = """\
 event: iteration
-data: {"index":24,"best":21.3,"mean":25.2,"median":23.9,"worst":41.7,"best_so_far":20.9,\
-"failed":2,"evaluate_seconds":1.23,"committed_at":"2026-01-01T12:00:00Z"}
+data: {"index":24,"designs":25,"best":21.3,"mean":25.2,"median":23.9,"worst":41.7,\
+"best_so_far":20.9,"failed":2,"evaluate_seconds":1.23,"committed_at":"2026-01-01T12:00:00Z"}
 id: 24
 
 event: state
-data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25}
+data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"evaluations":625}
 
 """
 

@@ -129,7 +129,10 @@ def resume(
 
 def extend(
     job_id: JobId,
-    iterations: Annotated[int, typer.Option(help="Iterations in all, not further ones.")],
+    iterations: Annotated[
+        int,
+        typer.Option(help="Budget in all, not further iterations."),
+    ],
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
@@ -144,8 +147,7 @@ def extend(
         print_json(job)
     else:
         stdout_console().print(
-            f"job {job.id} is {job.state}, with {job.iterations} of {job.iterations_planned}"
-            " iterations",
+            f"job {job.id} is {job.state}, with {job.spent}",
             markup=False,
         )
 

@@ -13,6 +13,7 @@ from gaitswarm.views.analysis import (
     RankingView,
 )
 from gaitswarm.views.base import View, finite
+from gaitswarm.views.budget import EstimateView
 from gaitswarm.views.catalogue import (
     CatalogueView,
     ControllerView,
@@ -36,7 +37,6 @@ from gaitswarm.views.evaluation import (
 from gaitswarm.views.iteration import HistoryIterationView, IterationView
 from gaitswarm.views.job import (
     PREFIX,
-    EstimateView,
     ExtensionRequest,
     JobSummaryView,
     JobView,

@@ -26,9 +26,10 @@ class DistributionItemView(View):
     failed: int = Field(
         description="Designs that failed in at least one scenario [1].", examples=[2]
     )
-    diversity: float = Field(
+    diversity: float | None = Field(
         description="Standard deviation of the designs as a share of each searched variable's"
-        " range, mean over these variables [1]: 0 when the swarm has come together.",
+        " range, mean over these variables [1]: 0 when the swarm has come together; null for an"
+        " iteration of a single design.",
         examples=[0.12],
     )
 
@@ -67,7 +68,7 @@ class DistributionView(View):
                 fitness=[finite(value) for value in fitness],
                 mean=finite(mean),
                 failed=failed,
-                diversity=diversity,
+                diversity=finite(diversity),
             )
             for index, fitness, mean, failed, diversity in rows
         ]

@@ -16,6 +16,10 @@ class IterationView(View):
     """One committed iteration of a job: the swarm's fitness at a glance."""
 
     index: int = Field(description="Index of the iteration, from 0.", examples=[24])
+    designs: int = Field(
+        description="Designs judged in it [1]: those that the method asked for at once.",
+        examples=[25],
+    )
     best: float | None = Field(
         description="Least fitness of this iteration [1]; null if every design failed.",
         examples=[21.3],
@@ -67,6 +71,7 @@ class HistoryIterationView(IterationView):
 def _at_a_glance(iteration: Iteration) -> dict[str, object]:
     return {
         "index": iteration.index,
+        "designs": iteration.designs,
         "best": finite(iteration.best),
         "mean": finite(iteration.mean),
         "median": finite(iteration.median),

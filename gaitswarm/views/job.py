@@ -8,10 +8,10 @@ from typing import Any, Final, Generic, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.views.base import View, finite, listing_name
+from gaitswarm.views.budget import Spent, budget_spent
 from gaitswarm.views.evaluation import BestView, ObjectiveView
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.estimate import Estimate
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import (
     LARGEST_BUDGET,
@@ -99,12 +99,22 @@ class JobSummaryView(View):
         " the spec cannot be read.",
         examples=["double"],
     )
-    particles: int = Field(
-        description="Size of the swarm [1]; 0 if the spec cannot be read.", examples=[25]
+    optimizer: str | None = Field(
+        description="Search method; null if the spec cannot be read.", examples=["pso"]
     )
-    iterations: int = Field(description="Iterations committed so far [1].", examples=[12])
+    particles: int = Field(
+        description="Designs of one iteration, at most [1]; 0 if the spec cannot be read.",
+        examples=[25],
+    )
+    iterations: int = Field(
+        description="Iterations committed so far [1]; a method that asks for fewer designs at once"
+        " takes more of them than are planned.",
+        examples=[12],
+    )
     iterations_planned: int = Field(
-        description="Budget of iterations [1]; 0 if the spec cannot be read.", examples=[25]
+        description="Budget in iterations of `particles` designs each [1]; 0 if the spec cannot be"
+        " read.",
+        examples=[25],
     )
     evaluations: int = Field(
         description="Designs judged so far, each in every scenario [1].", examples=[300]
@@ -151,6 +161,16 @@ class JobSummaryView(View):
     def last_iteration(self) -> int | None:
         """Index of the last committed iteration; None before the first."""
         return self.iterations - 1 if self.iterations else None
+
+    @property
+    def spent(self) -> Spent:
+        """How much of its budget it has spent."""
+        return budget_spent(
+            self.iterations,
+            self.evaluations,
+            particles=self.particles,
+            iterations_planned=self.iterations_planned,
+        )
 
     @classmethod
     def from_job(cls, job: Job) -> JobSummaryView:
@@ -230,7 +250,8 @@ class ExtensionRequest(BaseModel):
     iterations: int = Field(
         ge=1,
         le=LARGEST_BUDGET,
-        description="Iterations in all, more than the job has committed [1].",
+        description="Budget in all, in iterations of `particles` designs each: more than the job"
+        " has spent [1].",
         examples=[50],
     )
 
@@ -255,6 +276,7 @@ class StateView(View):
     state: JobState = Field(description="The state that it is in now.", examples=["succeeded"])
     error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
     iterations: int = Field(description="Iterations committed so far [1].", examples=[25])
+    evaluations: int = Field(description="Designs judged in them [1].", examples=[625])
 
     @classmethod
     def from_job(cls, job: Job) -> StateView:
@@ -263,7 +285,13 @@ class StateView(View):
         Args:
             job: as it was read.
         """
-        return cls(id=job.id, state=job.state, error=job.error, iterations=job.progress.iterations)
+        return cls(
+            id=job.id,
+            state=job.state,
+            error=job.error,
+            iterations=job.progress.iterations,
+            evaluations=job.progress.evaluations,
+        )
 
 
 def job_links(job: Job) -> dict[str, str]:
@@ -330,42 +358,8 @@ def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
         "controller": spec.controller if isinstance(spec, JobSpec) else None,
         "scenarios": scenarios,
         "precision": None if isinstance(spec, UnreadableSpec) else spec.precision,
+        "optimizer": None if isinstance(spec, UnreadableSpec) else spec.optimizer.name,
         "particles": particles,
         "iterations_planned": spec.iterations,
         "evaluations_planned": spec.iterations * particles,
     }
-
-
-class EstimateView(View):
-    """What a job would cost if it were submitted."""
-
-    evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
-    walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
-    simulated_seconds: float = Field(
-        description="Length of all walks together [s]; less for designs that fall.",
-        examples=[20250.0],
-    )
-    seconds: float | None = Field(
-        description="How long it will take, once it runs and has the machine for itself [s]; null"
-        " if that is unknown.",
-        examples=[21.5],
-    )
-    basis: str = Field(
-        description="What that is derived from.",
-        examples=["the rate of 2 earlier jobs with the same kind of walks: 942 simulated s/s"],
-    )
-
-    @classmethod
-    def from_estimate(cls, estimate: Estimate) -> EstimateView:
-        """Make a view of an estimate.
-
-        Args:
-            estimate: as the service makes it.
-        """
-        return cls(
-            evaluations=estimate.evaluations,
-            walks=estimate.walks,
-            simulated_seconds=estimate.simulated_seconds,
-            seconds=estimate.seconds,
-            basis=estimate.basis,
-        )

@@ -6,7 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from services.optimizer.analysis.distribution import Distribution, distribution
+from services.optimizer.analysis.distribution import (
+    Distribution,
+    distribution,
+    iteration_starts,
+)
 from services.optimizer.analysis.history import PIECE, HistoryCache, read_columns, read_history
 from services.optimizer.analysis.identifiability import (
     Identifiability,
@@ -321,7 +325,7 @@ class JobService:
 
         Args:
             job: As it was read; iterations committed later are left out.
-            rows: Evaluations in a piece at most, but one iteration at least.
+            rows: Evaluations in a piece on average, but one iteration at least.
 
         Returns:
             Whole iterations, in order.
@@ -344,11 +348,10 @@ class JobService:
         Raises:
             Conflict: the job is too large to be held in memory.
         """
-        particles = job.spec.optimizer.particles
         columns = self.columns(job).after(after)
-        page = columns.rows(slice(limit * particles))
-        spread = distribution(page, job.spec.design_space(), particles)
-        return spread, len(page) < len(columns)
+        following = iteration_starts(columns)[limit:]
+        page = columns.rows(slice(int(following[0]) if len(following) else None))
+        return distribution(page, job.spec.design_space()), len(following) > 0
 
     def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
         """Judge all designs by another preference, from what is stored.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim, JobState
+from services.optimizer.jobs.job import Claim, JobState, Progress
 from services.optimizer.jobs.spec import judge_outcomes
 from services.optimizer.run.coordinator import Backoff, Coordination, Phase, handle
 from services.optimizer.run.events import (
@@ -109,6 +109,15 @@ def test_the_ask_is_stored_before_it_is_sent_out() -> None:
     )
     assert sent.request.cases == SPEC.cases({})
     assert sent.request.iterations_left == SPEC.iterations - 1
+
+
+def test_iterations_left_are_those_of_the_designs_left() -> None:
+    position = np.array([[variable.low for variable in SPEC.design_space().variables]])
+    judged = replace(job(), progress=Progress(iterations=3, evaluations=3))
+    claim = Claim(judged, "runner", 1, Ask(3, position, {}))
+    _, (*_, sent) = handle(Coordination(), Claimed(claim, HERE))
+    assert isinstance(sent, Evaluate)
+    assert sent.request.iterations_left == SPEC.budget - 4
 
 
 @pytest.mark.parametrize("crash_before", range(2 * SPEC.iterations + 1))

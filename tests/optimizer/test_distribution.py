@@ -32,7 +32,7 @@ def test_quantiles_are_numpys_over_the_finite_values(values: list[float], failed
 
 
 def test_failed_designs_are_counted_and_left_out() -> None:
-    found = distribution(fitness_only((4.0, INF, 2.0), (INF, INF, INF)), SPACE, 3)
+    found = distribution(fitness_only((4.0, INF, 2.0), (INF, INF, INF)), SPACE)
     assert found.index.tolist() == [0, 1]
     assert found.failed.tolist() == [1, 3]
     assert found.mean[0] == 3.0 and math.isnan(found.mean[1])
@@ -43,11 +43,11 @@ def test_failed_designs_are_counted_and_left_out() -> None:
 def test_diversity_is_a_share_of_the_range_of_what_is_searched() -> None:
     designs = np.array([[0.0, 3.0], [10.0, 3.0], [4.0, 3.0], [4.0, 3.0]])
     columns = columns_of(np.ones((4, 1, 6)), particles=2, designs=designs)
-    assert distribution(columns, SPACE, 2).diversity.tolist() == [0.5, 0.0]
+    assert distribution(columns, SPACE).diversity.tolist() == [0.5, 0.0]
 
 
 def test_no_iteration_has_no_distribution() -> None:
-    found = distribution(columns_of(np.empty((0, 1, 6)), designs=np.empty((0, 2))), SPACE, 3)
+    found = distribution(columns_of(np.empty((0, 1, 6)), designs=np.empty((0, 2))), SPACE)
     assert len(found.index) == len(found.mean) == 0
     assert found.fitness.shape == (0, len(QUANTILES))
 

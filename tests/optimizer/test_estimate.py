@@ -14,6 +14,7 @@ from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import Job, Progress
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.swarm.pso import PsoSettings
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.batch import Walking
@@ -38,7 +39,7 @@ SPEC = JobSpec.model_validate(
 
 
 class NoMeasurement(MeasuredRates):
-    def rate(self, spec: Spec, cases: object) -> tuple[float | None, str]:
+    def rate(self, spec: Spec, cases: object, positions: object) -> tuple[float | None, str]:
         return None, "nothing"
 
 
@@ -99,8 +100,33 @@ def test_without_a_job_alike_a_walk_is_measured_once(monkeypatch: pytest.MonkeyP
     first = estimate(SPEC, SPEC.cases({}), (), rates)
     assert first.seconds is not None and 0.0 < first.seconds < 60.0
     assert "measured on this machine" in first.basis
-    monkeypatch.setattr("services.optimizer.jobs.estimate.create_optimizer", None)
+    monkeypatch.setattr("sim.case.simulating", None)
     assert estimate(SPEC, SPEC.cases({}), (), rates) == first
+
+
+def test_jobs_that_walk_fewer_designs_at_once_are_of_another_speed() -> None:
+    one_by_one = done(SPEC, 40, 1.0)
+    one_by_one = replace(one_by_one, progress=replace(one_by_one.progress, iterations=40))
+    assert estimated(SPEC, one_by_one) == (None, "nothing")
+    assert estimated(SPEC, one_by_one, done(SPEC, 50, 2.0))[0] == pytest.approx(2.0)
+
+
+@pytest.mark.slow
+def test_a_method_that_asks_for_one_design_at_a_time_is_measured_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    walked: list[int] = []
+
+    def noted(*arguments: Any, **options: Any) -> Walking[Simulation]:
+        *_, designs = arguments
+        walked.append(len(designs))
+        return simulating(*arguments, **options)
+
+    monkeypatch.setattr("sim.case.simulating", noted)
+    single = SPEC.model_copy(update={"optimizer": RandomSearchSettings(particles=1)})
+    found = estimate(single, single.cases({}), (), MeasuredRates())
+    assert found.seconds is not None
+    assert set(walked) == {1}
 
 
 @pytest.mark.slow

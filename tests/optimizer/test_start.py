@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.registry import METHODS, MethodName, create_search
 from services.optimizer.search.replayed import Proposals, Replayed, Start
 from services.optimizer.search.space import Axis, Space
+from services.optimizer.search.swarm.pso import PsoSettings
 
 Floats = NDArray[np.float64]
 

@@ -26,7 +26,8 @@ class Distribution:
         mean: (I,) of the same values.
         failed: (I,) number of the other designs.
         diversity: (I,) standard deviation of the swarm's designs as a share of each searched
-            variable's range, mean over these variables [1]; 0 for a swarm that has come together.
+            variable's range, mean over these variables [1]; 0 for a swarm that has come together,
+            NaN for a single design.
     """
 
     index: NDArray[np.int64]
@@ -36,30 +37,60 @@ class Distribution:
     diversity: Floats
 
 
-def distribution(columns: EvaluationColumns, space: DesignSpace, particles: int) -> Distribution:
+def distribution(columns: EvaluationColumns, space: DesignSpace) -> Distribution:
     """Say how the swarm is spread, iteration by iteration.
 
     Args:
-        columns: whole iterations, in order.
+        columns: whole iterations, in order, of any number of designs each.
         space: of their job.
-        particles: rows of every iteration.
 
     Returns:
         The distribution, in the order of the rows.
     """
-    fitness = columns.fitness.reshape(-1, particles)
+    starts = iteration_starts(columns)
+    sizes = np.diff(starts, append=len(columns))
+    found = Distribution(
+        index=columns.iteration[starts],
+        fitness=np.empty((len(starts), len(QUANTILES))),
+        mean=np.empty(len(starts)),
+        failed=np.empty(len(starts), dtype=np.int64),
+        diversity=np.empty(len(starts)),
+    )
+    searched = len(space.variables)
+    share = space.box.to_unit(columns.designs[:, :searched])
+    # Iterations of one size at once, as most methods' are all of one or two sizes.
+    for size in np.unique(sizes):
+        chosen = sizes == size
+        rows = starts[chosen][:, np.newaxis] + np.arange(size)
+        _describe(found, chosen, columns.fitness[rows], share[rows])
+    return found
+
+
+def _describe(
+    found: Distribution, chosen: NDArray[np.bool_], fitness: Floats, share: Floats
+) -> None:
+    """Fill in iterations of n designs: fitness (i, n), share of the variables' ranges (i, n, d)."""
+    size = fitness.shape[1]
     finite = np.isfinite(fitness)
     count = finite.sum(axis=1)
     # A mean of huge values may overflow; such a mean is as good as none.
     with np.errstate(over="ignore", invalid="ignore"):
-        mean = np.where(finite, fitness, 0.0).sum(axis=1) / count
-    return Distribution(
-        index=columns.iteration[::particles],
-        fitness=finite_quantiles(fitness, QUANTILES),
-        mean=mean,
-        failed=particles - count,
-        diversity=_diversity(columns, space, particles),
-    )
+        found.mean[chosen] = np.where(finite, fitness, 0.0).sum(axis=1) / count
+    found.fitness[chosen] = finite_quantiles(fitness, QUANTILES)
+    found.failed[chosen] = size - count
+    found.diversity[chosen] = share.std(axis=1).mean(axis=1) if size > 1 else np.nan
+
+
+def iteration_starts(columns: EvaluationColumns) -> NDArray[np.intp]:
+    """Where each iteration begins.
+
+    Args:
+        columns: whole iterations, in order.
+
+    Returns:
+        (I,) row of the first design of each.
+    """
+    return np.flatnonzero(np.diff(columns.iteration, prepend=-1))
 
 
 def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
@@ -85,13 +116,6 @@ def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
     return np.where(last[:, np.newaxis] >= 0, between, np.nan)
 
 
-def _diversity(columns: EvaluationColumns, space: DesignSpace, particles: int) -> Floats:
-    searched = len(space.variables)
-    share = space.box.to_unit(columns.designs[:, :searched])
-    spread: Floats = share.reshape(-1, particles, searched).std(axis=1).mean(axis=1)
-    return spread
-
-
 def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
     """Choose whole iterations evenly, from the first to the last, for a picture of all.
 
@@ -109,12 +133,16 @@ def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
     if rows <= most:
         return np.arange(rows)
     best = np.argmin(columns.fitness)
-    starts = np.flatnonzero(np.diff(columns.iteration, prepend=-1))
-    particles = rows // len(starts)
-    iterations = (most - 1) // particles
-    if iterations < 1:
-        chosen = np.linspace(0, rows - 1, most - 1).round().astype(np.intp)
-    else:
+    starts = iteration_starts(columns)
+    sizes = np.diff(starts, append=rows)
+    chosen = np.linspace(0, rows - 1, most - 1).round().astype(np.intp)
+    # As many as fit if all were of the mean size; fewer if larger ones are among them.
+    iterations = (most - 1) * len(starts) // rows
+    while iterations >= 1:
         kept = np.linspace(0, len(starts) - 1, iterations).round().astype(np.intp)
-        chosen = (starts[kept][:, np.newaxis] + np.arange(particles)).reshape(-1)
+        taken = int(sizes[kept].sum())
+        if taken < most:
+            chosen = np.concatenate([np.arange(starts[k], starts[k] + sizes[k]) for k in kept])
+            break
+        iterations = min(iterations - 1, iterations * (most - 1) // taken)
     return np.unique(np.append(chosen, best))

@@ -69,16 +69,22 @@ def read_columns(store: Store, job: Job, *, rows: int) -> Iterator[EvaluationCol
     Args:
         store: where they are.
         job: as it was read; iterations committed later are left out.
-        rows: evaluations in a piece at most, but one iteration at least.
+        rows: evaluations in a piece on average, but one iteration at least.
 
     Yields:
         Whole iterations, in order.
     """
-    step = max(1, rows // job.spec.optimizer.particles)
+    step = _iterations_of(rows, job)
     for first in range(0, job.progress.iterations, step):
         piece = store.evaluation_columns(job.id, first, min(first + step, job.progress.iterations))
         if piece is not None:
             yield piece
+
+
+def _iterations_of(rows: int, job: Job) -> int:
+    """How many iterations of a job have so many evaluations on average; one at least."""
+    progress = job.progress
+    return max(1, rows * progress.iterations // max(1, progress.evaluations))
 
 
 class HistoryCache:
@@ -134,8 +140,7 @@ class HistoryCache:
 
     def _read_on(self, history: _History, job: Job) -> None:
         first = history.iterations
-        piece = max(1, PIECE // job.spec.optimizer.particles)
-        last = min(first + piece, job.progress.iterations)
+        last = min(first + _iterations_of(PIECE, job), job.progress.iterations)
         found = self._store.evaluation_columns(job.id, first, last)
         if found is not None:
             history.append(found)

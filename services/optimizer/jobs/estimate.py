@@ -10,10 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.spec import Spec, create_optimizer
 from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.random_stream import RandomNumbers
 from sim.case import Case, Walk
 from sim.outcome import Status
 from sim.simulate import prepare
@@ -65,14 +69,15 @@ def estimate(
     """
     evaluations = spec.budget
     one = duration(spec, cases)
-    alike = [job for job in earlier if _alike(job, spec)][:_MOST_JOBS]
+    positions = create_optimizer(spec).ask()
+    alike = [job for job in earlier if _alike(job, spec, len(positions))][:_MOST_JOBS]
     if alike:
         walked = sum(_simulated_seconds(job, one) for job in alike)
         rate: float | None = walked / sum(job.progress.compute_seconds for job in alike)
         jobs = "1 earlier job" if len(alike) == 1 else f"{len(alike)} earlier jobs"
         basis = f"the rate of {jobs} with the same kind of walks: {rate:.3g} simulated s/s"
     else:
-        rate, basis = measured.rate(spec, cases)
+        rate, basis = measured.rate(spec, cases, positions)
     simulated = evaluations * one
     return Estimate(
         evaluations=evaluations,
@@ -112,7 +117,9 @@ class MeasuredRates:
         self._lock = threading.Lock()
         self._rates: OrderedDict[str, float] = OrderedDict()
 
-    def rate(self, spec: Spec, cases: Sequence[Case]) -> tuple[float | None, str]:
+    def rate(
+        self, spec: Spec, cases: Sequence[Case], positions: NDArray[np.float64]
+    ) -> tuple[float | None, str]:
         """Measure, unless it was measured before, how fast walks of a spec are simulated.
 
         Compiles the robot's kernel if need be, as the job itself would.
@@ -120,6 +127,7 @@ class MeasuredRates:
         Args:
             spec: of a job.
             cases: those of the spec.
+            positions: (n, d) that its method asks for first; as many walk at once.
 
         Returns:
             Simulated seconds per second on all cores, None without a compiled kernel or a design
@@ -131,8 +139,8 @@ class MeasuredRates:
         affinity = getattr(os, "sched_getaffinity", None)
         cores = len(affinity(0)) if affinity else os.cpu_count() or 1
         with self._lock:
-            key = _kind_of_walk(spec)
-            rate = self._rates.pop(key, None) or _measure(spec, cases)
+            key = f"{_kind_of_walk(spec)} {min(_MEASURED, len(positions))}"
+            rate = self._rates.pop(key, None) or _measure(spec, cases, positions)
             if rate is None:
                 return None, "nothing: the designs that were tried are beyond the legs' reach"
             self._rates[key] = rate
@@ -144,21 +152,26 @@ class MeasuredRates:
         )
 
 
-def _measure(spec: Spec, cases: Sequence[Case]) -> float | None:
-    """Simulated seconds per second of one core: the swarm's first designs in the shortest case.
+def _measure(spec: Spec, cases: Sequence[Case], positions: NDArray[np.float64]) -> float | None:
+    """Simulated seconds per second of one core: a search's first designs in the shortest case.
 
     None if none of them can begin to walk.
     """
-    positions = create_optimizer(spec).ask()[:_MEASURED]
     space = spec.design_space()
-    designs = space.simulated(space.designs(positions))
+    at_once = min(_MEASURED, len(positions))
+    if at_once < _MEASURED:
+        # A method that asks for few at a time would have nothing measured if those cannot walk.
+        positions = space.box.evenly(
+            RandomNumbers(spec.seed, 0).uniform(_MEASURED, space.box.dimension)
+        )
+    designs = space.simulated(space.designs(positions[:_MEASURED]))
     case = _shortened(min(cases, key=lambda case: case.duration))
     # The first walk pays for what later ones find ready: tables, and memory that is mapped.
     case.run(designs[:1])
     begun = time.perf_counter()
-    outcome = case.run(designs)
+    outcomes = [case.run(designs[i : i + at_once]) for i in range(0, _MEASURED, at_once)]
     elapsed = time.perf_counter() - begun
-    walked = int((outcome.statuses != Status.UNREACHABLE).sum())
+    walked = sum(int((outcome.statuses != Status.UNREACHABLE).sum()) for outcome in outcomes)
     return walked * duration(spec, [case]) / elapsed if walked else None
 
 
@@ -171,10 +184,16 @@ def _shortened(case: Case) -> Case:
     return replace(case, scenario=scenario.model_copy(update={"cycles": cycles}))
 
 
-def _alike(job: Job, spec: Spec) -> bool:
-    """Whether a job has run walks of the same kind; a fit, to the same recordings."""
+def _alike(job: Job, spec: Spec, asked: int) -> bool:
+    """Whether a job has run walks of the same kind; a fit, to the same recordings.
+
+    Few at once take longer each than many; asked: how many the spec's method asks for first.
+    """
+    progress = job.progress
     return (
-        job.progress.compute_seconds > 0.0
+        progress.compute_seconds > 0.0
+        and min(_MEASURED, round(progress.evaluations / progress.iterations))
+        == min(_MEASURED, asked)
         and _kind_of_walk(job.spec) == _kind_of_walk(spec)
         and job.spec.recording_ids == spec.recording_ids
     )

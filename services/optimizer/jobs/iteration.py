@@ -62,6 +62,7 @@ class Iteration:
 
     Attributes:
         index: from 0.
+        designs: how many were judged in it.
         best: least fitness of the swarm, None if every design failed; `mean`, `median` and `worst`
             likewise, over the finite values.
         best_so_far: least fitness of this and all earlier iterations.
@@ -71,6 +72,7 @@ class Iteration:
     """
 
     index: int
+    designs: int
     best: float | None
     mean: float | None
     median: float | None

@@ -125,6 +125,7 @@ class Coordination:
         provenance: What its numbers depend on.
         answered: The last answered ask, where the claim brought no other to go on with.
         best_fitness: Of the best committed design, in double precision; +inf if there is none.
+        evaluations: Designs judged in committed iterations.
         ask: What is being evaluated.
         done: The iteration, once its ask is evaluated and until it is committed.
         following: Of a commit under way: the ask after it.
@@ -138,6 +139,7 @@ class Coordination:
     provenance: JobProvenance | None = None
     answered: Answered | None = None
     best_fitness: float = math.inf
+    evaluations: int = 0
     ask: Ask | None = None
     done: CompletedIteration | None = None
     following: Ask | None = None
@@ -215,6 +217,7 @@ def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Act
         provenance=event.provenance,
         answered=claim.answered,
         best_fitness=math.inf if job.progress.best_fitness is None else job.progress.best_fitness,
+        evaluations=job.progress.evaluations,
         ask=claim.ask,
     )
     is_known = job.provenance and refused is None and not job.accepts_changes
@@ -289,6 +292,7 @@ def _go_on(state: Coordination, stored: JobState) -> tuple[Coordination, tuple[A
     state = replace(
         state,
         best_fitness=min(state.best_fitness, math.inf if found is None else found[1]),
+        evaluations=state.evaluations + len(_done(state).fitness),
         ask=state.following,
         following=None,
         done=None,
@@ -338,13 +342,15 @@ def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> 
     job, ask = _current(state)
     if state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
+    asked = len(ask.positions)
     return Evaluate(
         EvaluationRequest(
             job_id=job.id,
             cases=spec.cases(state.recordings),
             designs=spec.design_space().simulated(designs),
             provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
-            iterations_left=max(0, spec.iterations - ask.iteration - 1),
+            # As many as there are if the next ones are as large as this one.
+            iterations_left=max(0, -(-(spec.budget - state.evaluations - asked) // asked)),
         )
     )
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from sqlalchemy import func, select
 
 from services.optimizer.jobs.iteration import (
     Ask,
@@ -19,15 +20,28 @@ from services.optimizer.jobs.iteration import (
     Iteration,
     Reevaluation,
 )
-from services.optimizer.store.tables import iterations
+from services.optimizer.store.tables import evaluations, iterations
 from sim.outcome import Status
 
 Row = Mapping[Any, Any]
 """Columns of one row by name, as selected or as they are about to be."""
 
 
-LISTED: Final = tuple(
-    column for column in iterations.c if column.name not in ("positions", "optimizer_state")
+_DESIGNS: Final = (
+    select(func.max(evaluations.c.particle) + 1)
+    .where(
+        evaluations.c.job_id == iterations.c.job_id,
+        evaluations.c.iteration == iterations.c.iteration,
+    )
+    .correlate(iterations)
+    .scalar_subquery()
+    .label("designs")
+)
+"""How many designs an iteration has; particles are counted from 0, and the index has the last."""
+
+LISTED: Final = (
+    *(c for c in iterations.c if c.name not in ("positions", "optimizer_state")),
+    _DESIGNS,
 )
 """Columns of an iteration as it is listed: an ask is a hundred times as long as all others."""
 
@@ -36,13 +50,14 @@ def to_iteration(row: Row) -> Iteration:
     """A committed iteration from its row.
 
     Args:
-        row: The columns `LISTED` of `iterations`.
+        row: The columns `LISTED`.
 
     Returns:
         The iteration, without its particles.
     """
     return Iteration(
         index=row["iteration"],
+        designs=row["designs"],
         best=row["best"],
         mean=row["mean"],
         median=row["median"],

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from services.optimizer.analysis.ratio import Interval, median_interval, median_ratio
+from services.optimizer.jobs.optimizer_choice import with_settings
 from services.optimizer.jobs.preference import figure_of_merit
 from services.optimizer.jobs.tuning import JobSpec
 
@@ -137,7 +138,6 @@ def _runs(chapter: int, controller: str, name: str, robot: object, budget: Budge
     from pydantic import ValidationError
 
     from gaitswarm.errors import invalid_request
-    from gaitswarm.specs import with_particles
 
     study = CHAPTERS[chapter]
     particles, iterations = (
@@ -149,7 +149,7 @@ def _runs(chapter: int, controller: str, name: str, robot: object, budget: Budge
         "controller": controller,
         "scenarios": study["scenarios"],
         "preference": study["preference"],
-        "optimizer": with_particles(budget.optimizer, particles),
+        "optimizer": with_settings(budget.optimizer, {"particles": particles}),
         "iterations": iterations,
         "precision": budget.precision,
     }

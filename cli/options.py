@@ -75,13 +75,23 @@ class SpecOptions:
             help="Job spec as JSON; `-` reads standard input. Without one: the chapter-4 job.",
         ),
     ] = None
-    iterations: Annotated[int | None, typer.Option(help="Iterations to run.")] = None
-    particles: Annotated[int | None, typer.Option(help="Size of the swarm.")] = None
+    iterations: Annotated[
+        int | None, typer.Option(help="Budget, in iterations of so many designs as --particles.")
+    ] = None
+    particles: Annotated[int | None, typer.Option(help="Designs of one iteration, at most.")] = None
     optimizer: Annotated[
         str | None,
         typer.Option(
-            help="Search method with its settings: pso, or pso-thesis with the thesis's constant"
-            " inertia."
+            metavar="NAME",
+            help="Search method: pso, pso-thesis, auto, ...; `gaitswarm optimizers` lists all.",
+        ),
+    ] = None
+    optimizer_settings: Annotated[
+        str | None,
+        typer.Option(
+            metavar="JSON|FILE",
+            help="Settings of the method that are not its defaults, such as"
+            " '{\"inertia_end\": 0.5}'.",
         ),
     ] = None
     seed: Annotated[int | None, typer.Option(help="Source of all randomness.")] = None

@@ -57,12 +57,7 @@ def build_spec(options: SpecOptions) -> AnySpec:
         chosen["scenarios"] = scenario_data(options.scenarios)
     if options.robot is not None:
         chosen["robot"] = chosen_robot(options.robot)
-    particles = chosen.pop("particles", None)
-    if particles is not None:
-        from gaitswarm.specs import with_particles
-
-        optimizer = chosen.get("optimizer", data.get("optimizer", {}))
-        chosen["optimizer"] = with_particles(optimizer, particles)
+    _lay_settings(chosen, data.get("optimizer", {}))
     with_gait = chosen.pop("with_gait", False)
     file = _add_start(chosen, data)
     try:
@@ -86,6 +81,40 @@ def _add_start(chosen: dict[str, Any], data: Mapping[str, Any]) -> StartFile | N
     found = start_from(source, count)
     chosen["start"] = found.designs if isinstance(found, StartFile) else found
     return found if isinstance(found, StartFile) else None
+
+
+def _lay_settings(chosen: dict[str, Any], asked: object) -> None:
+    """Settings and particles over `optimizer`; asked: that of the file. Raises InvalidRequest."""
+    from services.optimizer.jobs.optimizer_choice import with_settings
+
+    text, particles = chosen.pop("optimizer_settings", None), chosen.pop("particles", None)
+    settings = {} if text is None else _settings_object(text)
+    if particles is not None:
+        settings["particles"] = particles
+    if not settings:
+        return
+    named = with_settings(chosen.get("optimizer", asked), {})
+    if "optimizer" in chosen and isinstance(named, Mapping):
+        method = named["name"]
+        if settings.get("name", method) != method:
+            raise InvalidRequest(
+                f"are those of {settings['name']}, but the optimizer is {chosen['optimizer']};"
+                " leave out one of both names",
+                field="optimizer-settings",
+            )
+    chosen["optimizer"] = with_settings(named, settings)
+
+
+def _settings_object(text: str) -> dict[str, Any]:
+    """A JSON object as text, or that in FILE or @FILE. Raises InvalidRequest."""
+    field = "optimizer-settings"
+    if not text.lstrip().startswith("{"):
+        return read_json_object(Path(text.removeprefix("@")), field)
+    try:
+        value: dict[str, Any] = json.loads(text, object_pairs_hook=_without_repeats)
+    except (ValueError, RecursionError) as error:
+        raise InvalidRequest(f"is not valid JSON: {error}", field=field) from error
+    return value
 
 
 def _searching_gait(spec: AnySpec) -> AnySpec:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
     from gaitswarm.jobs.port import JobEvent, Jobs
     from gaitswarm.jobs.server import ServerJobs
-    from gaitswarm.optimization import OptimizationResult, optimize
+    from gaitswarm.optimization import OptimizationResult, optimize, optimizers
     from gaitswarm.simulation import simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
     from gaitswarm.specs import SpecOptions
@@ -64,6 +64,10 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.preference import PREFERENCES, Preference
     from services.optimizer.jobs.tuning import JobSpec
     from services.optimizer.run.coordinator import Backoff
+    from services.optimizer.search.automatic import AutoSettings
+    from services.optimizer.search.local.nelder_mead import NelderMeadSettings
+    from services.optimizer.search.local.pattern_search import PatternSearchSettings
+    from services.optimizer.search.random_search import RandomSearchSettings
     from services.optimizer.search.swarm.pso import PsoSettings
     from sim.calibration.targets import Target, TargetWalk
     from sim.controllers import CONTROLLERS
@@ -86,6 +90,7 @@ __all__ = [
     "AsyncDatabaseJobs",
     "AsyncJobs",
     "AsyncServerJobs",
+    "AutoSettings",
     "Backoff",
     "BestView",
     "CalibrationSpec",
@@ -109,11 +114,14 @@ __all__ = [
     "JobView",
     "Jobs",
     "LeaseLost",
+    "NelderMeadSettings",
     "NotFound",
     "OptimizationResult",
+    "PatternSearchSettings",
     "Preference",
     "ProvenanceChanged",
     "PsoSettings",
+    "RandomSearchSettings",
     "RankingView",
     "RecordedWalk",
     "RobotFiles",
@@ -142,6 +150,7 @@ __all__ = [
     "open",
     "open_async",
     "optimize",
+    "optimizers",
     "simulate",
 ]
 
@@ -158,7 +167,7 @@ _MODULES: Final = {
     "gaitswarm.jobs.open": ("connect", "connect_async", "open", "open_async"),
     "gaitswarm.jobs.port": ("JobEvent", "Jobs"),
     "gaitswarm.jobs.server": ("ServerJobs",),
-    "gaitswarm.optimization": ("OptimizationResult", "optimize"),
+    "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
     "gaitswarm.simulation": ("simulate",),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
     "gaitswarm.specs": ("SpecOptions",),
@@ -175,7 +184,11 @@ _MODULES: Final = {
     "services.optimizer.jobs.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.tuning": ("JobSpec",),
+    "services.optimizer.search.automatic": ("AutoSettings",),
+    "services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
+    "services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
     "services.optimizer.search.swarm.pso": ("PsoSettings",),
+    "services.optimizer.search.random_search": ("RandomSearchSettings",),
     "services.optimizer.run.coordinator": ("Backoff",),
     "sim.controllers": ("CONTROLLERS",),
     "sim.calibration.targets": ("Target", "TargetWalk"),

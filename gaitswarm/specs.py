@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias, TypedDict, cast
 
@@ -13,12 +12,11 @@ from pydantic import ValidationError
 from gaitswarm.errors import InvalidRequest, invalid_request
 from gaitswarm.start import StartFile, start_from
 from services.optimizer.jobs.documents import SPECS, AnySpec
-from services.optimizer.jobs.optimizer_choice import optimizer_settings
+from services.optimizer.jobs.optimizer_choice import with_settings
 from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.registry import OptimizerName, OptimizerSettings
+from services.optimizer.search.automatic import ChoiceName, ChosenSettings
 from sim.controllers import ControllerName
 from sim.kernel.walk import Precision
 from sim.robot import RobotFiles, RobotVariant
@@ -60,10 +58,11 @@ class SpecOptions(TypedDict, total=False):
         fixed: Variables held at one value, by name, in their units; a categorical one at a choice's
             name.
         preference: How objectives are weighed.
-        optimizer: Settings of the search, or the name of a preset: `pso`, or `pso-thesis` with the
-            thesis's constant inertia.
-        particles: Designs of one iteration, in place of `optimizer`'s.
-        iterations: Budget: iterations of the swarm.
+        optimizer: Search method: a name of `gaitswarm.optimizers()`, settings such as
+            `PsoSettings`, or a document of some, `{"name": "pso", "inertia_end": 0.4}`; what it
+            does not set has the method's default.
+        particles: Designs of one iteration, at most, in place of `optimizer`'s.
+        iterations: Budget, in iterations of `particles` designs each.
         seed: Source of all randomness; the same seed gives the same bits.
         start: Designs that are judged first, and that the search begins with if its method can:
             values by name, a CSV file, or the ids of earlier jobs, separated by commas, for their
@@ -79,7 +78,7 @@ class SpecOptions(TypedDict, total=False):
     variables: Sequence[str | Variable | Document]
     fixed: Mapping[str, float | str]
     preference: PreferenceInput
-    optimizer: OptimizerName | OptimizerSettings | Document
+    optimizer: ChoiceName | ChosenSettings | Document
     particles: int
     iterations: int
     seed: int
@@ -110,7 +109,7 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
         given["scenarios"] = scenario_entries(given["scenarios"])
     if "particles" in given:
         settings = given.get("optimizer", document.get("optimizer", {}))
-        given["optimizer"] = with_particles(settings, given.pop("particles"))
+        given["optimizer"] = with_settings(settings, {"particles": given.pop("particles")})
     file = None
     if isinstance(given.get("start"), str | os.PathLike):
         source = start_from(given["start"])
@@ -122,23 +121,6 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     except ValidationError as error:
         refused = invalid_request(error, document)
         raise (refused if file is None else file.located(refused)) from error
-
-
-def with_particles(optimizer: object, particles: object) -> object:
-    """An optimizer with another size of its iterations.
-
-    Args:
-        optimizer: Settings, a document of some, or the name of a preset.
-        particles: Designs of one iteration.
-
-    Returns:
-        A document; what is none of these as it is, for validation to refuse.
-    """
-    with suppress(ValueError):
-        optimizer = optimizer_settings(optimizer)
-    if isinstance(optimizer, SearchSettings):
-        optimizer = optimizer.model_dump()
-    return {**optimizer, "particles": particles} if isinstance(optimizer, Mapping) else optimizer
 
 
 def scenario_entries(

@@ -1,4 +1,4 @@
-"""`gaitswarm optimize`: one job, run by this process from beginning to end."""
+"""`gaitswarm optimize`: one job, run by this process; `optimizers`: the methods it may name."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from cli.options import AcceptChanges, Json, SpecOptions, WorkerOptions, with_gr
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command."""
+    """Add the commands."""
     app.command()(optimize)
+    app.command()(optimizers)
 
 
 @with_groups
@@ -71,3 +72,15 @@ def optimize(
         note(f"job {job.id} in database {url}")
         interrupted = embedded.run(jobs, store, job, claim)
         finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published)
+
+
+def optimizers(as_json: Json = False) -> None:
+    """List search methods with what can be set of them."""
+    from cli.output import print_json_list, stdout_console
+    from cli.tables import optimizers_table
+    from gaitswarm.views import optimizer_views
+
+    if as_json:
+        print_json_list(optimizer_views())
+    else:
+        stdout_console().print(optimizers_table(optimizer_views()))

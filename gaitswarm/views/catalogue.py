@@ -8,12 +8,13 @@ from pydantic import ConfigDict, Field
 
 from gaitswarm.views.base import View, listing_name
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
-from services.optimizer.search.registry import (
-    METHODS,
-    OPTIMIZERS,
-    OptimizerName,
-    OptimizerSettings,
+from services.optimizer.search.automatic import (
+    AUTO_SUMMARY,
+    CHOICES,
+    ChoiceName,
+    ChosenSettings,
 )
+from services.optimizer.search.registry import METHODS
 from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
 from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
@@ -72,12 +73,12 @@ class PreferenceView(Preference):
 class OptimizerView(View):
     """A search method by its default settings, or a preset of one."""
 
-    name: OptimizerName = Field(description="Name, as in job specs.", examples=["pso-thesis"])
+    name: ChoiceName = Field(description="Name, as in job specs.", examples=["pso-thesis"])
     description: str = Field(
         description="What the method is, with its source.",
         examples=["Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)"],
     )
-    settings: OptimizerSettings = Field(description="What the name stands for.")
+    settings: ChosenSettings = Field(description="What the name stands for.")
     settings_schema: dict[str, Any] = Field(
         description="JSON schema of the method's settings, with defaults, bounds and descriptions."
     )
@@ -132,11 +133,11 @@ def optimizer_views() -> list[OptimizerView]:
     return [
         OptimizerView(
             name=name,
-            description=METHODS[settings.name].summary,
+            description=AUTO_SUMMARY if settings.name == "auto" else METHODS[settings.name].summary,
             settings=settings,
             settings_schema=type(settings).model_json_schema(),
         )
-        for name, settings in OPTIMIZERS.items()
+        for name, settings in CHOICES.items()
     ]
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 import gaitswarm
+from services.optimizer.search.registry import METHODS
 from tests.examples.paths import ROOT
 from tests.examples.processes import python
 
@@ -37,6 +38,11 @@ def test_type_checkers_see_the_names_that_there_are() -> None:
     assert sorted([*declared(), "__version__"]) == sorted(gaitswarm.__all__)
     for name, module in declared().items():
         assert getattr(gaitswarm, name) is getattr(import_module(module), name)
+
+
+def test_the_settings_of_every_method_are_public() -> None:
+    settings = {method.settings.__name__ for method in METHODS.values()}
+    assert {"AutoSettings", *settings} <= set(gaitswarm.__all__)
 
 
 @pytest.mark.parametrize("package", ["gaitswarm", "services", "sim"])

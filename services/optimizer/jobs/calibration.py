@@ -356,7 +356,7 @@ class CalibrationSpec(Spec):
         return math.sqrt(square + _NO_EVIDENCE * max(1.0, square) / int(self.fitted.sum()))
 
     def resolved(self) -> CalibrationSpec:
-        """The same job with scenarios and variables written out."""
+        """The same job with scenarios, variables and optimizer written out."""
         space = self.design_space()
         walks = tuple(
             walk.model_copy(
@@ -368,7 +368,12 @@ class CalibrationSpec(Spec):
             for walk in self.walks
         )
         return self.model_copy(
-            update={"walks": walks, "variables": space.variables, "fixed": space.shown_fixed},
+            update={
+                "walks": walks,
+                "variables": space.variables,
+                "fixed": space.shown_fixed,
+                "optimizer": self.search,
+            },
         )
 
 

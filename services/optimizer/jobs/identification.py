@@ -147,8 +147,12 @@ class IdentificationSpec(Spec):
             return Judgement(np.array(fitness), np.log(errors))
 
     def resolved(self) -> IdentificationSpec:
-        """The same job with its variables written out."""
+        """The same job with its variables and optimizer written out."""
         space = self.design_space()
         return self.model_copy(
-            update={"variables": space.variables, "fixed": space.shown_fixed},
+            update={
+                "variables": space.variables,
+                "fixed": space.shown_fixed,
+                "optimizer": self.search,
+            },
         )

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated, Any, Final, Union
 
-from pydantic import BaseModel, BeforeValidator, Discriminator, Tag
+from pydantic import BaseModel, BeforeValidator, Discriminator, Tag, ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from services.optimizer.search.registry import (
-    DEFAULT_METHOD,
-    METHODS,
-    OPTIMIZERS,
-    OptimizerName,
-    OptimizerSettings,
+from services.optimizer.search.automatic import (
+    CHOICES,
+    AutoSettings,
+    ChoiceName,
+    ChosenSettings,
 )
+from services.optimizer.search.optimizer import SearchSettings
+from services.optimizer.search.registry import DEFAULT_METHOD, METHODS
+
+_MODELS: Final[dict[str, type[SearchSettings]]] = {
+    "auto": AutoSettings,
+    **{name: method.settings for name, method in METHODS.items()},
+}
+"""Models of all settings, by their `name`."""
 
 
 def optimizer_settings(choice: object) -> object:
@@ -26,21 +35,65 @@ def optimizer_settings(choice: object) -> object:
         The settings of a name, a document with a `name`; anything else as it is.
 
     Raises:
-        ValueError: No method or preset of that name; names those that there are.
+        ValueError: No method or preset of that name, or no setting of the method; names those that
+            there are.
     """
     if isinstance(choice, Mapping):
         name = choice.get("name", DEFAULT_METHOD)
-        if isinstance(name, str) and name not in METHODS:
-            raise ValueError(f"unknown method {name!r}; known are {', '.join(METHODS)}")
+        if isinstance(name, str):
+            if name not in _MODELS:
+                raise ValueError(f"unknown method {name!r}; known are {', '.join(_MODELS)}")
+            _check_known(choice, _MODELS[name])
         return {"name": name, **choice}
     if not isinstance(choice, str):
         return choice
-    if choice in OPTIMIZERS:
-        return OPTIMIZERS[choice]
+    if choice in CHOICES:
+        return CHOICES[choice]
     raise ValueError(
-        f"unknown optimizer {choice!r}; known are {', '.join(OPTIMIZERS)}, or give an object:"
+        f"unknown optimizer {choice!r}; known are {', '.join(CHOICES)}, or give an object:"
         " settings of your own"
     )
+
+
+def with_settings(choice: object, settings: Mapping[str, Any]) -> object:
+    """Lay settings over those of an optimizer.
+
+    Args:
+        choice: Settings, a document of some, or the name of a method or preset.
+        settings: Those that are to be different, by name; a `name` of another method leaves
+            nothing of the first.
+
+    Returns:
+        A document; what is no optimizer as it is, for validation to refuse.
+    """
+    with suppress(ValueError):
+        choice = optimizer_settings(choice)
+    if isinstance(choice, SearchSettings):
+        choice = choice.model_dump()
+    if not isinstance(choice, Mapping):
+        return choice
+    name = settings.get("name", choice.get("name"))
+    return {**choice, **settings} if name == choice.get("name") else dict(settings)
+
+
+def _check_known(settings: Mapping[Any, Any], model: type[SearchSettings]) -> None:
+    """Raises ValidationError that names every unknown setting and those that there are."""
+    known = [name for name in model.model_fields if name != "name"]
+    problems = [
+        InitErrorDetails(
+            type=PydanticCustomError(
+                "unknown_setting",
+                "no setting of {method}; it has {known}",
+                {"method": model.model_fields["name"].default, "known": ", ".join(known)},
+            ),
+            loc=(str(key),),
+            input=value,
+        )
+        for key, value in settings.items()
+        if key not in model.model_fields
+    ]
+    if problems:
+        raise ValidationError.from_exception_data(model.__name__, problems)
 
 
 def _tag(settings: Any) -> str | None:
@@ -51,11 +104,11 @@ def _tag(settings: Any) -> str | None:
 
 
 if TYPE_CHECKING:
-    _Settings = OptimizerSettings
+    _Settings = ChosenSettings
 else:
     # A tag in angle brackets is no part of the location that an error names.
     _Settings = Annotated[
-        Union[tuple(Annotated[m.settings, Tag(f"<{name}>")] for name, m in METHODS.items())],  # noqa: UP007 - of a tuple
+        Union[tuple(Annotated[m, Tag(f"<{name}>")] for name, m in _MODELS.items())],  # noqa: UP007 - of a tuple
         Discriminator(
             _tag,
             custom_error_type="no_choice",
@@ -65,6 +118,6 @@ else:
 
 OptimizerChoice = Annotated[
     _Settings,
-    BeforeValidator(optimizer_settings, json_schema_input_type=OptimizerName | _Settings),
+    BeforeValidator(optimizer_settings, json_schema_input_type=ChoiceName | _Settings),
 ]
 """How jobs choose a search: once it is read, a name has become settings."""

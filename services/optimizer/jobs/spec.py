@@ -22,12 +22,14 @@ from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.jobs.start import EarlierJobs, StartChoice
+from services.optimizer.search.automatic import AutoSettings, chosen_method
 from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
     OPTIMIZERS,
+    OptimizerSettings,
     create_search,
 )
 from sim.assembly import check_precision
@@ -137,11 +139,19 @@ class Spec(BaseModel):
         """Designs that the job judges in all."""
         return self.iterations * self.optimizer.particles
 
+    @property
+    def search(self) -> OptimizerSettings:
+        """Settings of the method that searches; of `auto`, those of the method that it chooses."""
+        if isinstance(self.optimizer, AutoSettings):
+            return chosen_method(self.optimizer, self.design_space().box, self.budget)
+        return self.optimizer
+
     @model_validator(mode="after")
     def _can_be_resumed(self) -> Self:
-        if METHODS[self.optimizer.name].replays and self.budget > LONGEST_REPLAY:
+        name = self.optimizer.name
+        if name != "auto" and METHODS[name].replays and self.budget > LONGEST_REPLAY:
             raise ValueError(
-                f"iterations: {self.optimizer.name} is replayed when a job is resumed, and so"
+                f"iterations: {name} is replayed when a job is resumed, and so"
                 f" judges {LONGEST_REPLAY} designs at most, not {self.budget}"
             )
         return self
@@ -298,7 +308,8 @@ class Spec(BaseModel):
     def resolved(self) -> Self:
         """The same job with presets written out, so that it stays what it was when they change.
 
-        Scenarios, preference and variables are; robot and controller stay as they were named.
+        Scenarios, preference, variables and an `auto` optimizer are; robot and controller stay as
+        they were named.
         """
 
 
@@ -327,5 +338,5 @@ def create_optimizer(spec: Spec) -> Optimizer:
         The optimizer before its first ask.
     """
     return create_search(
-        spec.optimizer, spec.design_space().box, spec.budget, spec.seed, spec.start_positions()
+        spec.search, spec.design_space().box, spec.budget, spec.seed, spec.start_positions()
     )

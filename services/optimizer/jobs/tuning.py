@@ -188,7 +188,7 @@ class JobSpec(Spec):
         return figure_of_merit(fitness, self.resolved_preference())
 
     def resolved(self) -> JobSpec:
-        """The same job with scenarios, preference and variables written out."""
+        """The same job with scenarios, preference, variables and optimizer written out."""
         space = self.design_space()
         return self.model_copy(
             update={
@@ -196,6 +196,7 @@ class JobSpec(Spec):
                 "preference": self.resolved_preference(),
                 "variables": space.variables,
                 "fixed": space.shown_fixed,
+                "optimizer": self.search,
             }
         )
 

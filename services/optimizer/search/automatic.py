@@ -1,0 +1,94 @@
+"""`auto`: the method that suits a job's budget and variables."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from services.optimizer.search.optimizer import SearchSettings
+from services.optimizer.search.registry import (
+    DEFAULT_METHOD,
+    LONGEST_REPLAY,
+    METHODS,
+    OPTIMIZERS,
+    OptimizerName,
+    OptimizerSettings,
+)
+from services.optimizer.search.space import Kind, Space
+
+
+class AutoSettings(SearchSettings):
+    """The method is chosen when the job is submitted; the job then names that method."""
+
+    name: Literal["auto"] = "auto"
+
+
+AUTO_SUMMARY: Final = (
+    "The method that suits budget, dimension and kinds of variables, chosen on submission"
+)
+
+ChosenSettings = AutoSettings | OptimizerSettings
+"""What a spec may have before it is resolved; a stored job has the settings of a method."""
+
+ChoiceName = Literal["auto", OptimizerName]
+
+CHOICES: Final[dict[str, ChosenSettings]] = {"auto": AutoSettings(), **OPTIMIZERS}
+"""Everything that a job may name, with the settings that the name stands for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """Searches for which one method is chosen.
+
+    Attributes:
+        settings: Of the method; its `particles` become those of the job.
+        largest_budget: Evaluations, at most.
+        largest_dimension: Variables, at most.
+        kinds: Kinds of variables that there may be.
+    """
+
+    settings: OptimizerSettings
+    largest_budget: float = math.inf
+    largest_dimension: float = math.inf
+    kinds: frozenset[Kind] = frozenset({"continuous", "integer", "categorical"})
+
+    def suits(self, space: Space, budget: int) -> bool:
+        """Whether it is for a search.
+
+        Args:
+            space: The box that is searched.
+            budget: Evaluations of the planned run.
+
+        Returns:
+            True within its limits, unless the method could not be resumed after so many.
+        """
+        resumable = budget <= LONGEST_REPLAY or not METHODS[self.settings.name].replays
+        return (
+            resumable
+            and budget <= self.largest_budget
+            and space.dimension <= self.largest_dimension
+            and self.kinds.issuperset(axis.kind for axis in space.axes)
+        )
+
+
+RULES: Final = (Rule(METHODS[DEFAULT_METHOD].settings()),)
+"""The first one that suits a search is taken; the last one suits all."""
+
+
+def chosen_method(
+    settings: AutoSettings, space: Space, budget: int, rules: tuple[Rule, ...] = RULES
+) -> OptimizerSettings:
+    """Choose the method of a search.
+
+    Args:
+        settings: As the job has them.
+        space: The box that is searched.
+        budget: Evaluations of the planned run.
+        rules: From which the first that suits is taken.
+
+    Returns:
+        Settings of that method, with as many designs of one iteration as the job has.
+    """
+    rule = next(rule for rule in rules if rule.suits(space, budget))
+    return rule.settings.model_copy(update={"particles": settings.particles})

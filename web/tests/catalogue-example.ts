@@ -11,6 +11,7 @@ export const DOCUMENT: OpenApiDocument = {
           controller: { type: 'string', enum: ['pi', 'p'], default: 'pi' },
           scenarios: { default: ['fast', 'loaded'] },
           preference: { default: 'A' },
+          optimizer: { default: { name: 'pso', particles: 25, inertia_end: 0.7 } },
           iterations: { type: 'integer', minimum: 1, maximum: 1_000_000, default: 25 },
           seed: { type: 'integer', minimum: 0, exclusiveMaximum: 2 ** 63, default: 1 },
           precision: { type: 'string', enum: ['single', 'double'], default: 'double' },
@@ -28,9 +29,6 @@ export const DOCUMENT: OpenApiDocument = {
           load: { type: 'number', minimum: 0, maximum: 50, default: 0 },
         },
         required: ['name', 'radius'],
-      },
-      PsoSettings: {
-        properties: { particles: { type: 'integer', minimum: 1, maximum: 10_000, default: 25 } },
       },
       RobotVariant: {
         properties: {
@@ -56,6 +54,16 @@ const variable = (name: string, low: number, high: number, kind = 'continuous') 
   unit: '1',
   description: '',
 })
+
+const PARTICLES = { type: 'integer', minimum: 1, maximum: 10_000, default: 25 }
+
+const PSO = {
+  properties: {
+    name: { const: 'pso', default: 'pso', type: 'string' },
+    particles: PARTICLES,
+    inertia_end: { type: 'number', minimum: 0, maximum: 2, default: 0.7 },
+  },
+}
 
 export const CATALOGUE = {
   controllers: [
@@ -85,13 +93,36 @@ export const CATALOGUE = {
     { name: 'C', bias: [0, 0, 0, 0, 0], exponent: [1, 1, 1, 1, 1] },
   ],
   optimizers: [
-    { name: 'pso', settings: { particles: 25, inertia_end: 0.7 } },
-    { name: 'pso-thesis', settings: { particles: 25, inertia_end: 0.9 } },
+    {
+      name: 'pso',
+      description: 'a swarm',
+      settings: { name: 'pso', particles: 25, inertia_end: 0.7 },
+      settings_schema: PSO,
+    },
+    {
+      name: 'pso-thesis',
+      description: 'a swarm',
+      settings: { name: 'pso', particles: 25, inertia_end: 0.9 },
+      settings_schema: PSO,
+    },
+    {
+      name: 'simplex',
+      description: 'a simplex',
+      settings: { name: 'simplex', particles: 25, restarts: true, steps: [1, 2], order: null },
+      settings_schema: {
+        properties: {
+          name: { const: 'simplex', default: 'simplex', type: 'string' },
+          particles: PARTICLES,
+          restarts: { type: 'boolean', default: true, description: 'Whether it starts anew.' },
+          steps: { type: 'array', default: [1, 2] },
+          order: { anyOf: [{ type: 'integer', enum: [1, 2] }, { type: 'null' }], default: null },
+        },
+      },
+    },
   ],
   fields: {
     job: fieldsOf(DOCUMENT, 'JobSpec'),
     scenario: fieldsOf(DOCUMENT, 'Scenario'),
-    optimizer: fieldsOf(DOCUMENT, 'PsoSettings'),
     variant: fieldsOf(DOCUMENT, 'RobotVariant'),
   },
 } as unknown as Catalogue

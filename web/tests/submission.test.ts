@@ -2,7 +2,8 @@ import { describe, expect, test } from 'vitest'
 import type { JobSpec } from '../src/api/types'
 import { around } from '../src/submission/around-design'
 import { errorsByField, specOf, withKinds } from '../src/submission/build-spec'
-import { type Draft, draftOf, emptyDraft, scenarioDraft, withPreset } from '../src/submission/draft'
+import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
+import { optimizerDraft, settingsOf, withPreset } from '../src/submission/optimizer'
 import { boundsInWords, fieldsOf } from '../src/submission/schema-fields'
 import { CATALOGUE, DOCUMENT } from './catalogue-example'
 
@@ -27,7 +28,7 @@ describe('a draft', () => {
       ],
       fixed: {},
       preference: 'A',
-      optimizer: { particles: 25 },
+      optimizer: { name: 'pso', particles: 25, inertia_end: 0.7 },
       iterations: 25,
       seed: 1,
       precision: 'double',
@@ -113,18 +114,60 @@ describe('a draft', () => {
   })
 })
 
-describe('a preset of the optimizer', () => {
-  test('sets all but the size of the swarm', () => {
-    const [, thesis] = CATALOGUE.optimizers
-    expect(withPreset({ particles: '40', inertia_end: '0.7' }, thesis)).toEqual({
-      particles: '40',
-      inertia_end: '0.9',
+describe('the optimizer', () => {
+  const { optimizers } = CATALOGUE
+  const [pso, thesis, simplex] = optimizers
+
+  test('is the default method at first, with its settings', () => {
+    expect(empty.optimizer).toEqual({ name: 'pso', particles: '25', inertia_end: '0.7' })
+    expect(specOf(empty).optimizer).toEqual(pso.settings)
+  })
+
+  test('keeps the size of its iterations with a preset or another method', () => {
+    const large = { name: 'pso', particles: '40', inertia_end: '0.7' }
+    expect(withPreset(large, thesis)).toEqual({ name: 'pso', particles: '40', inertia_end: '0.9' })
+    expect(withPreset(large, simplex)).toMatchObject({ name: 'simplex', particles: '40' })
+    expect(withPreset(large, simplex)).not.toHaveProperty('inertia_end')
+  })
+
+  test('offers what the schema of the method has, but its name', () => {
+    const fields = new Map(settingsOf(simplex).map((field) => [field.name, field]))
+    expect([...fields.keys()]).toEqual(['particles', 'restarts', 'steps', 'order'])
+    expect(fields.get('restarts')).toMatchObject({
+      type: 'boolean',
+      description: 'Whether it starts anew.',
+    })
+    expect(fields.get('order')?.choices).toEqual(['1', '2'])
+    expect(boundsInWords(fields.get('particles')!)).toBe('1 to 10\u202f000')
+  })
+
+  test('becomes numbers, truth values and lists again, and nothing where it is left empty', () => {
+    const { optimizer } = draftOf({ ...specOf(empty), optimizer: 'simplex' } as never, CATALOGUE)
+    expect(specOf({ ...empty, optimizer }).optimizer).toEqual({
+      name: 'simplex',
+      particles: 25,
+      restarts: true,
+      steps: [1, 2],
+    })
+    const wrong = { ...optimizer, restarts: 'false', steps: '[1, ', order: 'two' }
+    expect(specOf({ ...empty, optimizer: wrong }).optimizer).toMatchObject({
+      restarts: false,
+      steps: '[1, ',
+      order: 'two',
     })
   })
 
-  test('may be all that a job to be cloned says of it', () => {
-    const draft = draftOf({ ...specOf(empty), optimizer: 'pso-thesis' }, CATALOGUE)
-    expect(draft.optimizer.inertia_end).toBe('0.9')
+  test('of a job to be cloned may be a name, or settings without their defaults', () => {
+    const named = draftOf({ ...specOf(empty), optimizer: 'pso-thesis' }, CATALOGUE)
+    expect(named.optimizer.inertia_end).toBe('0.9')
+    expect(optimizerDraft(optimizers, { name: 'simplex', particles: 3 }, 'pso')).toMatchObject({
+      particles: '3',
+      restarts: 'true',
+    })
+    expect(optimizerDraft(optimizers, { particles: 3 }, 'pso')).toMatchObject({
+      name: 'pso',
+      inertia_end: '0.7',
+    })
   })
 })
 
@@ -142,7 +185,7 @@ describe('a clone', () => {
       bias: [0, 0, 0, 0, 0],
       exponent: [1, 1, 1, 1, 1],
     },
-    optimizer: { particles: 7 },
+    optimizer: { name: 'pso', particles: 7, inertia_end: 0.7 },
     iterations: 3,
     seed: 9,
     precision: 'single',

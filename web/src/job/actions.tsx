@@ -8,6 +8,7 @@ import { ConfirmDialog } from '../components/confirm-dialog'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { withQuery } from '../router/routes'
+import { budgetSpent, iterationsSpent, spentInWords } from './budget'
 
 type Asking = 'cancel' | 'extend' | null
 
@@ -104,7 +105,8 @@ function ExtendDialog({
 }) {
   const [budget, setBudget] = useState(String(job.iterations_planned + 25))
   const wanted = Number(budget)
-  const valid = Number.isInteger(wanted) && wanted > job.iterations
+  const [spent, least] = [budgetSpent(job), iterationsSpent(job)]
+  const valid = Number.isInteger(wanted) && wanted > least
   return (
     <ConfirmDialog
       open={open}
@@ -115,8 +117,9 @@ function ExtendDialog({
       onDismiss={onDismiss}
     >
       <p>
-        {formatCount(job.iterations)} of {formatCount(job.iterations_planned)} iterations are done;
-        the job goes on after them.
+        {spentInWords(spent)} {spent.unit} are done; the job goes on after them.
+        {spent.unit === 'designs' &&
+          ` The budget counts iterations of ${formatCount(job.particles)} designs each.`}
       </p>
       <div class="field">
         <label for="extend-budget">
@@ -125,13 +128,13 @@ function ExtendDialog({
         <input
           id="extend-budget"
           type="number"
-          min={job.iterations + 1}
+          min={least + 1}
           step={1}
           value={budget}
           aria-invalid={!valid}
           onInput={(event) => setBudget(event.currentTarget.value)}
         />
-        {!valid && <span class="wrong">a whole number above {formatCount(job.iterations)}</span>}
+        {!valid && <span class="wrong">a whole number above {formatCount(least)}</span>}
       </div>
     </ConfirmDialog>
   )

@@ -2,7 +2,7 @@
 
 import { useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
-import type { DistributionItem, Job } from '../api/types'
+import type { DistributionItem, Iteration, Job } from '../api/types'
 import { LineChart, withAlpha } from '../charts/line-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { formatNumber, percent } from '../format/number'
@@ -15,7 +15,15 @@ import type { Distribution } from './use-distribution'
 /** More could not be told apart on a common screen. */
 const MOST_STRIPS = 250
 
-export function DistributionChart({ job, distribution }: { job: Job; distribution: Distribution }) {
+export function DistributionChart({
+  job,
+  iterations,
+  distribution,
+}: {
+  job: Job
+  iterations: readonly Iteration[]
+  distribution: Distribution
+}) {
   const { quantiles, items } = distribution
   const unit = fitnessUnit(job)
   const drawn = useMemo(() => {
@@ -31,7 +39,7 @@ export function DistributionChart({ job, distribution }: { job: Job; distributio
       ] as const,
     }
   }, [items, quantiles])
-  const failed = items.at(-1)?.failed ?? 0
+  const last = iterations.at(-1)
   return (
     <ChartFrame
       title="Distribution of fitness"
@@ -41,7 +49,7 @@ export function DistributionChart({ job, distribution }: { job: Job; distributio
           <LegendEntry colour="--series-2" label="median" />
           <LegendEntry colour="--series-1" label="density of the swarm" area />
           <span>
-            {failed} of {job.particles} failed in the last iteration
+            {last?.failed ?? 0} of {last?.designs ?? 0} failed in the last iteration
           </span>
         </>
       }

@@ -25,7 +25,11 @@ export function DiversityChart({ distribution }: { distribution: Distribution })
   return (
     <ChartFrame
       title="Diversity of the swarm"
-      note="Spread of the designs as a share of each variable’s range: near zero, the swarm has gathered."
+      note={
+        items.some(({ diversity }) => diversity !== null)
+          ? 'Spread of the designs as a share of each variable’s range: near zero, the swarm has gathered.'
+          : 'The method asks for one design at a time, which has no spread.'
+      }
       table={() => (
         <ByIteration
           caption="Diversity by iteration"

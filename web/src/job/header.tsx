@@ -8,12 +8,13 @@ import { STATE_TONES, StateBadge } from '../components/state-badge'
 import { change, formatCount, formatNumber, quantity } from '../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../format/time'
 import { JobActions } from './actions'
+import { budgetSpent } from './budget'
 import { fitnessUnit } from './fitness'
 import type { LiveJob } from './use-job'
 
 export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
   const { followed } = live
-  const committed = Math.max(job.iterations, followed.iterations.length)
+  const spent = budgetSpent(job, followed.iterations)
   const tone = STATE_TONES[job.state]
   return (
     <section class="card job-header" aria-label="The job">
@@ -43,12 +44,12 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
         </div>
       )}
       <Progress
-        done={committed}
-        planned={job.iterations_planned}
-        label={`${committed} of ${job.iterations_planned} iterations`}
+        done={spent.done}
+        planned={spent.planned}
+        label={`${spent.done} of ${spent.planned} ${spent.unit}`}
         tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
       />
-      <Figures job={job} committed={committed} />
+      <Figures job={job} committed={Math.max(job.iterations, followed.iterations.length)} />
     </section>
   )
 }
@@ -62,7 +63,11 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
     <dl class="figures">
       <Figure
         label="Iterations"
-        value={`${formatCount(committed)} of ${formatCount(job.iterations_planned)}`}
+        value={
+          budgetSpent(job).unit === 'iterations'
+            ? `${formatCount(committed)} of ${formatCount(job.iterations_planned)}`
+            : `${formatCount(committed)}, of ${formatCount(job.particles)} designs at most`
+        }
       />
       <Figure
         label={search ? 'Best fitness, in double' : 'Best fitness'}
@@ -122,6 +127,7 @@ function subtitle(job: StoredJob): string {
   const asked = isReadable(job)
     ? [
         job.controller ?? job.kind,
+        job.optimizer,
         `${formatCount(job.particles)} particles`,
         `seed ${job.spec.seed}`,
         `${job.precision} precision`,

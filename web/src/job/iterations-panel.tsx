@@ -104,6 +104,7 @@ function columns(job: Job): readonly Column<Iteration>[] {
       value: (i) => i.index,
       cell: (i) => <a href={jobPath(job.id, `iterations/${i.index}`)}>{i.index}</a>,
     },
+    { key: 'designs', label: 'Designs', numeric: true, minor: true, value: (i) => i.designs },
     fitness('best', 'Best'),
     fitness('median', 'Median', true),
     fitness('mean', 'Mean'),

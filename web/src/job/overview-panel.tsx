@@ -35,7 +35,7 @@ export function OverviewPanel({ live, job }: { live: LiveJob; job: Job }) {
       )}
       <ConvergenceChart job={job} iterations={iterations} distribution={distribution} />
       <div class="grid">
-        <DistributionChart job={job} distribution={distribution} />
+        <DistributionChart job={job} iterations={iterations} distribution={distribution} />
         <DiversityChart distribution={distribution} />
       </div>
       {job.best && (

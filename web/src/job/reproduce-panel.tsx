@@ -4,6 +4,7 @@ import type { Job } from '../api/types'
 import { CopyBlock } from '../components/copy-button'
 import { withQuery } from '../router/routes'
 import { curlCommand, submitCommand } from './commands'
+import { OptimizerCard } from './optimizer-card'
 import { ProvenanceCard } from './provenance-card'
 
 export function ReproducePanel({ job }: { job: Job }) {
@@ -31,6 +32,7 @@ export function ReproducePanel({ job }: { job: Job }) {
           </div>
         </div>
       </section>
+      <OptimizerCard job={job} />
       <ProvenanceCard job={job} />
       <section class="card" aria-labelledby="spec">
         <h2 id="spec">The spec as JSON</h2>

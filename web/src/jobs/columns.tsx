@@ -4,8 +4,9 @@ import type { JobSummary } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
 import type { Column } from '../components/table'
-import { formatCount, formatNumber, quantity } from '../format/number'
+import { formatNumber, quantity } from '../format/number'
 import { formatAge, formatDuration, formatMoment } from '../format/time'
+import { budgetSpent, spentInWords } from '../job/budget'
 import { fitnessUnit } from '../job/fitness'
 import { jobPath } from '../router/routes'
 
@@ -28,7 +29,7 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
     {
       key: 'progress',
       label: 'Iterations',
-      value: (job) => job.iterations / job.iterations_planned,
+      value: (job) => job.evaluations / job.evaluations_planned,
       cell: (job) => <ProgressCell job={job} />,
     },
     {
@@ -84,14 +85,15 @@ function NameCell({ job }: { job: JobSummary }) {
 
 function ProgressCell({ job }: { job: JobSummary }) {
   const tone = STATE_TONES[job.state]
-  const text = `${formatCount(job.iterations)} of ${formatCount(job.iterations_planned)}`
+  const spent = budgetSpent(job)
+  const text = spentInWords(spent)
   return (
     <div class="job-progress">
-      <span>{text}</span>
+      <span>{spent.unit === 'iterations' ? text : `${text} ${spent.unit}`}</span>
       <Progress
-        done={job.iterations}
-        planned={job.iterations_planned}
-        label={`${text} iterations`}
+        done={spent.done}
+        planned={spent.planned}
+        label={`${text} ${spent.unit}`}
         tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
       />
     </div>

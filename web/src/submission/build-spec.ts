@@ -3,6 +3,7 @@
 import type { FieldError } from '../api/problem'
 import type { JobSpec, Scenario, Variable } from '../api/types'
 import type { Draft } from './draft'
+import { optimizerSettings } from './optimizer'
 
 /** Problems by the form's fields: `iterations`, `own.0.radius`, `variables.FI1R.low`, ... */
 export type FieldErrors = ReadonlyMap<string, string>
@@ -30,7 +31,7 @@ export function specOf(draft: Draft): JobSpec {
     variables,
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
-    optimizer: numbers(draft.optimizer),
+    optimizer: optimizerSettings(draft.optimizer),
     iterations: number(draft.iterations),
     seed: number(draft.seed),
     precision: draft.precision,

@@ -20,7 +20,6 @@ export interface Catalogue {
   readonly fields: {
     readonly job: ReadonlyMap<string, SchemaField>
     readonly scenario: ReadonlyMap<string, SchemaField>
-    readonly optimizer: ReadonlyMap<string, SchemaField>
     readonly variant: ReadonlyMap<string, SchemaField>
   }
 }
@@ -49,7 +48,6 @@ export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
     fields: {
       job: fieldsOf(document, 'JobSpec'),
       scenario: fieldsOf(document, 'Scenario'),
-      optimizer: fieldsOf(document, 'PsoSettings'),
       variant: fieldsOf(document, 'RobotVariant'),
     },
   }

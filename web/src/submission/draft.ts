@@ -1,7 +1,8 @@
 /** A job as it stands in the form: numbers are still text, choices not yet a spec. */
 
-import type { JobSpec, OptimizerPreset, Scenario, Variable } from '../api/types'
+import type { JobSpec, Scenario, Variable } from '../api/types'
 import { type Catalogue, variablesOf } from './catalogue'
+import { type OptimizerDraft, optimizerDraft } from './optimizer'
 import type { SchemaField } from './schema-fields'
 
 /** What becomes of a variable; `default` leaves a convention, or the gait to each scenario. */
@@ -47,7 +48,8 @@ export interface Draft {
   readonly own: readonly Readonly<Record<string, string>>[]
   readonly variables: Readonly<Record<string, VariableDraft>>
   readonly preference: PreferenceDraft
-  readonly optimizer: Readonly<Record<string, string>>
+  /** Settings of the method that is its `name`. */
+  readonly optimizer: OptimizerDraft
   readonly iterations: string
   readonly seed: string
   readonly precision: string
@@ -55,7 +57,7 @@ export interface Draft {
 
 /** What the API does if nothing is said. */
 export function emptyDraft(catalogue: Catalogue): Draft {
-  const { job, optimizer, variant } = catalogue.fields
+  const { job, variant } = catalogue.fields
   const controller = String(job.get('controller')?.default)
   const preset = String(job.get('preference')?.default)
   return {
@@ -74,7 +76,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     own: [],
     variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, preset),
-    optimizer: defaults(optimizer),
+    optimizer: optimizerDraft(catalogue.optimizers, undefined, usualMethod(catalogue)),
     iterations: text(job.get('iterations')?.default),
     seed: text(job.get('seed')?.default),
     precision: text(job.get('precision')?.default),
@@ -122,7 +124,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
-    optimizer: { ...empty.optimizer, ...optimizerOf(spec.optimizer, catalogue) },
+    optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, usualMethod(catalogue)),
     iterations: text(spec.iterations),
     seed: text(spec.seed),
     precision: spec.precision ?? empty.precision,
@@ -162,21 +164,10 @@ export function preferenceOf(
   return { kind: 'own', bias: preference.bias.map(text), exponent: preference.exponent.map(text) }
 }
 
-/** Settings of an optimizer by field; a preset's where it is named. */
-function optimizerOf(
-  optimizer: JobSpec['optimizer'],
-  catalogue: Catalogue,
-): Readonly<Record<string, string>> {
-  if (typeof optimizer !== 'string') return texts(optimizer ?? {})
-  return texts(catalogue.optimizers.find(({ name }) => name === optimizer)?.settings ?? {})
-}
-
-/** An optimizer with a preset's settings; how large its swarm is, presets leave open. */
-export function withPreset(
-  optimizer: Draft['optimizer'],
-  { settings }: OptimizerPreset,
-): Draft['optimizer'] {
-  return { ...optimizer, ...texts(settings), particles: optimizer.particles }
+/** The method of a job that names none. */
+function usualMethod({ fields, optimizers }: Catalogue): string {
+  const usual = fields.job.get('optimizer')?.default as { name?: string } | undefined
+  return usual?.name ?? optimizers[0].settings.name
 }
 
 function variableDrafts(

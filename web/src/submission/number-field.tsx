@@ -9,18 +9,24 @@ export function NumberField({
   field,
   value,
   error,
+  help,
+  changed = false,
   onChange,
 }: {
   label: string
   field: SchemaField
   value: string
   error?: string
+  /** Shown beside the bounds; without it the description is the input's title. */
+  help?: string
+  /** Whether it is to be marked as no default. */
+  changed?: boolean
   onChange: (value: string) => void
 }) {
   const id = useId()
   const bounds = boundsInWords(field)
   return (
-    <div class="field">
+    <div class="field" data-changed={changed}>
       <label for={id}>
         {label}
         <Unit unit={field.unit} />
@@ -31,11 +37,11 @@ export function NumberField({
         value={value}
         aria-invalid={error !== undefined}
         aria-describedby={`${id}-hint`}
-        title={describe(field)}
+        title={help === undefined ? describe(field) : undefined}
         onInput={(event) => onChange(event.currentTarget.value)}
       />
       <span id={`${id}-hint`}>
-        <span class="hint">{bounds}</span>
+        <span class="hint">{[bounds, help].filter((part) => part).join(' · ')}</span>
         {error !== undefined && <span class="wrong"> {error}</span>}
       </span>
     </div>
@@ -49,6 +55,7 @@ export function ChoiceField({
   value,
   error,
   hint,
+  changed = false,
   onChange,
 }: {
   label: string
@@ -56,11 +63,13 @@ export function ChoiceField({
   value: string
   error?: string
   hint?: string
+  /** Whether it is to be marked as no default. */
+  changed?: boolean
   onChange: (value: string) => void
 }) {
   const id = useId()
   return (
-    <div class="field">
+    <div class="field" data-changed={changed}>
       <label for={id}>{label}</label>
       <select
         id={id}

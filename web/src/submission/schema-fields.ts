@@ -7,7 +7,7 @@ export interface SchemaField {
   readonly description: string
   /** From the brackets in the description; `1` if there are none. */
   readonly unit: string
-  readonly type: 'number' | 'integer' | 'string' | 'other'
+  readonly type: 'number' | 'integer' | 'string' | 'boolean' | 'other'
   readonly low: number | null
   readonly high: number | null
   /** Whether the bound itself is not allowed. */
@@ -25,18 +25,19 @@ interface Property {
   maximum?: number
   exclusiveMinimum?: number
   exclusiveMaximum?: number
-  enum?: string[]
-  const?: string
+  enum?: unknown[]
+  const?: unknown
   default?: unknown
   anyOf?: Property[]
 }
 
 export interface OpenApiDocument {
-  readonly components: {
-    readonly schemas: Readonly<
-      Record<string, { properties?: Record<string, Property>; required?: string[] }>
-    >
-  }
+  readonly components: { readonly schemas: Readonly<Record<string, ObjectSchema>> }
+}
+
+export interface ObjectSchema {
+  readonly properties?: Readonly<Record<string, Property>>
+  readonly required?: readonly string[]
 }
 
 /** The fields of a schema by name, in its order. Throws if the document has no such schema. */
@@ -46,9 +47,14 @@ export function fieldsOf(
 ): ReadonlyMap<string, SchemaField> {
   const found = document.components.schemas[schema]
   if (!found?.properties) throw new Error(`the API's document has no schema ${schema}`)
-  const required = new Set(found.required ?? [])
+  return fieldsIn(found)
+}
+
+/** The fields of an object that a schema describes, by name and in its order. */
+export function fieldsIn(schema: ObjectSchema): ReadonlyMap<string, SchemaField> {
+  const required = new Set(schema.required ?? [])
   return new Map(
-    Object.entries(found.properties).map(([name, property]) => [
+    Object.entries(schema.properties ?? {}).map(([name, property]) => [
       name,
       fieldOf(name, property, required.has(name)),
     ]),
@@ -79,15 +85,21 @@ function fieldOf(name: string, given: Property, required: boolean): SchemaField 
     name,
     description,
     unit: /\[([^\]]+)\]/.exec(description)?.[1] ?? '1',
-    type: type === 'number' || type === 'integer' || type === 'string' ? type : 'other',
+    type: isPlain(type) ? type : 'other',
     low: property.minimum ?? property.exclusiveMinimum ?? null,
     high: property.maximum ?? property.exclusiveMaximum ?? null,
     above: property.exclusiveMinimum !== undefined,
     below: property.exclusiveMaximum !== undefined,
-    choices: property.enum ?? (property.const === undefined ? null : [property.const]),
+    choices:
+      property.enum?.map(String) ??
+      (property.const === undefined ? null : [String(property.const)]),
     default: property.default,
     required,
   }
+}
+
+function isPlain(type: string | undefined): type is Exclude<SchemaField['type'], 'other'> {
+  return type !== undefined && ['number', 'integer', 'string', 'boolean'].includes(type)
 }
 
 /** Of a property that may be null instead: what else it may be. */

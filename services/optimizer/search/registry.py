@@ -17,16 +17,20 @@ from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.replayed import Replayed
 from services.optimizer.search.space import Space
 from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
+from services.optimizer.search.swarm.pso_ps import PsoPsSettings
 
 Floats = NDArray[np.float64]
 
-OptimizerSettings = NelderMeadSettings | PatternSearchSettings | PsoSettings | RandomSearchSettings
+OptimizerSettings = (
+    NelderMeadSettings | PatternSearchSettings | PsoSettings | PsoPsSettings | RandomSearchSettings
+)
 """Settings of every method; their `name` tells them apart."""
 
 MethodName = Literal[
     "nelder-mead",
     "ps",
     "pso",
+    "pso-ps",
     "random",
 ]
 
@@ -35,6 +39,7 @@ OptimizerName = Literal[
     "ps",
     "pso",
     "pso-constriction",
+    "pso-ps",
     "pso-thesis",
     "random",
 ]
@@ -99,6 +104,12 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)",
         ParticleSwarm,
         uses_start=True,
+    ),
+    "pso-ps": Method(
+        PsoPsSettings,
+        "Particle swarm, then pattern search from its best designs (thesis 3.2.2)",
+        _replayed("swarm.pso_ps:pso_ps"),
+        replays=True,
     ),
     "random": Method(
         RandomSearchSettings,

@@ -92,6 +92,10 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
     rounds its integer variables. So a particle keeps its velocity while it crosses the width of an
     integer, and does not freeze there. A velocity is the change of position in one iteration, in
     the same units.
+
+    Attributes:
+        best_positions: (particles, d) the best that each particle remembers.
+        best_fitness: (particles,) what those are worth, +inf for a particle that never succeeded.
     """
 
     state_model = _SwarmState
@@ -109,8 +113,8 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         """
         super().__init__(settings, space, budget, seed)
         self._velocities = np.zeros((settings.particles, space.dimension))
-        self._best_positions = np.tile(space.low, (settings.particles, 1))
-        self._best_fitness = np.full(settings.particles, np.inf)
+        self.best_positions = np.tile(space.low, (settings.particles, 1))
+        self.best_fitness = np.full(settings.particles, np.inf)
         self._informed_since = 0
 
     def propose(self) -> NDArray[np.float64]:
@@ -128,18 +132,18 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
             positions: (particles, d) of the swarm.
             fitness: (particles,) of each, +inf for a failed evaluation.
         """
-        if not fitness.min() < self._best_fitness.min():
+        if not fitness.min() < self.best_fitness.min():
             self._informed_since = self.generations + 1
-        better = fitness < self._best_fitness
-        self._best_positions[better] = positions[better]
-        self._best_fitness[better] = fitness[better]
+        better = fitness < self.best_fitness
+        self.best_positions[better] = positions[better]
+        self.best_fitness[better] = fitness[better]
 
     def memory(self) -> dict[str, Any]:
         """Give velocities and bests, and since when informants are what they are."""
         memory = {
             "velocities": self._velocities.tolist(),
-            "best_positions": self._best_positions.tolist(),
-            "best_fitness": worth(self._best_fitness),
+            "best_positions": self.best_positions.tolist(),
+            "best_fitness": worth(self.best_fitness),
         }
         drawn = self.settings.topology == "random"
         return memory | {"informed_since": self._informed_since} if drawn else memory
@@ -153,7 +157,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         Raises:
             ValueError: a shape is another, or something is outside the bounds.
         """
-        shape = self._best_positions.shape
+        shape = self.best_positions.shape
         # The first generation may be of more start positions than there are particles.
         asked = shape[0] if state.generations else max(shape[0], len(self._start))
         if len(state.positions) not in (0, asked):
@@ -162,8 +166,8 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         best = matrix(state.best_positions, shape, "best_positions")
         if len(state.best_fitness) != shape[0]:
             raise ValueError(f"best_fitness: {len(state.best_fitness)} values, not {shape[0]}")
-        self._best_positions = self.inside(best, "best_positions")
-        self._velocities, self._best_fitness = velocities, of_worth(state.best_fitness)
+        self.best_positions = self.inside(best, "best_positions")
+        self._velocities, self.best_fitness = velocities, of_worth(state.best_fitness)
         self._informed_since = state.informed_since
 
     def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
@@ -205,11 +209,11 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         own, swarm = self._draw(purpose=_MOVE)
         settings, space, positions = self.settings, self.space, self.positions
         velocities = self._inertia() * self._velocities
-        known = np.isfinite(self._best_fitness)
-        to_own_best = np.where(known[:, np.newaxis], self._best_positions - positions, 0.0)
+        known = np.isfinite(self.best_fitness)
+        to_own_best = np.where(known[:, np.newaxis], self.best_positions - positions, 0.0)
         velocities += settings.cognitive * own * to_own_best
         leader = self._leaders()
-        to_leader = self._best_positions[leader] - positions
+        to_leader = self.best_positions[leader] - positions
         velocities += settings.social * swarm * np.where(known[leader, np.newaxis], to_leader, 0.0)
         fastest = settings.velocity_limit * space.span
         velocities = np.clip(velocities, -fastest, fastest)
@@ -221,7 +225,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
 
     def _leaders(self) -> NDArray[np.intp]:
         """(particles,) the best of those that inform each one."""
-        particles, fitness = self.settings.particles, self._best_fitness
+        particles, fitness = self.settings.particles, self.best_fitness
         if self.settings.topology == "global":
             return np.full(particles, np.argmin(fitness))
         if self.settings.topology == "ring":
@@ -244,7 +248,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
 
     def _draw(self, *, purpose: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Two numbers in [0, 1) per particle and coordinate: twice (particles, d)."""
-        particles, d = self._best_positions.shape
+        particles, d = self.best_positions.shape
         draws = swarm_uniform(
             self.seed, purpose, iteration=self.generations, particles=particles, count=2 * d
         )

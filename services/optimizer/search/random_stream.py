@@ -66,14 +66,18 @@ class RandomNumbers:
     The same seed and purpose give the same numbers with every version of numpy.
     """
 
-    def __init__(self, seed: int, purpose: int) -> None:
+    def __init__(self, seed: int, purpose: int, *, iteration: int = 0) -> None:
         """Start a stream.
 
         Args:
             seed: of the job, 64 bits.
             purpose: what the numbers are for, 64 bits.
+            iteration: from 0, 64 bits; each has a stream of its own.
         """
-        self._philox = np.random.Philox(key=np.array([seed, purpose], dtype=np.uint64))
+        self._philox = np.random.Philox(
+            key=np.array([seed, purpose], dtype=np.uint64),
+            counter=np.array([0, 0, 0, iteration], dtype=np.uint64),
+        )
 
     def uniform(self, *shape: int) -> NDArray[np.float64]:
         """Draw numbers that are uniform in [0, 1).

@@ -10,6 +10,10 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.search.evolution.differential_evolution import (
+    DeSettings,
+    DifferentialEvolution,
+)
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.optimizer import Optimizer, SearchSettings
@@ -22,11 +26,17 @@ from services.optimizer.search.swarm.pso_ps import PsoPsSettings
 Floats = NDArray[np.float64]
 
 OptimizerSettings = (
-    NelderMeadSettings | PatternSearchSettings | PsoSettings | PsoPsSettings | RandomSearchSettings
+    DeSettings
+    | NelderMeadSettings
+    | PatternSearchSettings
+    | PsoPsSettings
+    | PsoSettings
+    | RandomSearchSettings
 )
 """Settings of every method; their `name` tells them apart."""
 
 MethodName = Literal[
+    "de",
     "nelder-mead",
     "ps",
     "pso",
@@ -35,6 +45,7 @@ MethodName = Literal[
 ]
 
 OptimizerName = Literal[
+    "de",
     "nelder-mead",
     "ps",
     "pso",
@@ -87,6 +98,11 @@ def _replayed(place: str) -> Create:
 
 
 METHODS: Final[dict[MethodName, Method]] = {
+    "de": Method(
+        DeSettings,
+        "Differential evolution, L-SHADE (Tanabe and Fukunaga 2014)",
+        DifferentialEvolution,
+    ),
     "nelder-mead": Method(
         NelderMeadSettings,
         "Simplex of Nelder and Mead (1965), adaptive coefficients (Gao and Han 2012), restarts",

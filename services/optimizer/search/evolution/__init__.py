@@ -1,0 +1,1 @@
+"""Evolutionary methods: populations that vary and select."""

@@ -7,7 +7,7 @@ it, so that a robot file, code or a compiler that changed meanwhile is noticed.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -87,16 +87,30 @@ class Provenance(BaseModel):
             found.append(f"the robot {self.robot} has other contents")
         if now.code_digest != self.code_digest:
             found.append("other simulation code")
-        for name in sorted(self.libraries.keys() | now.libraries.keys()):
-            before, after = self.libraries.get(name, "none"), now.libraries.get(name, "none")
-            if before != after:
-                found.append(f"{name} {after} instead of {before}")
+        found += version_changes(self.libraries, now.libraries)
         if now.backend != self.backend:
             cause = "no C compiler: " if now.backend == "reference" else ""
             found.append(f"{cause}backend {now.backend} instead of {self.backend}")
         if now.precision != self.precision:
             found.append(f"precision {now.precision} instead of {self.precision}")
         return tuple(found)
+
+
+def version_changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
+    """What is different of libraries, in words for people.
+
+    Args:
+        before: Their versions, by name.
+        now: The versions that are compared with the earlier ones.
+
+    Returns:
+        One phrase for each library that has another version, or that only one of the two has.
+    """
+    return [
+        f"{name} {now.get(name, 'none')} instead of {before.get(name, 'none')}"
+        for name in sorted(before.keys() | now.keys())
+        if before.get(name, "none") != now.get(name, "none")
+    ]
 
 
 @lru_cache(maxsize=32)

@@ -35,7 +35,10 @@ PARTICLES = 6
 BUDGET = 90
 SEED = 3
 
-METHOD = pytest.mark.parametrize("method", METHODS)
+INSTALLED = [name for name, method in METHODS.items() if not method.missing]
+"""Methods whose libraries are here; with the development lock, all that this machine can have."""
+
+METHOD = pytest.mark.parametrize("method", INSTALLED)
 SPACE = pytest.mark.parametrize("space", SPACES)
 
 
@@ -139,7 +142,7 @@ print(json.dumps([row.hex() for row in bits(path(optimizer))]))
 
 
 def test_another_process_goes_on_with_the_same_bits() -> None:
-    for method in METHODS:
+    for method in INSTALLED:
         straight, stopped = search(method), search(method)
         expected = bits(path(straight))
         done = list(path(stopped, evaluations=BUDGET // 2))

@@ -51,6 +51,7 @@ CHANGES = [
         HERE.model_copy(update={"optimizer_digest": "other"}),
         "other code of search and judgement",
     ),
+    (HERE.model_copy(update={"search_libraries": {"cmaes": "0.13"}}), "cmaes 0.13 instead of none"),
 ]
 
 

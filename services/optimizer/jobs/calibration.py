@@ -203,6 +203,7 @@ class CalibrationSpec(Spec):
             InvalidRequest: bounds or values that nothing can run with, or a walk out of reach;
                 names the field.
         """
+        self.check_optimizer()
         self.check_precision()
         space, cases = self.design_space(), self._cases()
         of_robot = {variable.name for variable in robot_variables(self.described)}

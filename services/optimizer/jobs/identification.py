@@ -88,6 +88,7 @@ class IdentificationSpec(Spec):
         Raises:
             InvalidRequest: bounds or values that no robot can have; names the field.
         """
+        self.check_optimizer()
         self.check_precision()
         robot, space = load_robot(self.robot), self.design_space()
         for values in space.corners():

@@ -11,7 +11,8 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from services.optimizer.jobs.spec import Spec
-from sim.provenance import Provenance, provenance_of, source_digest
+from services.optimizer.search.registry import METHODS
+from sim.provenance import Provenance, provenance_of, source_digest, version_changes
 
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
@@ -41,6 +42,11 @@ class JobProvenance(BaseModel):
         description="Digest of the source files that ask for designs and judge them.",
         examples=["3c6ef372fe94f82ba54ff53a5f1d36f1"],
     )
+    search_libraries: dict[str, str] = Field(
+        default_factory=dict,
+        description="Versions of the libraries that its search method computes with, if any.",
+        examples=[{"cmaes": "0.13.1"}],
+    )
     simulation: Provenance = Field(description="What its walks depend on.")
 
     def changes(self, now: JobProvenance) -> tuple[str, ...]:
@@ -55,6 +61,7 @@ class JobProvenance(BaseModel):
         found = list(self.simulation.changes(now.simulation))
         if now.optimizer_digest != self.optimizer_digest:
             found.append("other code of search and judgement")
+        found += version_changes(self.search_libraries, now.search_libraries)
         if found and now.gaitswarm != self.gaitswarm:
             found.append(f"gaitswarm {now.gaitswarm} instead of {self.gaitswarm}")
         return tuple(found)
@@ -90,6 +97,7 @@ def job_provenance(spec: Spec) -> JobProvenance:
     return JobProvenance(
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
+        search_libraries=METHODS[spec.optimizer.name].versions(),
         simulation=provenance_of(*spec.described, precision=spec.precision),
     )
 

@@ -215,6 +215,20 @@ class Spec(BaseModel):
             text = str(error).removeprefix("precision: ")
             raise InvalidRequest(text, field="precision") from error
 
+    def check_optimizer(self) -> None:
+        """Check that what the search method needs is installed here.
+
+        Raises:
+            InvalidRequest: A library is missing; its field is `optimizer`.
+        """
+        method = METHODS[self.optimizer.name]
+        if method.missing:
+            raise InvalidRequest(
+                f"{self.optimizer.name} needs {', '.join(method.missing)}, not installed here:"
+                f" pip install 'gaitswarm[{method.extra}]'",
+                field="optimizer",
+            )
+
     def check_recordings(self, find: Callable[[str], RecordedWalk]) -> None:
         """Check that each recording is of the robot's joints and of a gait that its legs reach.
 

@@ -124,6 +124,7 @@ class JobSpec(Spec):
             InvalidRequest: bounds or values that nothing can run with, or a scenario out of reach;
                 names the field.
         """
+        self.check_optimizer()
         self.check_precision()
         space, scenarios = self.design_space(), self.resolved_scenarios()
         for design in space.corners():

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
+from importlib import import_module, metadata
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.search.evolution.cma_es import CmaEsSettings
 from services.optimizer.search.evolution.differential_evolution import (
     DeSettings,
     DifferentialEvolution,
@@ -26,7 +27,8 @@ from services.optimizer.search.swarm.pso_ps import PsoPsSettings
 Floats = NDArray[np.float64]
 
 OptimizerSettings = (
-    DeSettings
+    CmaEsSettings
+    | DeSettings
     | NelderMeadSettings
     | PatternSearchSettings
     | PsoPsSettings
@@ -36,6 +38,7 @@ OptimizerSettings = (
 """Settings of every method; their `name` tells them apart."""
 
 MethodName = Literal[
+    "cma-es",
     "de",
     "nelder-mead",
     "ps",
@@ -45,6 +48,7 @@ MethodName = Literal[
 ]
 
 OptimizerName = Literal[
+    "cma-es",
     "de",
     "nelder-mead",
     "ps",
@@ -55,6 +59,8 @@ OptimizerName = Literal[
     "random",
 ]
 """What a job may name: a method with its default settings, or a preset."""
+
+_MISSING: Final = "none"
 
 Create = Callable[[Any, Space, int, int], Optimizer]
 """(settings, space, budget [evaluations], seed) -> the optimizer before its first ask."""
@@ -72,6 +78,8 @@ class Method:
         uses_start: Whether it learns from the designs that a job starts from. One that does not
             evaluates them first, and then goes on as if there had been none.
         extra: The optional dependencies that it needs, as in `gaitswarm[extra]`; "" if none.
+        libraries: Distributions whose version its path may depend on, beside those that every job
+            depends on; a job goes on with the same version only.
     """
 
     settings: type[OptimizerSettings]
@@ -80,6 +88,16 @@ class Method:
     replays: bool = False
     uses_start: bool = False
     extra: str = ""
+    libraries: tuple[str, ...] = ()
+
+    def versions(self) -> dict[str, str]:
+        """Versions of its libraries here; "none" for one that is not installed."""
+        return {name: _version(name) for name in self.libraries}
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Those of its libraries that are not installed here."""
+        return tuple(name for name, version in self.versions().items() if version == _MISSING)
 
 
 LONGEST_REPLAY: Final = 250_000
@@ -98,10 +116,19 @@ def _replayed(place: str) -> Create:
 
 
 METHODS: Final[dict[MethodName, Method]] = {
+    "cma-es": Method(
+        CmaEsSettings,
+        "Covariance matrix adaptation, with margin for integers and choices (cmaes; Hamano 2025)",
+        _replayed("evolution.cma_es:cma_es"),
+        replays=True,
+        extra="search",
+        libraries=("cmaes", "numpy", "scipy"),
+    ),
     "de": Method(
         DeSettings,
         "Differential evolution, L-SHADE (Tanabe and Fukunaga 2014)",
         DifferentialEvolution,
+        libraries=("scipy",),
     ),
     "nelder-mead": Method(
         NelderMeadSettings,
@@ -185,3 +212,10 @@ def create_search(
     if start is not None and len(start):
         optimizer.start_from(start)
     return optimizer
+
+
+def _version(distribution: str) -> str:
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return _MISSING

@@ -1,0 +1,63 @@
+"""Libraries that search methods use: refused where missing, and part of a job's provenance."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from importlib import metadata
+
+import pytest
+
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from services.optimizer.search.registry import METHODS, OPTIMIZERS
+from services.optimizer.service import JobService
+from services.optimizer.store.base import Store
+from tests.optimizer.formula import HERE, SPEC
+
+OPTIONAL = ("cmaes", "pymoo", "PyNomad", "scipy.stats", "sklearn")
+"""Modules that take long to import, or may be missing."""
+
+
+def test_a_job_whose_search_needs_a_missing_library_is_refused_with_the_way_out(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    method = replace(METHODS["random"], extra="search", libraries=("no-such-distribution",))
+    monkeypatch.setitem(METHODS, "random", method)
+    spec = SPEC.model_copy(update={"optimizer": OPTIMIZERS["random"]})
+    with pytest.raises(InvalidRequest, match=r"pip install 'gaitswarm\[search\]'") as refused:
+        JobService(store).submit(spec)
+    assert refused.value.field == "optimizer"
+    assert "no-such-distribution" in str(refused.value)
+    JobService(store).submit(SPEC)
+
+
+def test_a_job_keeps_the_versions_of_the_libraries_of_its_search() -> None:
+    spec = SPEC.model_copy(update={"optimizer": OPTIMIZERS["de"]})
+    kept = job_provenance(spec)
+    assert kept.search_libraries == {"scipy": metadata.version("scipy")}
+    other = kept.model_copy(update={"search_libraries": {"scipy": "0.1"}})
+    assert kept.changes(other) == (f"scipy 0.1 instead of {kept.search_libraries['scipy']}",)
+    assert kept.changes(kept) == ()
+
+
+def test_a_provenance_that_was_stored_without_them_is_read() -> None:
+    stored = HERE.model_dump(exclude={"search_libraries"})
+    assert JobProvenance.model_validate(stored) == HERE
+
+
+def test_methods_that_need_an_extra_say_which_libraries_it_brings() -> None:
+    for name, method in METHODS.items():
+        assert not method.extra or method.libraries, name
+
+
+def test_no_method_imports_its_library_before_it_runs() -> None:
+    code = (
+        "import sys, services.optimizer.search.registry;"
+        f"print([name for name in {OPTIONAL} if name in sys.modules])"
+    )
+    printed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
+    assert printed.strip() == "[]"

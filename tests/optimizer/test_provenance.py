@@ -26,6 +26,7 @@ from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
+from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.search.swarm.pso import ParticleSwarm
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
@@ -267,6 +268,6 @@ def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     specs = (JobSpec, IdentificationSpec, CalibrationSpec, Spec)
     used = (*specs, optimizer_settings, ParticleSwarm, DesignSpace, Preference, root_mean_square)
     files = {Path(inspect.getfile(thing)) for thing in used}
-    search = Path(inspect.getfile(ParticleSwarm)).parent
+    search = Path(inspect.getfile(Optimizer)).parent
     files |= set(search.rglob("*.py"))
     assert files == set(optimizer_files())

@@ -97,7 +97,7 @@ def job_provenance(spec: Spec) -> JobProvenance:
     return JobProvenance(
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
-        search_libraries=METHODS[spec.optimizer.name].versions(),
+        search_libraries=METHODS[spec.search.name].versions(),
         simulation=provenance_of(*spec.described, precision=spec.precision),
     )
 

@@ -221,10 +221,10 @@ class Spec(BaseModel):
         Raises:
             InvalidRequest: A library is missing; its field is `optimizer`.
         """
-        method = METHODS[self.optimizer.name]
+        method = METHODS[self.search.name]
         if method.missing:
             raise InvalidRequest(
-                f"{self.optimizer.name} needs {', '.join(method.missing)}, not installed here:"
+                f"{self.search.name} needs {', '.join(method.missing)}, not installed here:"
                 f" pip install 'gaitswarm[{method.extra}]'",
                 field="optimizer",
             )

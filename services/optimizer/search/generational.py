@@ -100,7 +100,7 @@ class Generational(ABC, Generic[S, G]):
         self._start: Floats = np.empty((0, space.dimension))
 
     @property
-    def members(self) -> int:
+    def first_size(self) -> int:
         """Size of the first generation, where start positions are more than that."""
         return self.settings.particles
 
@@ -161,7 +161,7 @@ class Generational(ABC, Generic[S, G]):
         self._evaluations += self._asked
         self._asked = 0
         if len(self._fitness) == len(self.positions):
-            if not self.generations and len(self._start) > self.members:
+            if not self.generations and len(self._start) > self.first_size:
                 self._keep_the_best()
             self.learn(self.positions, np.array(self._fitness))
             self.generations += 1
@@ -218,7 +218,7 @@ class Generational(ABC, Generic[S, G]):
 
     def _keep_the_best(self) -> None:
         """Of more start positions than members; the earlier of equals, in their order."""
-        order = np.argsort(np.array(self._fitness), kind="stable")[: self.members]
+        order = np.argsort(np.array(self._fitness), kind="stable")[: self.first_size]
         kept = np.sort(order)
         self.positions = self.positions[kept]
         self._fitness = [self._fitness[k] for k in kept.tolist()]

@@ -128,6 +128,7 @@ METHODS: Final[dict[MethodName, Method]] = {
         DeSettings,
         "Differential evolution, L-SHADE (Tanabe and Fukunaga 2014)",
         DifferentialEvolution,
+        uses_start=True,
         libraries=("scipy",),
     ),
     "nelder-mead": Method(

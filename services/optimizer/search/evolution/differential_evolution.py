@@ -144,6 +144,11 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         self._begin()
 
     @property
+    def first_size(self) -> int:
+        """Positions of the first generation."""
+        return self.settings.population
+
+    @property
     def members(self) -> Floats:
         """(n, d) the population, (0, d) before its first generation was judged."""
         return self._members.copy()

@@ -14,7 +14,8 @@ from sim.kernel.body import body_of, body_state
 from sim.kernel.limb import links_at
 from sim.kernel.parameters import Floats, gravity_on, pack_parameters
 from sim.kernel.physics_step import physics_model
-from sim.kernel.spatial import Matrix, add, apply, cross, dot, scale
+from sim.kernel.rotation import Rotation
+from sim.kernel.spatial import Matrix, add, apply, cross, dot, inverse, matrix, scale, vector
 from sim.robot import Robot
 from sim.robot.limbs import limbs_of
 from tests.examples.walks import STEEP, random_state
@@ -153,3 +154,28 @@ def test_the_centre_of_mass_is_pinocchios(
 ) -> None:
     for k, (q, _) in enumerate(states):
         same(found.centre[k], pin.centerOfMass(oracle.model, oracle.data, oracle.q(q)))
+
+
+@pytest.mark.parametrize(
+    "axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)]
+)
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_vectors_and_tensors_turn_as_by_pinocchios_rotation(
+    axis: tuple[float, float, float], *, symmetric: bool
+) -> None:
+    rng = np.random.default_rng(3)
+    rest = pin.AngleAxis(0.7, np.array([0.0, 0.6, 0.8])).matrix()
+    for angle in (0.0, 0.4, -2.0, 3.0):
+        rotation = Rotation(matrix(rest), axis, np.sin(angle), np.cos(angle))
+        to_parent = rest @ pin.AngleAxis(angle, np.array(axis)).matrix()
+        a, m = rng.normal(size=3), rng.normal(size=(3, 3))
+        m = m + m.T if symmetric else m
+        same(np.array(rotation.inwards(vector(a))), to_parent @ a)
+        same(np.array(rotation.outwards(vector(a))), to_parent.T @ a)
+        same(np.array(rotation.tensor_inwards(matrix(m))), to_parent @ m @ to_parent.T)
+
+
+def test_a_symmetric_matrix_is_inverted_by_its_adjugate() -> None:
+    for m in np.random.default_rng(4).normal(size=(20, 3, 3)):
+        definite = m @ m.T + np.eye(3)
+        same(np.array(inverse(matrix(definite))), np.linalg.inv(definite))

@@ -22,7 +22,7 @@ CONTROLLERS: Final[dict[ControllerName, Controller]] = {
 """By name, as in job specs and on the command line."""
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=192)
 def control_law(controller: ControllerName, gains: tuple[tuple[str, float], ...]) -> ControlLaw:
     """A design as it runs on the robot, made once for all that it walks through.
 

@@ -99,7 +99,7 @@ def inference_system(
     return Mamdani(inputs, sets.output, rules, shape, sets.universe)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=192)
 def quantised_table(
     fw1: float,
     fw23: float,

@@ -154,7 +154,7 @@ def integral_system(
     return Mamdani(inputs, sets.output, rules, shape, sets.universe)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=192)
 def _voltage_table(
     w1: float, w34: float, w56: float, shape: Shape, sets: MembershipSets
 ) -> Quantised:
@@ -162,7 +162,7 @@ def _voltage_table(
     return quantised(system, {"error": ERROR, "current": CURRENT})
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=192)
 def _integral_table(
     w1: float, w2: float, w78: float, shape: Shape, sets: MembershipSets
 ) -> Quantised:

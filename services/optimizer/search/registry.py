@@ -21,35 +21,42 @@ from services.optimizer.search.optimizer import Optimizer, SearchSettings
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.replayed import Replayed
 from services.optimizer.search.space import Space
+from services.optimizer.search.swarm.gsa import GsaSettings
 from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
 from services.optimizer.search.swarm.pso_ps import PsoPsSettings
+from services.optimizer.search.swarm.tlbo import TlboSettings
 
 Floats = NDArray[np.float64]
 
 OptimizerSettings = (
     CmaEsSettings
     | DeSettings
+    | GsaSettings
     | NelderMeadSettings
     | PatternSearchSettings
     | PsoPsSettings
     | PsoSettings
     | RandomSearchSettings
+    | TlboSettings
 )
 """Settings of every method; their `name` tells them apart."""
 
 MethodName = Literal[
     "cma-es",
     "de",
+    "gsa",
     "nelder-mead",
     "ps",
     "pso",
     "pso-ps",
     "random",
+    "tlbo",
 ]
 
 OptimizerName = Literal[
     "cma-es",
     "de",
+    "gsa",
     "nelder-mead",
     "ps",
     "pso",
@@ -57,6 +64,7 @@ OptimizerName = Literal[
     "pso-ps",
     "pso-thesis",
     "random",
+    "tlbo",
 ]
 """What a job may name: a method with its default settings, or a preset."""
 
@@ -131,6 +139,12 @@ METHODS: Final[dict[MethodName, Method]] = {
         uses_start=True,
         libraries=("scipy",),
     ),
+    "gsa": Method(
+        GsaSettings,
+        "Gravitational search algorithm (Rashedi, Nezamabadi-pour and Saryazdi 2009)",
+        _replayed("swarm.gsa:gsa"),
+        replays=True,
+    ),
     "nelder-mead": Method(
         NelderMeadSettings,
         "Simplex of Nelder and Mead (1965), adaptive coefficients (Gao and Han 2012), restarts",
@@ -159,6 +173,12 @@ METHODS: Final[dict[MethodName, Method]] = {
         RandomSearchSettings,
         "Uniform random designs, each independent of all others: what a search has to beat",
         _replayed("random_search:random_search"),
+        replays=True,
+    ),
+    "tlbo": Method(
+        TlboSettings,
+        "Teaching-learning-based optimization (Rao, Savsani and Vakharia 2011)",
+        _replayed("swarm.tlbo:tlbo"),
         replays=True,
     ),
 }

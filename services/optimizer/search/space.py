@@ -13,6 +13,9 @@ Floats = NDArray[np.float64]
 
 Kind = Literal["continuous", "integer", "categorical"]
 
+_RESOLUTION: Final = 2.0**40
+"""Continuous values are the same design to within this part of a range: rounding is far less."""
+
 
 @dataclass(frozen=True, slots=True)
 class Axis:
@@ -145,3 +148,33 @@ class Space:
         points = self.from_unit(unit)
         values = self.low + np.floor(unit * (self.span + 1.0))
         return np.where(self.integer, np.minimum(values, self.high), points)
+
+
+class Judged:
+    """Designs that were judged, so that none is asked for twice."""
+
+    def __init__(self, space: Space) -> None:
+        """Begin with none.
+
+        Args:
+            space: The box that is searched.
+        """
+        self._space: Final = space
+        self._seen: set[bytes] = set()
+
+    def new(self, designs: Floats) -> NDArray[np.bool_]:
+        """Tell which designs were not judged yet, and take them as judged from now on.
+
+        Args:
+            designs: (n, d).
+
+        Returns:
+            (n,) true where a design is new; of equal ones, for the first.
+        """
+        keys = np.rint(self._space.to_unit(designs) * _RESOLUTION).astype(np.int64)
+        new = np.zeros(len(designs), dtype=np.bool_)
+        for i, row in enumerate(keys):
+            key = row.tobytes()
+            new[i] = key not in self._seen
+            self._seen.add(key)
+        return new

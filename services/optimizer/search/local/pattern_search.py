@@ -12,15 +12,12 @@ from pydantic import Field
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.replayed import Proposals
-from services.optimizer.search.space import Space
+from services.optimizer.search.space import Judged, Space
 
 Floats = NDArray[np.float64]
 
 Polls = Generator[Floats, Floats, None]
 """Yields positions (n, d), n >= 1, is sent their fitness (n,), and ends when its mesh is fine."""
-
-_RESOLUTION: Final = 2.0**40
-"""Continuous values are the same design to within this part of a range: rounding is far less."""
 
 _DRAWS: Final = 20
 """Random starts to draw, at most, before one that was judged already is taken."""
@@ -60,36 +57,6 @@ class PatternSearchSettings(PollSettings):
     """Settings of pattern search."""
 
     name: Literal["ps"] = "ps"
-
-
-class Judged:
-    """Designs that were judged, so that none is asked for twice."""
-
-    def __init__(self, space: Space) -> None:
-        """Begin with none.
-
-        Args:
-            space: The box that is searched.
-        """
-        self._space: Final = space
-        self._seen: set[bytes] = set()
-
-    def new(self, designs: Floats) -> NDArray[np.bool_]:
-        """Tell which designs were not judged yet, and take them as judged from now on.
-
-        Args:
-            designs: (n, d).
-
-        Returns:
-            (n,) true where a design is new; of equal ones, for the first.
-        """
-        keys = np.rint(self._space.to_unit(designs) * _RESOLUTION).astype(np.int64)
-        new = np.zeros(len(designs), dtype=np.bool_)
-        for i, row in enumerate(keys):
-            key = row.tobytes()
-            new[i] = key not in self._seen
-            self._seen.add(key)
-        return new
 
 
 def pattern_search(

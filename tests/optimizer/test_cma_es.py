@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from services.optimizer.search.registry import METHODS, create_search
 from services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl
 
@@ -83,3 +84,11 @@ def test_integers_of_two_and_of_very_many_values_are_searched_too() -> None:
     )
     best = min(np.vstack(asked).tolist(), key=lambda x: abs(x[1] - 123_456.0) / 1e6 + x[0])
     assert best[0] == 0.0 and abs(best[1] - 123_456.0) < 100.0
+
+
+def test_a_search_begins_about_the_best_start_position() -> None:
+    settings = METHODS["cma-es"].settings.model_validate({"sigma": 0.01})
+    start = np.array([[-4.0] * 6, [3.0] * 6, [4.0] * 6])
+    optimizer = create_search(settings, BOX, 100, 1, start)
+    optimizer.tell(np.array([2.0, 1.0, 3.0])[: len(optimizer.ask())])
+    assert np.abs(optimizer.ask() - 3.0).max() < 0.5

@@ -129,8 +129,9 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Covariance matrix adaptation, with margin for integers and choices (cmaes; Hamano 2025)",
         _replayed("evolution.cma_es:cma_es"),
         replays=True,
+        uses_start=True,
         extra="search",
-        libraries=("cmaes", "numpy", "scipy"),
+        libraries=("cmaes", "scipy"),
     ),
     "de": Method(
         DeSettings,

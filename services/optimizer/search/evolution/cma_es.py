@@ -12,7 +12,7 @@ from pydantic import Field
 
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def cma_es(
     space: Space,
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
+    start: Start | None = None,
 ) -> Proposals:
     """Search by a normal distribution that adapts to where the better half of its samples is.
 
@@ -71,12 +72,15 @@ def cma_es(
         space: The box that is searched.
         budget: Evaluations of the planned run.
         random: Its random numbers.
+        start: The first distribution is about the best of these; None: about the box's middle.
 
     Yields:
         (population, d) positions.
     """
     size = settings.population or 4 + math.floor(3.0 * math.log(space.dimension))
     mean = np.full(space.dimension, 0.5)
+    if start is not None and len(start.best_first[0]):
+        mean = space.to_unit(start.best_first[0][0])
     while True:
         yield from _descent(_Distribution(space, size, mean, settings.sigma, random.seed()))
         size = min(_LARGEST_POPULATION, math.ceil(size * settings.growth))

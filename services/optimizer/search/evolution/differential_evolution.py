@@ -145,12 +145,12 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
 
     @property
     def first_size(self) -> int:
-        """Positions of the first generation."""
+        """Size of a new population."""
         return self.settings.population
 
     @property
-    def members(self) -> Floats:
-        """(n, d) the population, (0, d) before its first generation was judged."""
+    def population(self) -> Floats:
+        """(n, d) the members' positions, (0, d) before their first generation was judged."""
         return self._members.copy()
 
     def propose(self) -> Floats:
@@ -213,7 +213,11 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
             if len(getattr(state, name)) != settings.memory:
                 raise ValueError(f"{name}: expected {settings.memory} of them")
         judged, asked = len(state.fitness), len(state.positions)
-        if judged < asked != (size or settings.population):
+        # The first generation may be of more start positions than there are members.
+        whole = {size or settings.population} | (
+            {len(self._start)} if not state.generations else set()
+        )
+        if judged < asked and asked not in whole:
             raise ValueError(f"positions: {asked} of them under way for {size} members")
         members = self.inside(matrix(state.members, (size, d), "members"), "members")
         shape = (len(state.archive), d)

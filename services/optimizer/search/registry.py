@@ -17,6 +17,11 @@ from services.optimizer.search.evolution.differential_evolution import (
 )
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
+from services.optimizer.search.multistart.global_search import (
+    GlobalBfgsSettings,
+    GlobalNelderMeadSettings,
+    GlobalUnirandiSettings,
+)
 from services.optimizer.search.optimizer import Optimizer, SearchSettings
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.replayed import Replayed
@@ -31,6 +36,9 @@ Floats = NDArray[np.float64]
 OptimizerSettings = (
     CmaEsSettings
     | DeSettings
+    | GlobalBfgsSettings
+    | GlobalNelderMeadSettings
+    | GlobalUnirandiSettings
     | GsaSettings
     | NelderMeadSettings
     | PatternSearchSettings
@@ -44,6 +52,9 @@ OptimizerSettings = (
 MethodName = Literal[
     "cma-es",
     "de",
+    "global-bfgs",
+    "global-nelder-mead",
+    "global-unirandi",
     "gsa",
     "nelder-mead",
     "ps",
@@ -56,6 +67,9 @@ MethodName = Literal[
 OptimizerName = Literal[
     "cma-es",
     "de",
+    "global-bfgs",
+    "global-nelder-mead",
+    "global-unirandi",
     "gsa",
     "nelder-mead",
     "ps",
@@ -139,6 +153,24 @@ METHODS: Final[dict[MethodName, Method]] = {
         DifferentialEvolution,
         uses_start=True,
         libraries=("scipy",),
+    ),
+    "global-bfgs": Method(
+        GlobalBfgsSettings,
+        "GLOBAL (Csendes et al. 2008): clustered samples, local searches by BFGS",
+        _replayed("multistart.global_search:global_search"),
+        replays=True,
+    ),
+    "global-nelder-mead": Method(
+        GlobalNelderMeadSettings,
+        "GLOBAL (Csendes et al. 2008): clustered samples, local searches by Nelder-Mead",
+        _replayed("multistart.global_search:global_search"),
+        replays=True,
+    ),
+    "global-unirandi": Method(
+        GlobalUnirandiSettings,
+        "GLOBAL (Csendes et al. 2008): clustered samples, local searches by UniRandi",
+        _replayed("multistart.global_search:global_search"),
+        replays=True,
     ),
     "gsa": Method(
         GsaSettings,

@@ -16,6 +16,7 @@ from services.optimizer.search.local.walk import (
     Walk,
     evaluated_once,
     gains,
+    judged,
     mixed,
     sampled,
 )
@@ -133,16 +134,16 @@ def simplex_search(
         centroid = vertices[:-1].sum(axis=0) / n
         away = centroid - vertices[-1]
 
-        reflected = yield from _judged(centroid + away)
+        reflected = yield from judged(centroid + away)
         if reflected.fitness < fitness[0]:
-            expanded = yield from _judged(centroid + expansion * away)
+            expanded = yield from judged(centroid + expansion * away)
             accepted = expanded if expanded.fitness < reflected.fitness else reflected
         elif reflected.fitness < fitness[-2]:
             accepted = reflected
         else:
             outside = reflected.fitness < fitness[-1]
             trial = centroid + (contraction if outside else -contraction) * away
-            accepted = yield from _judged(trial)
+            accepted = yield from judged(trial)
             if not accepted.fitness < min(reflected.fitness, fitness[-1]):
                 vertices[1:] = vertices[0] + shrinkage * (vertices[1:] - vertices[0])
                 fitness[1:] = yield vertices[1:].copy()
@@ -150,10 +151,3 @@ def simplex_search(
         vertices[-1], fitness[-1] = accepted.unit, accepted.fitness
     k = int(np.argmin(fitness))
     return Point(vertices[k], float(fitness[k]))
-
-
-def _judged(unit: Floats) -> Walk:
-    """One trial point, brought to the nearest face of the box."""
-    inside = np.clip(unit, 0.0, 1.0)
-    fitness = yield inside[None]
-    return Point(inside, float(fitness[0]))

@@ -32,8 +32,9 @@ FEW_VALUES: Final = 32
 _RESUMED: Final = 0.25
 """First steps of a local search that is resumed after a poll, as a share of its usual ones."""
 
-_PATIENCE: Final = 100
-"""Proposals in a row of which everything is known, until one is evaluated again."""
+_PATIENCE: Final = 16
+"""Proposals in a row of which everything is known, until one is evaluated again. After that half as
+many, and so on, until there is something new: a space of a few designs is soon known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +82,18 @@ class Axes:
         self.polled: Final[Indices] = np.flatnonzero(few)
         self.least: Final[Floats] = np.where(space.integer, 1.0 / space.span, 0.0)
 
+    def design(self, unit: Floats) -> Floats:
+        """Give what is judged for a unit position.
+
+        Args:
+            unit: (d,) inside the box.
+
+        Returns:
+            (d,) the design.
+        """
+        design: Floats = self.space.designs(self.space.from_unit(unit[None]))[0]
+        return design
+
     def neighbours(self, unit: Floats) -> Floats:
         """Unit positions that differ in one polled variable: an integer by one, or another choice.
 
@@ -90,7 +103,7 @@ class Axes:
         Returns:
             (n, d), n >= 0.
         """
-        here = self.space.designs(self.space.from_unit(unit[None]))[0]
+        here = self.design(unit)
         found = []
         for j in self.polled.tolist():
             if self.space.categorical[j]:
@@ -158,6 +171,23 @@ def sampled(
     return [Point(unit[k], float(fitness[k])) for k in order]
 
 
+def judged(unit: Floats) -> Walk:
+    """Judge one position, brought to the nearest face of the box.
+
+    Args:
+        unit: (d,) unit position, anywhere.
+
+    Yields:
+        (1, d) the position inside the box.
+
+    Returns:
+        It, with its fitness.
+    """
+    inside = np.clip(unit, 0.0, 1.0)
+    fitness = yield inside[None]
+    return Point(inside, float(fitness[0]))
+
+
 def poll(start: Point, axes: Axes) -> Walk:
     """Go to the best neighbour in the polled variables as long as it is better.
 
@@ -223,15 +253,18 @@ def evaluated_once(space: Space, search: Endless) -> Proposals:
         (n, d) positions.
     """
     known: dict[bytes, float] = {}
-    unit, idle = next(search), 0
+    unit, idle, patience = next(search), 0, _PATIENCE
     while True:
         positions = space.from_unit(unit)
         # 0.0 and -0.0 are one value, but not the same bytes.
         keys = [row.tobytes() for row in space.designs(positions) + 0.0]
         new = {key: k for k, key in reversed(list(enumerate(keys))) if key not in known}
-        idle = 0 if new else idle + 1
-        if idle == _PATIENCE:
-            new, idle = {keys[0]: 0}, 0
+        if new:
+            idle, patience = 0, _PATIENCE
+        elif idle >= patience:
+            new, idle, patience = {keys[0]: 0}, 0, patience // 2
+        else:
+            idle += 1
         if new:
             asked = sorted(new.values())
             fitness = yield positions[asked]

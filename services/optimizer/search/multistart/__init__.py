@@ -1,0 +1,1 @@
+"""Searches that start local ones from several places."""

@@ -156,6 +156,16 @@ def test_an_opportunistic_poll_ends_with_the_first_success() -> None:
     assert sizes(better, after, PLANE) == pytest.approx([2.0**-5])
 
 
+def test_a_job_that_starts_from_designs_is_polled_around_their_best() -> None:
+    optimizer = search(PLANE, initial_mesh=2.0**-6)
+    given = np.array([[0.5, 1.0], [0.25, 2.0], [-0.5, 3.0]])
+    optimizer.start_from(given)
+    worth = iter([np.array([2.0, 1.0, math.inf]), np.ones(4)])
+    start, poll = proposals(optimizer, PLANE, lambda _: next(worth), 2)
+    assert start.tolist() == given.tolist()
+    assert sizes(given[1], poll, PLANE) == pytest.approx([2.0**-6] * 4)
+
+
 def test_a_start_that_fails_is_left_at_once() -> None:
     optimizer = search(PLANE)
     worth = iter([math.inf, math.inf, 1.0])

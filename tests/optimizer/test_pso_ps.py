@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.registry import create_search
+from services.optimizer.search.replayed import Start
 from services.optimizer.search.space import Axis, Space
 from services.optimizer.search.swarm.pso import ParticleSwarm
 from services.optimizer.search.swarm.pso_ps import PsoPsSettings, best_members, pso_ps
@@ -78,6 +79,24 @@ def told(settings: PsoPsSettings, iterations: list[Floats]) -> ParticleSwarm:
         swarm.ask()
         swarm.tell(bowl(positions))
     return swarm
+
+
+@pytest.mark.parametrize("count", [3, 12])
+def test_what_was_evaluated_before_are_members_of_the_first_swarm(count: int) -> None:
+    """They are not asked for again; of more than the swarm has, the best are its members."""
+    settings, drawn = settings_of(), RandomNumbers(7, 1)
+    given = BOX.from_unit(drawn.uniform(count, BOX.dimension))
+    start = Start(given, bowl(given))
+    swarm = ParticleSwarm(settings, BOX, 50, RandomNumbers(1, STREAM).seed())
+    swarm.start_from(given)
+    for size in (count, 10 - count) if count < 10 else (10, 2):
+        swarm.tell(bowl(swarm.ask(size)))
+    proposals = pso_ps(settings, BOX, BUDGET, RandomNumbers(1, STREAM), start)
+    first = next(proposals)
+    if count < 10:
+        assert len(first) == 10 - count
+        first = proposals.send(bowl(first))
+    assert first.tobytes() == swarm.ask().tobytes()
 
 
 def test_best_members_are_each_particles_best_without_failures_and_equal_designs() -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.registry import create_search
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Axis, Space
 from services.optimizer.search.swarm.tlbo import TlboSettings, tlbo
 
@@ -112,6 +112,21 @@ def test_a_class_of_which_everything_failed_is_replaced() -> None:
     drawn = RandomNumbers(1, 99)
     for positions in (first, second):
         assert positions.tolist() == BOX.evenly(drawn.uniform(6, 2)).tolist()
+
+
+def test_what_was_evaluated_before_are_learners_of_the_first_class() -> None:
+    given = np.array([[0.5, 0.5], [0.3, 0.2], [-0.5, 0.5]])
+    _, drawn = begin()
+    settings, worth = TlboSettings(particles=6), np.array([2.0, 1.0, math.inf])
+    proposals = tlbo(settings, BOX, 1000, RandomNumbers(1, 99), Start(given, worth))
+    assert next(proposals).tolist() == drawn[2:].tolist()
+
+    full = tlbo(TlboSettings(particles=2), BOX, 1000, RandomNumbers(1, 99), Start(given, worth))
+    moved = next(full)
+    teacher, mean = given[1], given[:2].mean(axis=0)
+    for before, after in zip(given[[1, 0]], moved, strict=True):
+        shares = [(after - before) / (teacher - factor * mean) for factor in (1.0, 2.0)]
+        assert any(((share >= 0.0) & (share < 1.0)).all() for share in shares)
 
 
 def test_it_reaches_a_target_with_integers_and_choices() -> None:

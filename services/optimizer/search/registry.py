@@ -189,6 +189,7 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Generalized pattern search on a mesh (Torczon 1997; Audet and Dennis 2003)",
         _replayed("local.pattern_search:pattern_search"),
         replays=True,
+        uses_start=True,
     ),
     "pso": Method(
         PsoSettings,
@@ -201,6 +202,7 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Particle swarm, then pattern search from its best designs (thesis 3.2.2)",
         _replayed("swarm.pso_ps:pso_ps"),
         replays=True,
+        uses_start=True,
     ),
     "random": Method(
         RandomSearchSettings,
@@ -213,6 +215,7 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Teaching-learning-based optimization (Rao, Savsani and Vakharia 2011)",
         _replayed("swarm.tlbo:tlbo"),
         replays=True,
+        uses_start=True,
     ),
 }
 

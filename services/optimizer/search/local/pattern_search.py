@@ -11,7 +11,7 @@ from pydantic import Field
 
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Judged, Space
 
 Floats = NDArray[np.float64]
@@ -64,6 +64,7 @@ def pattern_search(
     space: Space,
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
+    start: Start | None = None,
 ) -> Proposals:
     """Search by polling around the best design on a mesh that grows and shrinks.
 
@@ -78,16 +79,22 @@ def pattern_search(
         space: The box that is searched.
         budget: Evaluations of the planned run.
         random: Its random numbers.
+        start: What was evaluated before; the first search begins at its best.
 
     Yields:
-        (n, d) positions: a start, or a poll of up to 2d designs and all other choices.
+        (n, d) positions: a random design, or a poll of up to 2d designs and all other choices.
     """
     judged = Judged(space)
+    if start is not None:
+        judged.new(space.designs(start.positions))
+        positions, fitness = start.best_first
+        for centre in space.designs(positions[:1]):
+            yield from polls(settings, space, centre, float(fitness[0]), judged, random)
     while True:
-        start = _random_design(space, random, judged)
-        fitness = yield space.positions(start)
+        designs = _random_design(space, random, judged)
+        fitness = yield space.positions(designs)
         if np.isfinite(fitness[0]):
-            yield from polls(settings, space, start[0], float(fitness[0]), judged, random)
+            yield from polls(settings, space, designs[0], float(fitness[0]), judged, random)
 
 
 def polls(

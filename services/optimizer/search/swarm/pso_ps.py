@@ -10,7 +10,7 @@ from pydantic import Field
 
 from services.optimizer.search.local.pattern_search import Polls, PollSettings, polls
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Judged, Space
 from services.optimizer.search.swarm.pso import ParticleSwarm, SwarmSettings
 
@@ -38,7 +38,13 @@ class PsoPsSettings(SwarmSettings, PollSettings):
     )
 
 
-def pso_ps(settings: PsoPsSettings, space: Space, budget: int, random: RandomNumbers) -> Proposals:
+def pso_ps(
+    settings: PsoPsSettings,
+    space: Space,
+    budget: int,
+    random: RandomNumbers,
+    start: Start | None = None,
+) -> Proposals:
     """Search by a swarm, then by pattern searches from the best that its particles remember.
 
     The thesis's hybrid: pattern search runs after the swarm. That of Vaz and Vicente (2007),
@@ -53,6 +59,7 @@ def pso_ps(settings: PsoPsSettings, space: Space, budget: int, random: RandomNum
         budget: Evaluations of the planned run, of which the swarm has its share, in whole
             iterations and at least one.
         random: Its random numbers.
+        start: What was evaluated before, the first members of the first swarm.
 
     Yields:
         (n, d) positions: the swarm, or polls.
@@ -61,7 +68,11 @@ def pso_ps(settings: PsoPsSettings, space: Space, budget: int, random: RandomNum
     while True:
         swarm = ParticleSwarm(settings, space, iterations * settings.particles, random.seed())
         judged = Judged(space)
-        for _ in range(iterations):
+        if start is not None:
+            judged.new(space.designs(start.positions))
+            _begin(swarm, start)
+            start = None
+        while swarm.generations < iterations:
             positions = swarm.ask()
             judged.new(space.designs(positions))
             swarm.tell((yield positions))
@@ -72,6 +83,16 @@ def pso_ps(settings: PsoPsSettings, space: Space, budget: int, random: RandomNum
                 for start, fitness in zip(starts, worth.tolist(), strict=True)
             ]
         )
+
+
+def _begin(swarm: ParticleSwarm, start: Start) -> None:
+    """Let a swarm ask for what was evaluated before, and tell it."""
+    swarm.start_from(start.positions)
+    fitness = start.fitness
+    while len(fitness):
+        asked = len(swarm.ask(len(fitness)))
+        swarm.tell(fitness[:asked])
+        fitness = fitness[asked:]
 
 
 def best_members(swarm: ParticleSwarm, count: int) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Judged, Space
 
 Floats = NDArray[np.float64]
@@ -57,6 +57,7 @@ def tlbo(
     space: Space,
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
+    start: Start | None = None,
 ) -> Proposals:
     """Search by a class that learns from its teacher and from one another, phase by phase.
 
@@ -73,15 +74,23 @@ def tlbo(
         space: The box that is searched.
         budget: Evaluations of the planned run.
         random: Its random numbers.
+        start: What was evaluated before; the best of it are learners of the first class.
 
     Yields:
-        (particles, d) positions.
+        (n, d) positions: what a class still lacks, or (particles, d) in a phase.
     """
     judged = Judged(space)
+    known, worth = np.empty((0, space.dimension)), np.empty(0)
+    if start is not None:
+        judged.new(space.designs(start.positions))
+        known, worth = (best[: settings.particles] for best in start.best_first)
     while True:
-        start = space.evenly(random.uniform(settings.particles, space.dimension))
-        start = _without_duplicates(start, space, judged, random)
-        group = _Class(start.copy(), (yield start))
+        drawn = space.evenly(random.uniform(settings.particles, space.dimension))[len(known) :]
+        if len(drawn):
+            drawn = _without_duplicates(drawn, space, judged, random)
+            known, worth = np.vstack([known, drawn]), np.concatenate([worth, (yield drawn)])
+        group = _Class(known.copy(), worth.copy())
+        known, worth = known[:0], worth[:0]
         while np.isfinite(group.fitness).any() and group.spread(space) > settings.collapse:
             for phase in (_taught, _discussed):
                 moved = np.clip(phase(group, random), space.low, space.high)

@@ -70,9 +70,10 @@ def optimizers_table(optimizers: Iterable[OptimizerView]) -> Table:
     table = Table("name", "description", "settings", box=None)
     for optimizer in optimizers:
         settings = optimizer.settings.model_dump(exclude={"name"})
+        needs = "" if optimizer.needs is None else f"; needs {optimizer.needs}"
         table.add_row(
             optimizer.name,
-            Text(optimizer.description),
+            Text(f"{optimizer.description}{needs}"),
             Text("\n".join(f"{name} {json.dumps(value)}" for name, value in settings.items())),
         )
     return table

@@ -65,10 +65,20 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.tuning import JobSpec
     from services.optimizer.run.coordinator import Backoff
     from services.optimizer.search.automatic import AutoSettings
+    from services.optimizer.search.evolution.cma_es import CmaEsSettings
+    from services.optimizer.search.evolution.differential_evolution import DeSettings
     from services.optimizer.search.local.nelder_mead import NelderMeadSettings
     from services.optimizer.search.local.pattern_search import PatternSearchSettings
+    from services.optimizer.search.multistart.global_search import (
+        GlobalBfgsSettings,
+        GlobalNelderMeadSettings,
+        GlobalUnirandiSettings,
+    )
     from services.optimizer.search.random_search import RandomSearchSettings
+    from services.optimizer.search.swarm.gsa import GsaSettings
     from services.optimizer.search.swarm.pso import PsoSettings
+    from services.optimizer.search.swarm.pso_ps import PsoPsSettings
+    from services.optimizer.search.swarm.tlbo import TlboSettings
     from sim.calibration.targets import Target, TargetWalk
     from sim.controllers import CONTROLLERS
     from sim.identification.recorded_walk import RecordedWalk
@@ -94,12 +104,18 @@ __all__ = [
     "Backoff",
     "BestView",
     "CalibrationSpec",
+    "CmaEsSettings",
     "Conflict",
     "DatabaseJobs",
+    "DeSettings",
     "EvaluationTable",
     "EvaluationView",
     "EvaluatorUnavailable",
     "GaitswarmError",
+    "GlobalBfgsSettings",
+    "GlobalNelderMeadSettings",
+    "GlobalUnirandiSettings",
+    "GsaSettings",
     "HistoryIterationView",
     "IdempotencyConflict",
     "IdentifiabilityView",
@@ -120,6 +136,7 @@ __all__ = [
     "PatternSearchSettings",
     "Preference",
     "ProvenanceChanged",
+    "PsoPsSettings",
     "PsoSettings",
     "RandomSearchSettings",
     "RankingView",
@@ -139,6 +156,7 @@ __all__ = [
     "Target",
     "TargetWalk",
     "TargetsView",
+    "TlboSettings",
     "Unavailable",
     "Unreadable",
     "Variable",
@@ -185,10 +203,18 @@ _MODULES: Final = {
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.tuning": ("JobSpec",),
     "services.optimizer.search.automatic": ("AutoSettings",),
+    "services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
+    "services.optimizer.search.evolution.differential_evolution": ("DeSettings",),
     "services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
     "services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
-    "services.optimizer.search.swarm.pso": ("PsoSettings",),
+    "services.optimizer.search.multistart.global_search": (
+        "GlobalBfgsSettings", "GlobalNelderMeadSettings", "GlobalUnirandiSettings",
+    ),
     "services.optimizer.search.random_search": ("RandomSearchSettings",),
+    "services.optimizer.search.swarm.gsa": ("GsaSettings",),
+    "services.optimizer.search.swarm.pso": ("PsoSettings",),
+    "services.optimizer.search.swarm.pso_ps": ("PsoPsSettings",),
+    "services.optimizer.search.swarm.tlbo": ("TlboSettings",),
     "services.optimizer.run.coordinator": ("Backoff",),
     "sim.controllers": ("CONTROLLERS",),
     "sim.calibration.targets": ("Target", "TargetWalk"),

@@ -78,6 +78,10 @@ class OptimizerView(View):
         description="What the method is, with its source.",
         examples=["Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)"],
     )
+    needs: str | None = Field(
+        description="What would have to be installed for it where this was asked; null if nothing.",
+        examples=["pip install 'gaitswarm[search]'"],
+    )
     settings: ChosenSettings = Field(description="What the name stands for.")
     settings_schema: dict[str, Any] = Field(
         description="JSON schema of the method's settings, with defaults, bounds and descriptions."
@@ -129,16 +133,24 @@ def preference_views() -> list[PreferenceView]:
 
 
 def optimizer_views() -> list[OptimizerView]:
-    """Every search method and preset."""
+    """Every search method and preset, `auto` first."""
     return [
         OptimizerView(
             name=name,
-            description=AUTO_SUMMARY if settings.name == "auto" else METHODS[settings.name].summary,
+            **_of_method(settings),
             settings=settings,
             settings_schema=type(settings).model_json_schema(),
         )
         for name, settings in CHOICES.items()
     ]
+
+
+def _of_method(settings: ChosenSettings) -> dict[str, Any]:
+    if settings.name == "auto":
+        return {"description": AUTO_SUMMARY, "needs": None}
+    method = METHODS[settings.name]
+    needs = f"pip install 'gaitswarm[{method.extra}]'" if method.missing else None
+    return {"description": method.summary, "needs": needs}
 
 
 def controller_views() -> list[ControllerView]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import httpx2
 import jsonschema
+import pytest
 
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.search.automatic import CHOICES
+from services.optimizer.search.registry import METHODS
 from sim.controllers import CONTROLLERS
 from sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
 from sim.scenario import GAIT_VARIABLES, PRESETS, SCENARIOS
@@ -71,6 +74,16 @@ def test_optimizers_have_their_settings(client: httpx2.Client) -> None:
     for item in found.values():
         assert item["description"]
         jsonschema.validate(item["settings"], item["settings_schema"])
+
+
+def test_a_method_says_what_would_have_to_be_installed_for_it(
+    client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without = replace(METHODS["random"], extra="search", libraries=("no-such-library",))
+    monkeypatch.setitem(METHODS, "random", without)
+    needs = {item["name"]: item["needs"] for item in items(client, "optimizers")}
+    assert needs["random"] == "pip install 'gaitswarm[search]'"
+    assert needs["auto"] is needs["pso"] is None
 
 
 def test_controllers_have_variables_with_bounds_units_and_published_designs(

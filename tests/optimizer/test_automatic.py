@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from pydantic import ValidationError
 
@@ -61,6 +63,13 @@ def test_no_method_is_chosen_that_could_not_be_resumed() -> None:
     assert METHODS[SOMETIMES.name].replays
     assert chosen(Rule(SOMETIMES), LINE, LONGEST_REPLAY) == SOMETIMES
     assert chosen(Rule(SOMETIMES), LINE, LONGEST_REPLAY + 1) == OTHERWISE
+
+
+def test_no_method_is_chosen_that_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert chosen(Rule(SOMETIMES), LINE, 100) == SOMETIMES
+    without = replace(METHODS[SOMETIMES.name], libraries=("no-such-library",))
+    monkeypatch.setitem(METHODS, SOMETIMES.name, without)
+    assert chosen(Rule(SOMETIMES), LINE, 100) == OTHERWISE
 
 
 def test_the_size_of_iterations_stays_and_with_it_the_budget() -> None:

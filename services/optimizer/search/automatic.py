@@ -61,11 +61,13 @@ class Rule:
             budget: Evaluations of the planned run.
 
         Returns:
-            True within its limits, unless the method could not be resumed after so many.
+            True within its limits, unless the method needs what is not installed here, or could
+            not be resumed after so many evaluations.
         """
-        resumable = budget <= LONGEST_REPLAY or not METHODS[self.settings.name].replays
+        method = METHODS[self.settings.name]
         return (
-            resumable
+            not method.missing
+            and (budget <= LONGEST_REPLAY or not method.replays)
             and budget <= self.largest_budget
             and space.dimension <= self.largest_dimension
             and self.kinds.issuperset(axis.kind for axis in space.axes)

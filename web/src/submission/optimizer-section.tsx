@@ -1,5 +1,6 @@
 /** The search method and its settings, as the API describes them. */
 
+import type { OptimizerPreset } from '../api/types'
 import { capitalized, inWords, sentence } from '../format/words'
 import { ChoiceField, NumberField, Problems } from './number-field'
 import {
@@ -36,7 +37,7 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
           label="Method"
           choices={methodsOf(optimizers).map(({ name }) => name)}
           value={optimizer.name}
-          hint={method && sentence(method.description)}
+          hint={method && hintOf(method)}
           onChange={choose}
         />
         {presets.length > 1 && (
@@ -72,6 +73,11 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
       </div>
     </section>
   )
+}
+
+function hintOf({ description, needs }: OptimizerPreset): string {
+  const said = sentence(description)
+  return needs === null ? said : `${said} It is not installed where the job would run: ${needs}.`
 }
 
 /** One setting; where it is not the method's default, it says what that is. */

@@ -15,6 +15,7 @@ from services.optimizer.search.evolution.differential_evolution import (
     DeSettings,
     DifferentialEvolution,
 )
+from services.optimizer.search.local.annealing import AnnealingSettings
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.multistart.global_search import (
@@ -34,7 +35,8 @@ from services.optimizer.search.swarm.tlbo import TlboSettings
 Floats = NDArray[np.float64]
 
 OptimizerSettings = (
-    CmaEsSettings
+    AnnealingSettings
+    | CmaEsSettings
     | DeSettings
     | GlobalBfgsSettings
     | GlobalNelderMeadSettings
@@ -61,6 +63,7 @@ MethodName = Literal[
     "pso",
     "pso-ps",
     "random",
+    "sa",
     "tlbo",
 ]
 
@@ -78,6 +81,7 @@ OptimizerName = Literal[
     "pso-ps",
     "pso-thesis",
     "random",
+    "sa",
     "tlbo",
 ]
 """What a job may name: a method with its default settings, or a preset."""
@@ -208,6 +212,12 @@ METHODS: Final[dict[MethodName, Method]] = {
         RandomSearchSettings,
         "Uniform random designs, each independent of all others: what a search has to beat",
         _replayed("random_search:random_search"),
+        replays=True,
+    ),
+    "sa": Method(
+        AnnealingSettings,
+        "Simulated annealing with adapted steps (Corana et al. 1987), cooling over the budget",
+        _replayed("local.annealing:annealing"),
         replays=True,
     ),
     "tlbo": Method(

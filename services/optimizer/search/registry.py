@@ -16,6 +16,7 @@ from services.optimizer.search.evolution.differential_evolution import (
     DifferentialEvolution,
 )
 from services.optimizer.search.local.annealing import AnnealingSettings
+from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.multistart.global_search import (
@@ -38,6 +39,7 @@ OptimizerSettings = (
     AnnealingSettings
     | CmaEsSettings
     | DeSettings
+    | DirectedTabuSettings
     | GlobalBfgsSettings
     | GlobalNelderMeadSettings
     | GlobalUnirandiSettings
@@ -54,6 +56,7 @@ OptimizerSettings = (
 MethodName = Literal[
     "cma-es",
     "de",
+    "dts",
     "global-bfgs",
     "global-nelder-mead",
     "global-unirandi",
@@ -70,6 +73,7 @@ MethodName = Literal[
 OptimizerName = Literal[
     "cma-es",
     "de",
+    "dts",
     "global-bfgs",
     "global-nelder-mead",
     "global-unirandi",
@@ -157,6 +161,12 @@ METHODS: Final[dict[MethodName, Method]] = {
         DifferentialEvolution,
         uses_start=True,
         libraries=("scipy",),
+    ),
+    "dts": Method(
+        DirectedTabuSettings,
+        "Directed tabu search (Hedar and Fukushima 2006): explores, intensifies, diversifies",
+        _replayed("local.directed_tabu:directed_tabu"),
+        replays=True,
     ),
     "global-bfgs": Method(
         GlobalBfgsSettings,

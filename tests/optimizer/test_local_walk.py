@@ -19,8 +19,9 @@ from services.optimizer.search.local.walk import (
     mixed,
     poll,
 )
+from services.optimizer.search.registry import MethodName, create_search
 from services.optimizer.search.space import Axis, Space
-from tests.optimizer.searched import MIXED, mixed_bowl, walked
+from tests.optimizer.searched import MIXED, mixed_bowl, settings_of, walked
 
 AXES = Axes(MIXED)
 
@@ -136,3 +137,20 @@ def test_any_success_gains_on_a_failed_evaluation() -> None:
     failed, good, better = (Point(START, f) for f in (math.inf, 2.0, 1.9))
     assert gains(good, failed, 0.1) and not gains(failed, failed, 0.1)
     assert gains(better, good, 0.04) and not gains(better, good, 0.06)
+
+
+@pytest.mark.parametrize(
+    "method", ["dts", "global-bfgs", "global-nelder-mead", "global-unirandi", "nelder-mead", "sa"]
+)
+def test_a_method_searches_around_the_best_of_its_start(method: MethodName) -> None:
+    """Random designs differ from it in every variable, its neighbours in one."""
+    best = np.array([0.5, 7.0, 2.0, -1.2, 640.0])
+    start = MIXED.positions(np.array([[1.5, 2.0, 0.0, 4.0, 100.0], best]))
+    search = create_search(settings_of(method), MIXED, 120, 1, start)  # type: ignore[arg-type]
+    asked = []
+    while search.evaluations < 120:
+        designs = MIXED.designs(search.ask(120 - search.evaluations))
+        asked.append(designs)
+        search.tell(mixed_bowl(designs))
+    after = np.vstack(asked)[2:]
+    assert ((np.abs(after - best) > 1e-9).sum(axis=1) == 1).any()

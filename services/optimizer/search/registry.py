@@ -167,24 +167,28 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Directed tabu search (Hedar and Fukushima 2006): explores, intensifies, diversifies",
         _replayed("local.directed_tabu:directed_tabu"),
         replays=True,
+        uses_start=True,
     ),
     "global-bfgs": Method(
         GlobalBfgsSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by BFGS",
         _replayed("multistart.global_search:global_search"),
         replays=True,
+        uses_start=True,
     ),
     "global-nelder-mead": Method(
         GlobalNelderMeadSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by Nelder-Mead",
         _replayed("multistart.global_search:global_search"),
         replays=True,
+        uses_start=True,
     ),
     "global-unirandi": Method(
         GlobalUnirandiSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by UniRandi",
         _replayed("multistart.global_search:global_search"),
         replays=True,
+        uses_start=True,
     ),
     "gsa": Method(
         GsaSettings,
@@ -197,6 +201,7 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Simplex of Nelder and Mead (1965), adaptive coefficients (Gao and Han 2012), restarts",
         _replayed("local.nelder_mead:nelder_mead"),
         replays=True,
+        uses_start=True,
     ),
     "ps": Method(
         PatternSearchSettings,
@@ -229,6 +234,7 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Simulated annealing with adapted steps (Corana et al. 1987), cooling over the budget",
         _replayed("local.annealing:annealing"),
         replays=True,
+        uses_start=True,
     ),
     "tlbo": Method(
         TlboSettings,

@@ -10,10 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from services.optimizer.search.local.walk import Axes, Endless, Point, evaluated_once, sampled
+from services.optimizer.search.local.walk import (
+    Axes,
+    Endless,
+    Point,
+    evaluated_once,
+    known_points,
+    sampled,
+)
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
@@ -64,7 +71,11 @@ class AnnealingSettings(SearchSettings):
 
 
 def annealing(
-    settings: AnnealingSettings, space: Space, budget: int, random: RandomNumbers
+    settings: AnnealingSettings,
+    space: Space,
+    budget: int,
+    random: RandomNumbers,
+    start: Start | None = None,
 ) -> Proposals:
     """Search by moves in one variable at a time, of which worse ones are accepted now and then.
 
@@ -83,18 +94,25 @@ def annealing(
         space: The box that is searched.
         budget: Evaluations of the planned run, of one annealing.
         random: Its random numbers.
+        start: Chains begin at the best of these and of the first sample.
 
     Returns:
         The proposals.
     """
-    return evaluated_once(space, _annealings(settings, Axes(space), budget, random))
+    known = known_points(space, start)
+    search = _annealings(settings, Axes(space), budget, random, known)
+    return evaluated_once(space, search, start)
 
 
 def _annealings(
-    settings: AnnealingSettings, axes: Axes, budget: int, random: RandomNumbers
+    settings: AnnealingSettings,
+    axes: Axes,
+    budget: int,
+    random: RandomNumbers,
+    best: list[Point],
 ) -> Endless:
     """Anneal, again and again; the best is kept."""
-    chains, best = settings.chains, list[Point]()
+    chains = settings.chains
     moves = chains * settings.cycles * axes.space.dimension
     levels = max(2, math.ceil((budget - settings.sample) / moves))
     while True:

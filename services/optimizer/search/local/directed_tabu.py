@@ -18,12 +18,13 @@ from services.optimizer.search.local.walk import (
     Walk,
     evaluated_once,
     gains,
+    known_points,
     mixed,
     sampled,
 )
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
@@ -76,6 +77,7 @@ def directed_tabu(
     space: Space,
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
+    start: Start | None = None,
 ) -> Proposals:
     """Explore by a tabu search whose trial points are directed, then intensify, then diversify.
 
@@ -96,21 +98,27 @@ def directed_tabu(
         space: The box that is searched.
         budget: Evaluations of the planned run.
         random: Its random numbers.
+        start: The first exploration begins at the best of these; None: of a random sample.
 
     Returns:
         The proposals.
     """
-    return evaluated_once(space, _explorations(settings, Axes(space), random))
+    first = known_points(space, start)[:1]
+    return evaluated_once(space, _explorations(settings, Axes(space), random, first), start)
 
 
-def _explorations(settings: DirectedTabuSettings, axes: Axes, random: RandomNumbers) -> Endless:
+def _explorations(
+    settings: DirectedTabuSettings, axes: Axes, random: RandomNumbers, first: list[Point]
+) -> Endless:
     """Explore, intensify, diversify, for ever."""
 
     def search(start: Point, scale: float) -> Walk:
         return simplex_search(start, axes, 0.25 * settings.step * scale, settings.tolerance)
 
     visited = VisitedRegions(axes.space.dimension, settings.region_radius)
-    best = (yield from sampled(axes, random, axes.space.dimension + 1))[0]
+    if not first:
+        first = yield from sampled(axes, random, axes.space.dimension + 1)
+    best = first[0]
     start = best
     while True:
         found = yield from explore(start, axes, settings, visited, random)

@@ -17,12 +17,13 @@ from services.optimizer.search.local.walk import (
     evaluated_once,
     gains,
     judged,
+    known_points,
     mixed,
     sampled,
 )
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
@@ -55,6 +56,7 @@ def nelder_mead(
     space: Space,
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
+    start: Start | None = None,
 ) -> Proposals:
     """Search by a simplex that is restarted where it ended, and then elsewhere.
 
@@ -72,19 +74,23 @@ def nelder_mead(
         space: The box that is searched.
         budget: Evaluations of the planned run.
         random: Its random numbers.
+        start: The first simplex is around the best of these; None: of a random sample.
 
     Returns:
         The proposals.
     """
-    return evaluated_once(space, _restarted(settings, Axes(space), random))
+    first = known_points(space, start)[:1]
+    return evaluated_once(space, _restarted(settings, Axes(space), random, first), start)
 
 
-def _restarted(settings: NelderMeadSettings, axes: Axes, random: RandomNumbers) -> Endless:
+def _restarted(
+    settings: NelderMeadSettings, axes: Axes, random: RandomNumbers, first: list[Point]
+) -> Endless:
     def search(start: Point, scale: float) -> Walk:
         return simplex_search(start, axes, settings.simplex * scale, settings.tolerance)
 
     while True:
-        here = (yield from sampled(axes, random, settings.sample))[0]
+        here = first.pop() if first else (yield from sampled(axes, random, settings.sample))[0]
         while True:
             found = yield from mixed(here, axes, search)
             if not gains(found, here, settings.tolerance):

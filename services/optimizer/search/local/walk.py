@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
@@ -188,6 +188,23 @@ def judged(unit: Floats) -> Walk:
     return Point(inside, float(fitness[0]))
 
 
+def known_points(space: Space, start: Start | None) -> list[Point]:
+    """Give what was judged before a method began.
+
+    Args:
+        space: The box.
+        start: Positions with their fitness; None for none.
+
+    Returns:
+        The points that did not fail, best first.
+    """
+    if start is None:
+        return []
+    positions, fitness = start.best_first
+    units = space.to_unit(positions)
+    return [Point(unit, f) for unit, f in zip(units, fitness.tolist(), strict=True)]
+
+
 def poll(start: Point, axes: Axes) -> Walk:
     """Go to the best neighbour in the polled variables as long as it is better.
 
@@ -238,7 +255,7 @@ def mixed(start: Point, axes: Axes, search: LocalSearch) -> Walk:
         scale = _RESUMED
 
 
-def evaluated_once(space: Space, search: Endless) -> Proposals:
+def evaluated_once(space: Space, search: Endless, start: Start | None = None) -> Proposals:
     """Run a search in unit coordinates, and ask for no design twice.
 
     A design that was judged is answered from memory. Where there is nothing new to ask for, as in a
@@ -248,15 +265,19 @@ def evaluated_once(space: Space, search: Endless) -> Proposals:
     Args:
         space: The box.
         search: Yields unit positions; outside of the box they are brought to its nearest face.
+        start: Positions that were judged before.
 
     Yields:
         (n, d) positions.
     """
     known: dict[bytes, float] = {}
+    if start is not None:
+        # 0.0 and -0.0 are one value, but not the same bytes.
+        designs = space.designs(start.positions) + 0.0
+        known = {k.tobytes(): f for k, f in zip(designs, start.fitness.tolist(), strict=True)}
     unit, idle, patience = next(search), 0, _PATIENCE
     while True:
         positions = space.from_unit(unit)
-        # 0.0 and -0.0 are one value, but not the same bytes.
         keys = [row.tobytes() for row in space.designs(positions) + 0.0]
         new = {key: k for k, key in reversed(list(enumerate(keys))) if key not in known}
         if new:

@@ -18,12 +18,13 @@ from services.optimizer.search.local.walk import (
     Point,
     Walk,
     evaluated_once,
+    known_points,
     mixed,
     sampled,
 )
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
@@ -104,6 +105,7 @@ def global_search(
     space: Space,
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
+    start: Start | None = None,
 ) -> Proposals:
     """Search locally from sample points that belong to no cluster yet.
 
@@ -123,6 +125,7 @@ def global_search(
         space: The box that is searched.
         budget: Evaluations of the planned run.
         random: Its random numbers.
+        start: These are part of the first sample.
 
     Returns:
         The proposals.
@@ -137,17 +140,22 @@ def global_search(
             return simplex_search(start, axes, step, settings.tolerance)
         return bfgs(start, axes, step, settings.tolerance, settings.difference)
 
-    return evaluated_once(space, _cycles(settings, axes, search, random))
+    known = known_points(space, start)
+    return evaluated_once(space, _cycles(settings, axes, search, random, known), start)
 
 
 def _cycles(
-    settings: _GlobalSettings, axes: Axes, search: LocalSearch, random: RandomNumbers
+    settings: _GlobalSettings,
+    axes: Axes,
+    search: LocalSearch,
+    random: RandomNumbers,
+    sample: list[Point],
 ) -> Endless:
     """Sample, cluster, search locally, for ever."""
     d = axes.space.dimension
     count = settings.sample_per_variable * d
     selected = min(settings.selected_per_variable * d, _MOST_SELECTED)
-    clusters, sample, cycles = Clusters(axes), list[Point](), 0
+    clusters, cycles = Clusters(axes), 0
     while True:
         cycles += 1
         drawn = yield from sampled(axes, random, count)

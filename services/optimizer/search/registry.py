@@ -15,6 +15,7 @@ from services.optimizer.search.evolution.differential_evolution import (
     DeSettings,
     DifferentialEvolution,
 )
+from services.optimizer.search.evolution.genetic import GaSettings
 from services.optimizer.search.local.annealing import AnnealingSettings
 from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
@@ -40,6 +41,7 @@ OptimizerSettings = (
     | CmaEsSettings
     | DeSettings
     | DirectedTabuSettings
+    | GaSettings
     | GlobalBfgsSettings
     | GlobalNelderMeadSettings
     | GlobalUnirandiSettings
@@ -57,6 +59,7 @@ MethodName = Literal[
     "cma-es",
     "de",
     "dts",
+    "ga",
     "global-bfgs",
     "global-nelder-mead",
     "global-unirandi",
@@ -74,6 +77,7 @@ OptimizerName = Literal[
     "cma-es",
     "de",
     "dts",
+    "ga",
     "global-bfgs",
     "global-nelder-mead",
     "global-unirandi",
@@ -168,6 +172,14 @@ METHODS: Final[dict[MethodName, Method]] = {
         _replayed("local.directed_tabu:directed_tabu"),
         replays=True,
         uses_start=True,
+    ),
+    "ga": Method(
+        GaSettings,
+        "Genetic algorithm for mixed variables (pymoo; Blank and Deb 2020)",
+        _replayed("evolution.genetic:genetic_algorithm"),
+        replays=True,
+        extra="search",
+        libraries=("pymoo",),
     ),
     "global-bfgs": Method(
         GlobalBfgsSettings,

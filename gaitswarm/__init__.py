@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.calibration import CalibrationSpec
     from services.optimizer.jobs.identification import IdentificationSpec
     from services.optimizer.jobs.preference import PREFERENCES, Preference
+    from services.optimizer.jobs.tournament import TournamentSpec
     from services.optimizer.jobs.tuning import JobSpec
     from services.optimizer.run.coordinator import Backoff
     from services.optimizer.search.automatic import AutoSettings
@@ -157,6 +158,7 @@ __all__ = [
     "TargetWalk",
     "TargetsView",
     "TlboSettings",
+    "TournamentSpec",
     "Unavailable",
     "Unreadable",
     "Variable",
@@ -201,6 +203,7 @@ _MODULES: Final = {
     "services.optimizer.jobs.calibration": ("CalibrationSpec",),
     "services.optimizer.jobs.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
+    "services.optimizer.jobs.tournament": ("TournamentSpec",),
     "services.optimizer.jobs.tuning": ("JobSpec",),
     "services.optimizer.search.automatic": ("AutoSettings",),
     "services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),

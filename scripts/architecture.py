@@ -26,8 +26,9 @@ ROWS: Final = (
     ("services.runtime",),
     ("services.worker", "services.optimizer.service"),
     ("services.optimizer.run", "services.optimizer.analysis"),
-    ("services.optimizer.store", "services.optimizer.tournament"),
+    ("services.optimizer.store",),
     ("services.optimizer.jobs",),
+    ("services.optimizer.tournament",),
     ("services.optimizer.search", "sim"),
 )
 """Where a room is drawn, from the top. Every arrow must lead downwards or along its row."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -75,10 +75,33 @@ class WalkingCase(Case, Protocol):
         """
 
 
+@runtime_checkable
+class LongCase(Case, Protocol):
+    """A case that may take minutes of a single design, and can be broken off on the way.
+
+    Designs share nothing, so that each may be a task of its own.
+    """
+
+    def run_until(self, designs: NDArray[np.float64], should_stop: Callable[[], bool]) -> Outcome:
+        """As `run`, to the bit, unless it is broken off.
+
+        Args:
+            designs: As for `run`.
+            should_stop: Polled every few seconds at least.
+
+        Returns:
+            As of `run`.
+
+        Raises:
+            Exception: Of any kind, when `should_stop` has said so; nobody waits for an outcome.
+        """
+
+
 def run_together(
     cases: Sequence[Case],
     designs: Sequence[NDArray[np.float64]],
     kernel_time: KernelTime | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> tuple[Outcome, ...]:
     """Put designs to several cases, whose walks share calls of kernels where they can.
 
@@ -86,6 +109,8 @@ def run_together(
         cases: The cases.
         designs: Those of each case, as for `Case.run`.
         kernel_time: Is added to, by cases whose walks can be shared.
+        should_stop: Whether nobody waits for the outcomes any more; cases that take long may then
+            raise.
 
     Returns:
         The outcome of each case, with the bits that `Case.run` gives it.
@@ -101,9 +126,15 @@ def run_together(
     }
     outcomes = dict(zip(walking, walk_together(list(walking.values()), kernel_time), strict=True))
     return tuple(
-        outcomes[index] if index in outcomes else case.run(rows)
+        outcomes[index] if index in outcomes else _run(case, rows, should_stop)
         for index, (case, rows) in enumerate(pairs)
     )
+
+
+def _run(case: Case, designs: NDArray[np.float64], should_stop: Callable[[], bool]) -> Outcome:
+    if isinstance(case, LongCase):
+        return case.run_until(designs, should_stop)
+    return case.run(designs)
 
 
 @dataclass(frozen=True, slots=True)

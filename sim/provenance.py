@@ -118,8 +118,8 @@ def provenance_of(*robots: RobotSource, precision: Precision = "double") -> Prov
     """The provenance of what this process computes of robots; nothing is compiled for it.
 
     Args:
-        robots: the robots as cases name them, one at least. They are looked at once: later calls
-            give the same answer.
+        robots: the robots as cases name them, none where nothing walks. They are looked at once:
+            later calls give the same answer.
         precision: of the physics' numbers.
 
     Returns:

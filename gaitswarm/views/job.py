@@ -70,7 +70,7 @@ class JobSummaryView(View):
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
-    kind: Literal["tuning", "identification", "calibration"] | None = Field(
+    kind: Literal["tuning", "identification", "calibration", "tournament"] | None = Field(
         description="Whether it tunes a drive, fits parameters of the robot to recorded walks, or"
         " fits robot and conventions to a table of results; null if its spec cannot be read.",
         examples=["tuning"],

@@ -16,7 +16,7 @@ from services.worker.cutting import Chunk, cut
 from services.worker.fair_queue import FairQueue
 from services.worker.pace import Pace, TaskTime
 from services.worker.tasks import Answer, Task, TaskTotals
-from sim.case import WalkingCase
+from sim.case import LongCase, WalkingCase
 from sim.kernel.walk import Precision
 from sim.outcome import Outcome
 from sim.provenance import Provenance
@@ -233,9 +233,12 @@ class Dispatcher:
             self._changed.notify_all()
 
     def _cut(self, request: EvaluationRequest) -> tuple[Chunk, ...]:
-        # The interpreter steps one walk.
+        # The interpreter steps one walk, and a run has the lanes for the walks that it asks for.
         is_compiled = request.provenance.backend == "native"
-        lanes = max(self.lanes(case.precision) if is_compiled else 1 for case in request.cases)
+        lanes = max(
+            self.lanes(case.precision) if is_compiled and not isinstance(case, LongCase) else 1
+            for case in request.cases
+        )
         return cut(
             [case.duration for case in request.cases],
             len(request.designs),

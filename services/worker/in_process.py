@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
+from functools import partial
 
 from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.dispatch import Dispatcher
+from services.worker.dispatch import Dispatcher, Work
 from services.worker.preparation import KernelBuilder
 from services.worker.tasks import TaskTotals
 from sim import simulate
@@ -71,8 +72,11 @@ class InProcessEvaluator:
             if work is None:
                 continue
             try:
-                answer = work.task.run()
+                answer = work.task.run(partial(self._in_vain, work))
             except Exception as error:  # noqa: BLE001 - it is the caller's, in another thread
                 self._dispatcher.fail(work, error)
             else:
                 self._dispatcher.complete(work, answer)
+
+    def _in_vain(self, work: Work) -> bool:
+        return work.batch.ended or self._dispatcher.closed

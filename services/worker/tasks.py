@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,8 +68,12 @@ class Task:
             provenance=provenance,
         )
 
-    def run(self) -> Answer:
+    def run(self, should_stop: Callable[[], bool] = lambda: False) -> Answer:
         """Put the designs to the cases, unless this process computes something else.
+
+        Args:
+            should_stop: Whether nobody waits for the outcomes any more; what takes long may then
+                raise.
 
         Returns:
             The outcomes, or None in their place, with the provenance of this process.
@@ -85,6 +89,7 @@ class Task:
                 [self.cases[part.case] for part in self.parts],
                 [self.designs[part.start : part.stop] for part in self.parts],
                 kernel_time,
+                should_stop,
             )
         seconds = time.perf_counter() - begun - kernel_time.waited
         return Answer(

@@ -106,7 +106,7 @@ def test_every_error_is_a_problem(document: Document) -> None:
 def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -> None:
     schemas = document["components"]["schemas"]
 
-    kinds = ["JobSpec", "IdentificationSpec", "CalibrationSpec"]
+    kinds = ["JobSpec", "IdentificationSpec", "CalibrationSpec", "TournamentSpec"]
     assert not [name for name in schemas if name.startswith(tuple(f"{kind}-" for kind in kinds))]
     spec, null = schemas["JobView"]["properties"]["spec"]["anyOf"]
     answered = spec["oneOf"]

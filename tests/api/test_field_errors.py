@@ -106,7 +106,9 @@ def test_a_job_hears_of_its_own_kind_alone() -> None:
 
 
 def test_an_unknown_kind_hears_of_the_known() -> None:
-    assert told({"kind": "magic"}) == {"kind": "must be tuning, identification or calibration"}
+    assert told({"kind": "magic"}) == {
+        "kind": "must be tuning, identification, calibration or tournament"
+    }
 
 
 def test_a_wrong_key_is_told_by_its_path() -> None:

@@ -20,16 +20,20 @@ from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.jobs.misfit import root_mean_square
 from services.optimizer.jobs.optimizer_choice import optimizer_settings
 from services.optimizer.jobs.preference import Preference
+from services.optimizer.jobs.problem import FunctionProblem
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance, optimizer_files
+from services.optimizer.jobs.race_case import RaceCase
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.start import EarlierJobs
+from services.optimizer.jobs.tournament import TournamentSpec
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
-from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.swarm.pso import ParticleSwarm
+from services.optimizer.search.registry import create_search
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
+from services.optimizer.tournament.race import race
 from sim.errors import RobotFileError
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
 
@@ -265,9 +269,10 @@ def test_a_refused_claim_sends_nothing() -> None:
 
 
 def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
-    specs = (JobSpec, IdentificationSpec, CalibrationSpec, Spec)
-    used = (*specs, optimizer_settings, ParticleSwarm, DesignSpace, Preference, root_mean_square)
-    files = {Path(inspect.getfile(thing)) for thing in used}
-    search = Path(inspect.getfile(Optimizer)).parent
-    files |= set(search.rglob("*.py"))
+    specs = (JobSpec, IdentificationSpec, CalibrationSpec, TournamentSpec, Spec)
+    used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)
+    runs = (FunctionProblem, RaceCase)
+    files = {Path(inspect.getfile(thing)) for thing in (*used, *runs)}
+    for room in (Path(inspect.getfile(thing)).parent for thing in (create_search, race)):
+        files |= set(room.rglob("*.py"))
     assert files == set(optimizer_files())

@@ -8,11 +8,13 @@ from pydantic import Discriminator, Tag, TypeAdapter
 
 from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.identification import IdentificationSpec
+from services.optimizer.jobs.tournament import TournamentSpec
 from services.optimizer.jobs.tuning import JobSpec
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"
 _CALIBRATION: Final = "<calibration>"
+_TOURNAMENT: Final = "<tournament>"
 
 
 def _kind(value: Any) -> str:
@@ -24,13 +26,16 @@ def _kind(value: Any) -> str:
 AnySpec = Annotated[
     Annotated[JobSpec, Tag(_TUNING)]
     | Annotated[IdentificationSpec, Tag(_IDENTIFICATION)]
-    | Annotated[CalibrationSpec, Tag(_CALIBRATION)],
+    | Annotated[CalibrationSpec, Tag(_CALIBRATION)]
+    | Annotated[TournamentSpec, Tag(_TOURNAMENT)],
     Discriminator(
         _kind,
         custom_error_type="unknown_kind",
-        custom_error_message="kind: must be tuning, identification or calibration",
+        custom_error_message="kind: must be tuning, identification, calibration or tournament",
     ),
 ]
 
-SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec]] = TypeAdapter(AnySpec)
+SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | TournamentSpec]] = (
+    TypeAdapter(AnySpec)
+)
 """Reads a document with a spec of any kind; raises ValidationError for what is none."""

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.spec import Spec, create_optimizer
+from services.optimizer.jobs.tournament import TournamentSpec
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.random_stream import RandomNumbers
-from sim.case import Case, Walk
+from sim.case import Case, LongCase, Walk
 from sim.outcome import Status
 from sim.simulate import prepare
 
@@ -133,6 +134,8 @@ class MeasuredRates:
             Simulated seconds per second on all cores, None without a compiled kernel or a design
             that can begin to walk; and what that is based on, for people.
         """
+        if any(isinstance(case, LongCase) for case in cases):
+            return None, "nothing: a run takes too long to be measured beforehand"
         if prepare(spec.robot, precision=spec.precision) != "native":
             return None, "nothing: without a C compiler walks take some hundred times as long"
         # Only Linux says which processors a process may use.
@@ -200,7 +203,9 @@ def _alike(job: Job, spec: Spec, asked: int) -> bool:
 
 
 def _kind_of_walk(spec: Spec) -> str:
-    """What a walk's speed depends on: robot, controller and precision."""
+    """What a walk's speed depends on: robot, controller and precision; a run's, the method, too."""
+    if isinstance(spec, TournamentSpec):
+        return spec.model_dump_json(include={"method", "problems", "evaluations"})
     controller = spec.controller if isinstance(spec, JobSpec) else _fitted_walks(spec)
     return f"{controller} {spec.model_dump_json(include={'robot', 'precision'})}"
 

@@ -11,7 +11,6 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.search.registry import METHODS
 from sim.provenance import Provenance, provenance_of, source_digest, version_changes
 
 _OPTIMIZER: Final = Path(__file__).parents[1]
@@ -23,7 +22,11 @@ _JUDGING: Final = (
     "jobs/misfit.py",
     "jobs/optimizer_choice.py",
     "jobs/preference.py",
+    "jobs/problem.py",
+    "jobs/race_case.py",
     "jobs/spec.py",
+    "jobs/start.py",
+    "jobs/tournament.py",
     "jobs/tuning.py",
 )
 """Files that judge designs."""
@@ -97,7 +100,7 @@ def job_provenance(spec: Spec) -> JobProvenance:
     return JobProvenance(
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
-        search_libraries=METHODS[spec.search.name].versions(),
+        search_libraries=spec.search_libraries,
         simulation=provenance_of(*spec.described, precision=spec.precision),
     )
 
@@ -155,8 +158,8 @@ def with_record(
 
 def optimizer_files() -> tuple[Path, ...]:
     """The source files that judge designs and ask for them, in order."""
-    search = sorted((_OPTIMIZER / "search").rglob("*.py"))
-    return (*(_OPTIMIZER / name for name in _JUDGING), *search)
+    rooms = [sorted((_OPTIMIZER / room).rglob("*.py")) for room in ("search", "tournament")]
+    return (*(_OPTIMIZER / name for name in _JUDGING), *rooms[0], *rooms[1])
 
 
 @lru_cache(maxsize=1)

@@ -3,7 +3,8 @@
 Spec
 ├── JobSpec              (kind `tuning`) a drive is tuned to walk well
 ├── IdentificationSpec   (kind `identification`) a robot's parameters are fitted to measured walks
-└── CalibrationSpec      (kind `calibration`) robot and conventions are fitted to tables of results
+├── CalibrationSpec      (kind `calibration`) robot and conventions are fitted to tables of results
+└── TournamentSpec       (kind `tournament`) a search method is run many times on several problems
 """
 
 from __future__ import annotations
@@ -269,6 +270,11 @@ class Spec(BaseModel):
         Returns:
             K cases, in the order of `case_names`.
         """
+
+    @property
+    def search_libraries(self) -> dict[str, str]:
+        """Versions of the libraries that the search computes with here, by name."""
+        return METHODS[self.search.name].versions()
 
     @property
     def described(self) -> tuple[RobotSource, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module, metadata
 from typing import Any, Final, Literal, get_args
@@ -126,12 +126,36 @@ class Method:
 
     def versions(self) -> dict[str, str]:
         """Versions of its libraries here; "none" for one that is not installed."""
-        return {name: _version(name) for name in self.libraries}
+        return versions_of(self.libraries)
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Those of its libraries that are not installed here."""
-        return tuple(name for name, version in self.versions().items() if version == _MISSING)
+        return missing_of(self.libraries)
+
+
+def versions_of(libraries: Iterable[str]) -> dict[str, str]:
+    """Versions of distributions here.
+
+    Args:
+        libraries: Their names.
+
+    Returns:
+        Version by name; "none" for one that is not installed.
+    """
+    return {name: _version(name) for name in libraries}
+
+
+def missing_of(libraries: Iterable[str]) -> tuple[str, ...]:
+    """Distributions that are not installed here.
+
+    Args:
+        libraries: Names of some.
+
+    Returns:
+        Those of them.
+    """
+    return tuple(name for name, version in versions_of(libraries).items() if version == _MISSING)
 
 
 LONGEST_REPLAY: Final = 250_000

@@ -1,1 +1,1 @@
-"""Races between search methods, and the functions to race on."""
+"""Runs of one search method on one problem, with its rivals."""

@@ -35,8 +35,9 @@ export type RankedDesign = Schemas['RankedDesignView']
 export type Objective = Schemas['ObjectiveView']
 export type IdentificationSpec = Schemas['IdentificationSpec']
 export type CalibrationSpec = Schemas['CalibrationSpec']
+export type TournamentSpec = Schemas['TournamentSpec']
 /** A spec of any kind. */
-export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec
+export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | TournamentSpec
 export type Convergence = Schemas['IdentifiabilityView']
 export type FittedParameter = Schemas['ParameterView']
 export type Targets = Schemas['TargetsView']

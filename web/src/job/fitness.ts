@@ -54,6 +54,13 @@ const WORDS: Readonly<Record<Job['kind'], CaseWords>> = {
     worths: 'misfits',
     bars: 'Root mean square of how many tolerances the fitted targets of a walk are off',
   },
+  tournament: {
+    one: 'problem',
+    many: 'problems',
+    worth: 'best value',
+    worths: 'best values',
+    bars: MEAN,
+  },
 }
 
 export function caseWords(kind: Job['kind']): CaseWords {

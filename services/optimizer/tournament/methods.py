@@ -1,0 +1,223 @@
+"""Who takes part: methods of the registry and rivals, by name, with settings that may be drawn."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any, Final
+
+from services.optimizer.search.automatic import CHOICES, RULES, AutoSettings, chosen_method
+from services.optimizer.search.optimizer import SearchSettings
+from services.optimizer.search.registry import METHODS, create_search
+from services.optimizer.search.space import Space
+from services.optimizer.tournament.race import Evaluate, Search
+from services.optimizer.tournament.rivals import RIVALS
+from sim.variables import Variable
+
+_UNBOUNDED: Final = 1e9
+"""In place of a bound that a setting does not have."""
+
+_SWITCH: Final = ("no", "yes")
+"""Choices of a setting that is true or false."""
+
+
+def method_names() -> tuple[str, ...]:
+    """Names that a method may be given by: what a job may name, then rivals."""
+    return (*CHOICES, *RIVALS)
+
+
+def named_settings(name: str) -> SearchSettings:
+    """Settings that a name stands for.
+
+    Args:
+        name: Of a method or preset that a job may name, or of a rival.
+
+    Returns:
+        The settings.
+
+    Raises:
+        ValueError: There is none of that name; names those that there are.
+    """
+    if name in CHOICES:
+        return CHOICES[name]
+    if name in RIVALS:
+        return RIVALS[name].settings()
+    raise ValueError(f"unknown method {name!r}; known are {', '.join(method_names())}")
+
+
+def settings_models() -> dict[str, type[SearchSettings]]:
+    """Settings of every method that may take part, by their `name`."""
+    own: dict[str, type[SearchSettings]] = {name: m.settings for name, m in METHODS.items()}
+    rivals = {name: rival.settings for name, rival in RIVALS.items()}
+    return {"auto": AutoSettings, **own, **rivals}
+
+
+def search_of(settings: SearchSettings) -> Search:
+    """The method that settings are of.
+
+    Args:
+        settings: Of a method that takes part.
+
+    Returns:
+        What runs it.
+    """
+    if settings.name in RIVALS:
+        return partial(_rival, settings)
+    return partial(_ask_and_tell, settings)
+
+
+def libraries_of(settings: SearchSettings) -> tuple[str, ...]:
+    """Distributions that a method computes with, beside those that every job does.
+
+    Args:
+        settings: Of the method; of `auto`, those of all methods that it may choose.
+
+    Returns:
+        Their names.
+    """
+    if settings.name in RIVALS:
+        return RIVALS[settings.name].libraries
+    chosen = {rule.settings.name for rule in RULES} if settings.name == "auto" else {settings.name}
+    found = [library for name, m in METHODS.items() if name in chosen for library in m.libraries]
+    return tuple(dict.fromkeys(found))
+
+
+def extra_of(settings: SearchSettings) -> str:
+    """The optional dependencies of gaitswarm that a method's libraries are in.
+
+    Args:
+        settings: Of a method that needs some.
+
+    Returns:
+        As in `gaitswarm[extra]`.
+    """
+    return "search" if settings.name in METHODS else "rivals"
+
+
+def settings_variables(model: type[SearchSettings]) -> tuple[Variable, ...]:
+    """What may be drawn of a method's settings: numbers by their bounds, names by their choices.
+
+    Args:
+        model: Of the settings.
+
+    Returns:
+        One variable for each; a setting that is true or false has the choices `no` and `yes`.
+    """
+    properties = model.model_json_schema()["properties"]
+    found = [_variable(name, schema) for name, schema in properties.items() if name != "name"]
+    return tuple(variable for variable in found if variable is not None)
+
+
+def drawn_settings(settings: SearchSettings, drawn: dict[str, float]) -> SearchSettings:
+    """Settings of one run.
+
+    Args:
+        settings: Of the method.
+        drawn: What is other in this run, by name: numbers, of a choice its index.
+
+    Returns:
+        The settings of the run.
+
+    Raises:
+        ValueError: The method refuses them; says why.
+    """
+    known = {variable.name: variable for variable in settings_variables(type(settings))}
+    values = {name: _value(known[name], number) for name, number in drawn.items()}
+    return type(settings).model_validate(settings.model_dump() | values)
+
+
+def random_ranges(name: str) -> tuple[Variable, ...]:
+    """What the thesis's tournament draws anew for every run of a method.
+
+    Args:
+        name: Of the method.
+
+    Returns:
+        As `RANGES` says; else every number between half and twice its default and inside its
+        bounds, every choice with an equal share. A setting whose default is 0 or none stays.
+    """
+    model = settings_models()[name]
+    known = settings_variables(model)
+    if name in RANGES:
+        bounds = RANGES[name]
+        return tuple(
+            v.model_copy(update={"low": float(bounds[v.name][0]), "high": float(bounds[v.name][1])})
+            for v in known
+            if v.name in bounds
+        ) + tuple(v for v in known if v.kind == "categorical")
+    defaults = {key: getattr(model(name=name), key) for key in model.model_fields}
+    found = (v if v.kind == "categorical" else _around(v, defaults[v.name]) for v in known)
+    return tuple(variable for variable in found if variable is not None)
+
+
+RANGES: Final[dict[str, dict[str, tuple[float, float]]]] = {
+    "pso": {
+        "particles": (12, 50),
+        "cognitive": (0.25, 2.0),
+        "social": (0.75, 2.5),
+        "inertia_start": (0.7, 1.0),
+        "inertia_end": (0.3, 0.7),
+        "velocity_limit": (0.25, 1.0),
+    },
+}
+"""Ranges of settings, by method, where half to twice the default would not do."""
+
+
+def _around(variable: Variable, default: Any) -> Variable | None:
+    if isinstance(default, bool) or not isinstance(default, int | float) or not default:
+        return None
+    low, high = sorted((0.5 * default, 2.0 * default))
+    if variable.kind == "integer":
+        low, high = float(round(low)), float(round(high))
+    low, high = max(low, variable.low), min(high, variable.high)
+    return variable.model_copy(update={"low": low, "high": high}) if low < high else None
+
+
+def _variable(name: str, schema: dict[str, Any]) -> Variable | None:
+    described: dict[str, Any] = {"name": name, "description": schema.get("description", "")}
+    kind = schema.get("type")
+    if kind == "boolean":
+        return Variable(**described, kind="categorical", choices=_SWITCH)
+    if "enum" in schema and kind == "string":
+        return Variable(**described, kind="categorical", choices=tuple(schema["enum"]))
+    if kind not in ("integer", "number"):
+        return None
+    low, high = schema.get("minimum", -_UNBOUNDED), schema.get("maximum", _UNBOUNDED)
+    if "exclusiveMinimum" in schema:
+        low = _beyond(schema["exclusiveMinimum"], math.inf, kind)
+    if "exclusiveMaximum" in schema:
+        high = _beyond(schema["exclusiveMaximum"], -math.inf, kind)
+    numeric = "integer" if kind == "integer" else "continuous"
+    return Variable(**described, kind=numeric, low=low, high=high) if low < high else None
+
+
+def _beyond(bound: float, towards: float, kind: str) -> float:
+    """The next value, of a bound that is none itself."""
+    return math.nextafter(bound, towards) if kind == "number" else bound + math.copysign(1, towards)
+
+
+def _value(variable: Variable, number: float) -> object:
+    if variable.choices == _SWITCH:
+        return bool(number)
+    if variable.kind == "categorical":
+        return variable.shown(number)
+    return int(number) if variable.kind == "integer" else number
+
+
+def _rival(
+    settings: SearchSettings,
+    space: Space,
+    budget: int,  # noqa: ARG001 - libraries are told to end, not when
+    seed: int,
+    evaluate: Evaluate,
+) -> None:
+    RIVALS[settings.name].search(settings, space, seed, evaluate)
+
+
+def _ask_and_tell(settings: Any, space: Space, budget: int, seed: int, evaluate: Evaluate) -> None:
+    if isinstance(settings, AutoSettings):
+        settings = chosen_method(settings, space, budget)
+    optimizer = create_search(settings, space, budget, seed)
+    while True:
+        positions = optimizer.ask(budget - optimizer.evaluations)
+        optimizer.tell(evaluate(positions))

@@ -30,6 +30,7 @@ from cli.commands import (
     simulate,
     study,
     synthesize,
+    tournament,
     validate,
 )
 from cli.exit_codes import ExitCode, exit_code, explanation
@@ -89,6 +90,7 @@ for _module in (
     plot,
     validate,
     synthesize,
+    tournament,
     identify,
     calibrate,
     reconstruct,

@@ -181,12 +181,13 @@ def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
     return service.command(job_id, Command.RESUME) if job.state in _TAKEN_UP else job
 
 
-def earlier_job(service: JobService, spec: Spec) -> Job | None:
+def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) -> Job | None:
     """The job that was submitted before to do the same, under the same name.
 
     Args:
         service: Of the database to look in.
         spec: What the job is to do; its name should be its alone.
+        any_budget: Whether it may have been given more or fewer iterations.
 
     Returns:
         One that was not cancelled, and whose numbers depend on what they would depend on if it were
@@ -197,7 +198,10 @@ def earlier_job(service: JobService, spec: Spec) -> Job | None:
     while True:
         page = service.jobs(search=spec.name, after=after)
         for job in page.items:
-            if not job.readable or job.state is JobState.CANCELLED or job.spec != wanted:
+            if not job.readable or job.state is JobState.CANCELLED:
+                continue
+            budget = wanted.iterations if any_budget else job.spec.iterations
+            if job.spec.model_copy(update={"iterations": budget}) != wanted:
                 continue
             with suppress(ProvenanceChanged):
                 service.check_unchanged(job)

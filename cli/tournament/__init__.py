@@ -1,0 +1,1 @@
+"""Tournaments between search methods: plan, runs, report."""

@@ -1,0 +1,218 @@
+"""What a tournament runs: problems, methods with settings, and the jobs that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from cli.spec_file import parse_spec
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.search.registry import METHODS, OPTIMIZERS, missing_of
+from services.optimizer.tournament.functions import FUNCTIONS
+from services.optimizer.tournament.methods import (
+    libraries_of,
+    method_names,
+    named_settings,
+    random_ranges,
+    settings_models,
+)
+from services.optimizer.tournament.race import default_checkpoints
+from services.optimizer.tournament.rivals import RIVALS
+
+PresetName = Literal["thesis", "robot"]
+
+Settings = Literal["random", "default"]
+
+_LOOKED_AT: Final = (100, 250, 625, 2500)
+"""Evaluations after which medians are reported, where the budget reaches as far."""
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A tournament of a name.
+
+    Attributes:
+        problems: Names of its problems.
+        methods: Names of its methods.
+        repetitions: Runs of each method on each problem.
+        evaluations: Budget of each run.
+        settings: Whether settings are drawn anew for every run.
+    """
+
+    problems: tuple[str, ...]
+    methods: tuple[str, ...]
+    repetitions: int
+    evaluations: int
+    settings: Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """How much is run.
+
+    Attributes:
+        repetitions: Runs of each method on each problem.
+        evaluations: Budget of each run.
+        seed: Of the jobs, from which those of the runs are drawn.
+        settings: Whether settings are drawn anew for every run.
+    """
+
+    repetitions: int
+    evaluations: int
+    seed: int
+    settings: Settings
+
+    @property
+    def checkpoints(self) -> tuple[int, ...]:
+        """Evaluations at which runs are looked at."""
+        usual = default_checkpoints(self.evaluations)
+        return tuple(sorted({*usual, *(c for c in _LOOKED_AT if c < self.evaluations)}))
+
+    @property
+    def looked_at(self) -> tuple[int, ...]:
+        """Checkpoints whose medians are reported; the budget is the last."""
+        return (*(c for c in _LOOKED_AT if c < self.evaluations), self.evaluations)
+
+
+_ROBOT: Final[dict[str, dict[str, Any]]] = {
+    **{f"chapter-4.{name}": {"controller": "fuzzy-pi", "preference": name} for name in "ABC"},
+    "chapter-3.pi": {"controller": "pi", "preference": "chapter-3"},
+    "chapter-3.fuzzy-pi": {"controller": "fuzzy-pi-3", "preference": "chapter-3"},
+}
+"""Jobs that tune the robot's drive; those of chapter 3 walk straight, and search the gait, too."""
+
+PROBLEMS: Final = (*FUNCTIONS, *_ROBOT)
+"""Names of all problems."""
+
+PRESETS: Final[dict[PresetName, Preset]] = {
+    "thesis": Preset(tuple(FUNCTIONS), tuple(METHODS), 100, 2500, "random"),
+    "robot": Preset(tuple(_ROBOT), (*OPTIMIZERS, *RIVALS), 20, 625, "default"),
+}
+
+
+def chosen_problems(preset: Preset, names: str | None) -> list[str]:
+    """Names of the problems.
+
+    Args:
+        preset: Whose problems they are by default.
+        names: Separated by commas; None for those of the preset.
+
+    Returns:
+        The names, in order.
+
+    Raises:
+        InvalidRequest: One is unknown or named twice.
+    """
+    chosen = list(preset.problems) if names is None else _names(names)
+    _check(chosen, PROBLEMS, "problems")
+    return chosen
+
+
+def chosen_methods(
+    preset: Preset, names: str | None, document: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """Methods by label, each as a spec names it.
+
+    Args:
+        preset: Whose methods they are by default, as far as their libraries are installed.
+        names: Separated by commas; None for those of the preset.
+        document: Further ones by label: names, or objects with settings of your own.
+
+    Returns:
+        Label -> name or settings.
+
+    Raises:
+        InvalidRequest: One is unknown or named twice.
+    """
+    if names is None:
+        chosen = [] if document else [m for m in preset.methods if _is_installed(m)]
+    else:
+        chosen = _names(names)
+    _check(chosen, method_names(), "methods")
+    own = dict(document or {})
+    for label in own:
+        if label in chosen:
+            raise InvalidRequest(f"{label!r} is named twice", field="methods")
+    return {name: name for name in chosen} | own
+
+
+def tournament_jobs(
+    methods: Mapping[str, Any], problems: Sequence[str], size: Size, precision: str
+) -> dict[str, TournamentSpec]:
+    """The job of every method.
+
+    Args:
+        methods: By label, each as a spec names it.
+        problems: Names of the problems.
+        size: How much is run.
+        precision: Of the walks of a search.
+
+    Returns:
+        Specs by label.
+
+    Raises:
+        InvalidRequest: Something cannot be run; names the field.
+    """
+    documents = [_problem(name, precision) for name in problems]
+    found = {}
+    for label, method in methods.items():
+        document: dict[str, Any] = {
+            "kind": "tournament",
+            "name": f"tournament: {label}",
+            "method": method,
+            "problems": documents,
+            "evaluations": size.evaluations,
+            "checkpoints": size.checkpoints,
+            "stops_at_target": True,
+            "iterations": size.repetitions,
+            "seed": size.seed,
+        }
+        if size.settings == "random":
+            document["variables"] = ["seed", *_drawn(method)]
+        spec = parse_spec(document)
+        if isinstance(spec, TournamentSpec):
+            found[label] = spec
+    return found
+
+
+def _drawn(method: Any) -> list[dict[str, Any]]:
+    """Ranges of the settings of a method that are not given."""
+    if isinstance(method, str):
+        given: Mapping[str, Any] = named_settings(method).model_dump(exclude_unset=True)
+        name = named_settings(method).name
+    else:
+        given, name = method, method.get("name")
+    if name not in settings_models():
+        return []
+    return [v.model_dump() for v in random_ranges(name) if v.name not in given]
+
+
+def _is_installed(name: str) -> bool:
+    return not missing_of(libraries_of(named_settings(name)))
+
+
+def _problem(name: str, precision: str) -> dict[str, Any]:
+    if name in FUNCTIONS:
+        return {"function": name}
+    job: dict[str, Any] = {**_ROBOT[name], "precision": precision}
+    if name.startswith("chapter-3"):
+        searching = JobSpec.model_validate({**job, "scenarios": ["straight"]}).with_gait_searched()
+        job = searching.model_dump(exclude={"optimizer", "iterations", "seed", "start"})
+    return {"name": name, "job": job}
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _check(chosen: Sequence[str], known: Sequence[str], field: str) -> None:
+    if not chosen:
+        raise InvalidRequest(f"one at least; known are {', '.join(known)}", field=field)
+    for name in chosen:
+        if name not in known:
+            raise InvalidRequest(f"unknown {name!r}; known are {', '.join(known)}", field=field)
+        if chosen.count(name) > 1:
+            raise InvalidRequest(f"{name!r} is named twice", field=field)

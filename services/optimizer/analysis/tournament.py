@@ -1,0 +1,352 @@
+"""What a tournament says of its methods: running times, profiles, ranks, and how sure that is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.search.random_stream import RandomNumbers
+
+Floats = NDArray[np.float64]
+
+RESAMPLES: Final = 500
+"""Bootstrap samples of an interval."""
+
+CONFIDENCE: Final = 0.95
+
+_BOOTSTRAP: Final = 2_000
+"""Purpose of random streams: the same runs give the same intervals."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """All runs of one method on one problem.
+
+    Attributes:
+        checkpoints: (m,) evaluations at which `best` was noted; the last is the budget.
+        best: (r, m) least fitness of each run so far, NaN while all its evaluations failed.
+        to_best: (r,) evaluations until its best was found, NaN without one.
+        to_target: (r,) evaluations until the target was reached, NaN if it was not.
+        dimension: Variables of the problem.
+        target: Fitness that counts as solved; None if there is none.
+    """
+
+    checkpoints: NDArray[np.int64]
+    best: Floats
+    to_best: Floats
+    to_target: Floats
+    dimension: int
+    target: float | None
+
+    def __len__(self) -> int:
+        return len(self.best)
+
+    @property
+    def final(self) -> Floats:
+        """(r,) least fitness of each run, +inf if all its evaluations failed."""
+        last = self.best[:, -1]
+        return np.where(np.isnan(last), np.inf, last)
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """(r,) whether a run reached the target."""
+        return ~np.isnan(self.to_target)
+
+    @property
+    def budget(self) -> int:
+        """Evaluations of a run."""
+        return int(self.checkpoints[-1])
+
+    def aiming_at(self, target: float) -> Runs:
+        """The same runs with another target, reached at the first checkpoint that shows it.
+
+        Args:
+            target: Fitness that counts as solved.
+
+        Returns:
+            The runs; `to_target` are checkpoints.
+        """
+        reached = np.nan_to_num(self.best, nan=math.inf) <= target
+        at = self.checkpoints[reached.argmax(axis=1)].astype(np.float64)
+        return replace(self, to_target=np.where(reached.any(axis=1), at, math.nan), target=target)
+
+    def quartiles(self) -> Floats:
+        """(3, m) lower quartile, median and upper quartile of the best so far.
+
+        +inf where so many runs have none; values in between are interpolated.
+        """
+        filled = np.where(np.isnan(self.best), np.inf, self.best)
+        rows: Floats = np.quantile(filled, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf")
+        return rows
+
+    def median_after(self, evaluations: int) -> float:
+        """Median of the best after so many evaluations.
+
+        Args:
+            evaluations: One of the checkpoints, or the last one before counts.
+
+        Returns:
+            The middle run's, the lower of two; +inf if it has none, NaN before the first
+            checkpoint.
+        """
+        index = int(np.searchsorted(self.checkpoints, evaluations, "right")) - 1
+        return math.nan if index < 0 else float(self.quartiles()[1, index])
+
+
+Results = Mapping[str, Mapping[str, Runs]]
+"""Runs by problem, then by method."""
+
+
+def runs_of(spec: TournamentSpec, columns: EvaluationColumns, most: int) -> dict[str, Runs]:
+    """Runs of a job, by problem.
+
+    Args:
+        spec: Of the job.
+        columns: Its evaluations, one for each repetition.
+        most: Repetitions to take, the first ones.
+
+    Returns:
+        Runs of its method on each of its problems, in order.
+    """
+    rows = columns.objectives[:most]
+    count = len(spec.checkpoints)
+    return {
+        problem.name: Runs(
+            checkpoints=np.array(spec.checkpoints),
+            best=rows[:, k, :count],
+            to_best=rows[:, k, count],
+            to_target=rows[:, k, count + 1],
+            dimension=problem.space.dimension,
+            target=problem.target,
+        )
+        for k, problem in enumerate(spec.problems)
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """An estimate with a bootstrap interval of 95 %.
+
+    Attributes:
+        value: Of all runs.
+        low: Quantile 0.025 over resampled runs.
+        high: Quantile 0.975.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+def expected_running_time(to_target: Floats, budget: int) -> float:
+    """Evaluations until the target is reached, if runs are repeated until one is successful.
+
+    The sum of evaluations of all runs, each until it reached the target or its budget was spent,
+    over the number of runs that reached it (Hansen, Auger, Ros, Mersmann, Tusar and Brockhoff 2021,
+    COCO).
+
+    Args:
+        to_target: (r,) evaluations until the target was reached, NaN for runs that did not.
+        budget: Evaluations of such a run.
+
+    Returns:
+        The expected running time; +inf if no run reached the target.
+    """
+    solved = ~np.isnan(to_target)
+    spent = np.where(solved, to_target, budget).sum()
+    return float(spent / solved.sum()) if solved.any() else math.inf
+
+
+def running_time_interval(runs: Runs) -> Interval:
+    """Expected running time with an interval, of resampled runs.
+
+    Args:
+        runs: Of a method on a problem with a target.
+
+    Returns:
+        The estimate; a bound is +inf where so many resamples have no successful run.
+    """
+    return _interval(
+        expected_running_time(runs.to_target, runs.budget),
+        lambda pick: expected_running_time(runs.to_target[pick(len(runs))], runs.budget),
+    )
+
+
+def data_profile(
+    results: Results, method: str, precision: float, budgets: Sequence[float]
+) -> Floats:
+    """Share of runs that are solved within a budget (More and Wild 2009, SIAM J. Optim. 20(1)).
+
+    A run has solved a problem when f <= f_L + tau (f_0 - f_L), eq. 2.2, with f_L the least value of
+    any run of any method. Methods start anywhere, so f_0 is the median over all runs of their best
+    at the first checkpoint. Evaluations are those of the checkpoint at which a run is seen to have
+    solved it.
+
+    Args:
+        results: Of all methods.
+        method: Whose profile is wanted.
+        precision: tau.
+        budgets: (b,) evaluations over the number of variables plus one, the unit of a simplex
+            gradient.
+
+    Returns:
+        (b,) shares, over all runs on all problems.
+    """
+    solved = []
+    for by_method in results.values():
+        least = min(float(runs.final.min(initial=math.inf)) for runs in by_method.values())
+        first = np.concatenate([runs.best[:, 0] for runs in by_method.values()])
+        begun = float(np.median(first[~np.isnan(first)])) if not np.isnan(first).all() else math.inf
+        runs = by_method[method]
+        bound = least + precision * (begun - least) if math.isfinite(begun) else least
+        at = np.nan_to_num(runs.aiming_at(bound).to_target, nan=math.inf)
+        solved.append(at / (runs.dimension + 1))
+    gradients = np.concatenate(solved)
+    return np.array([float((gradients <= budget).mean()) for budget in budgets])
+
+
+def ranks(by_method: Mapping[str, Runs]) -> Floats:
+    """Rank methods on a problem by how their runs compare.
+
+    A run is before another one if it reached the target and the other did not, or both did and it
+    took fewer evaluations, or neither did and its best is less. Methods are ranked by the mean rank
+    of their runs among all runs, ties sharing a mean rank.
+
+    Args:
+        by_method: Runs of each method.
+
+    Returns:
+        (M,) ranks from 1, the best, in the order of the methods.
+    """
+    return _ranks([_scores(runs) for runs in by_method.values()])
+
+
+def mean_ranks(results: Results, methods: Sequence[str]) -> dict[str, Interval]:
+    """Ranks of methods, averaged over problems, with intervals of resampled runs.
+
+    Args:
+        results: Of all methods.
+        methods: Their names.
+
+    Returns:
+        Mean rank of each; 1 is that of a method that is the best on every problem.
+    """
+    scores = _all_scores(results, methods)
+    value = _mean_ranks(scores)
+    samples = _resampled(lambda pick: _mean_ranks(_picked(scores, pick)))
+    return {name: _bounded(float(value[k]), samples[:, k]) for k, name in enumerate(methods)}
+
+
+def rank_correlation(one: Results, other: Results, methods: Sequence[str]) -> Interval:
+    """Spearman's correlation of methods' mean ranks on two sets of problems.
+
+    Args:
+        one: A set of problems with runs of each method.
+        other: Another one.
+        methods: That are in both, three at least.
+
+    Returns:
+        The correlation, with an interval of resampled runs: it says how sure the ranks are, not
+        what other methods would do. NaN where all methods are equal on a set.
+    """
+    scores = [_all_scores(results, methods) for results in (one, other)]
+
+    def correlation(sets: Sequence[list[list[Floats]]]) -> float:
+        return spearman(_mean_ranks(sets[0]), _mean_ranks(sets[1]))
+
+    samples = _resampled(lambda pick: [correlation([_picked(s, pick) for s in scores])])
+    return _bounded(correlation(scores), samples[:, 0])
+
+
+def spearman(one: Floats, other: Floats) -> float:
+    """Spearman's rank correlation, ties sharing their mean rank.
+
+    Args:
+        one: (M,) values.
+        other: (M,) values of the same things.
+
+    Returns:
+        -1 to 1; NaN where one of the two is constant.
+    """
+    a, b = (average_ranks(values) for values in (one, other))
+    a, b = a - a.mean(), b - b.mean()
+    scale = math.sqrt(float((a * a).sum()) * float((b * b).sum()))
+    return float((a * b).sum()) / scale if scale > 0.0 else math.nan
+
+
+def average_ranks(values: Floats) -> Floats:
+    """Ranks from 1, the least; equal values share their mean rank.
+
+    Args:
+        values: (n,), +inf allowed.
+
+    Returns:
+        (n,).
+    """
+    ordered = np.sort(values)
+    first: Floats = np.searchsorted(ordered, values, "left").astype(np.float64)
+    last: Floats = np.searchsorted(ordered, values, "right").astype(np.float64)
+    return 0.5 * (first + last + 1.0)
+
+
+Pick = Callable[[int], NDArray[np.intp]]
+"""How many runs there are -> (n,) indices of resampled ones."""
+
+
+def _scores(runs: Runs) -> Floats:
+    """(r, 2) what runs are compared by: 0 and evaluations to the target, or 1 and the best."""
+    solved = runs.solved
+    return np.stack([~solved, np.where(solved, runs.to_target, runs.final)], axis=1)
+
+
+def _ranks(scores: Sequence[Floats]) -> Floats:
+    joined = np.concatenate(scores)
+    # Equal rows get equal places; places are then ranked with ties.
+    _, place = np.unique(joined, axis=0, return_inverse=True)
+    among_all = average_ranks(place.reshape(-1).astype(np.float64))
+    edges = np.cumsum([len(s) for s in scores])[:-1]
+    return average_ranks(np.array([part.mean() for part in np.split(among_all, edges)]))
+
+
+def _all_scores(results: Results, methods: Sequence[str]) -> list[list[Floats]]:
+    """By problem, then by method."""
+    return [[_scores(by_method[name]) for name in methods] for by_method in results.values()]
+
+
+def _mean_ranks(scores: Sequence[Sequence[Floats]]) -> Floats:
+    total = sum((_ranks(of_problem) for of_problem in scores), np.zeros(len(scores[0])))
+    return total / len(scores)
+
+
+def _picked(scores: Sequence[Sequence[Floats]], pick: Pick) -> list[list[Floats]]:
+    return [[runs[pick(len(runs))] for runs in of_problem] for of_problem in scores]
+
+
+def _interval(value: float, statistic: Callable[[Pick], float]) -> Interval:
+    return _bounded(value, _resampled(lambda pick: [statistic(pick)])[:, 0])
+
+
+def _resampled(statistic: Callable[[Pick], Sequence[float] | Floats]) -> Floats:
+    """(RESAMPLES, ...) the statistic of runs that are drawn with replacement."""
+    random = RandomNumbers(1, _BOOTSTRAP)
+
+    def pick(count: int) -> NDArray[np.intp]:
+        return np.floor(random.uniform(count) * count).astype(np.intp)
+
+    return np.array([statistic(pick) for _ in range(RESAMPLES)])
+
+
+def _bounded(value: float, samples: Floats) -> Interval:
+    known = samples[~np.isnan(samples)]
+    if not len(known):
+        return Interval(value, math.nan, math.nan)
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low, high = np.quantile(known, (tail, 1.0 - tail), method="inverted_cdf")
+    return Interval(value, float(low), float(high))

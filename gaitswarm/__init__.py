@@ -68,6 +68,9 @@ if TYPE_CHECKING:
     from services.optimizer.search.automatic import AutoSettings
     from services.optimizer.search.evolution.cma_es import CmaEsSettings
     from services.optimizer.search.evolution.differential_evolution import DeSettings
+    from services.optimizer.search.evolution.genetic import GaSettings
+    from services.optimizer.search.local.annealing import AnnealingSettings
+    from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
     from services.optimizer.search.local.nelder_mead import NelderMeadSettings
     from services.optimizer.search.local.pattern_search import PatternSearchSettings
     from services.optimizer.search.multistart.global_search import (
@@ -98,6 +101,7 @@ __all__ = [
     "PREFERENCES",
     "PRESETS",
     "SCENARIOS",
+    "AnnealingSettings",
     "AsyncDatabaseJobs",
     "AsyncJobs",
     "AsyncServerJobs",
@@ -109,9 +113,11 @@ __all__ = [
     "Conflict",
     "DatabaseJobs",
     "DeSettings",
+    "DirectedTabuSettings",
     "EvaluationTable",
     "EvaluationView",
     "EvaluatorUnavailable",
+    "GaSettings",
     "GaitswarmError",
     "GlobalBfgsSettings",
     "GlobalNelderMeadSettings",
@@ -208,6 +214,9 @@ _MODULES: Final = {
     "services.optimizer.search.automatic": ("AutoSettings",),
     "services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
     "services.optimizer.search.evolution.differential_evolution": ("DeSettings",),
+    "services.optimizer.search.evolution.genetic": ("GaSettings",),
+    "services.optimizer.search.local.annealing": ("AnnealingSettings",),
+    "services.optimizer.search.local.directed_tabu": ("DirectedTabuSettings",),
     "services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
     "services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
     "services.optimizer.search.multistart.global_search": (

@@ -17,7 +17,7 @@ import pytest
 from services.optimizer.jobs.job import Command, Job
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
-from tests.api.conftest import Commit, Serve
+from tests.api.conftest import PARTICLES, Commit, Serve
 
 pytestmark = pytest.mark.slow
 
@@ -86,6 +86,7 @@ def test_iterations_are_streamed_as_they_are_committed(
             "state": "succeeded",
             "error": None,
             "iterations": 3,
+            "evaluations": 3 * PARTICLES,
         }
         assert list(stream) == []
 

@@ -108,6 +108,18 @@ def test_one_valley_is_searched_once_a_cycle_and_two_from_both(method: MethodNam
 
 
 @LOCAL
+def test_what_joins_a_known_cluster_is_not_searched_from(method: MethodName) -> None:
+    def bowl(x: Floats) -> Floats:
+        return 1.0 + np.square(x - 0.4).sum(axis=1)
+
+    asked = designs_asked(
+        method, SQUARE, bowl, 1200, particles=1000, sample_per_variable=100, alpha=1e-6
+    )
+    assert [len(designs) for designs in asked[-3:-1]] == [200, 200]
+    assert sum(len(designs) == 200 for designs in asked) > 3
+
+
+@LOCAL
 def test_a_mixed_optimum_is_found(method: MethodName) -> None:
     calls = [
         calls_to(1e-2, designs_asked(method, MIXED, mixed_bowl, 600, seed), mixed_bowl)

@@ -111,6 +111,7 @@ class Embedded:
                     on_news=progress.remark,
                     stop=stop,
                     accepts_changes=self._accepts_changes,
+                    cache=self._settings.cache,
                 )
             except Exception as error:
                 error.add_note(_how_to_go_on(job.id, jobs.place))
@@ -251,6 +252,7 @@ def _report(job: JobView, place: str, *, compare: bool) -> None:
         if searched is not None:
             console.print(searched, markup=False)
     speed = f" at {job.simulations_per_second:.0f} walks/s" if job.simulations_per_second else ""
-    note(f"{job.evaluations} designs in {len(job.spec.case_names)} walks each{speed}")
+    saved = f"; {job.evaluations_saved} of them were known" if job.evaluations_saved else ""
+    note(f"{job.evaluations} designs in {len(job.spec.case_names)} walks each{speed}{saved}")
     note(f"its history: gaitswarm history {job.id}{place}")
     note(f"look at it: gaitswarm serve{place}, then http://127.0.0.1:8000/jobs/{job.id}")

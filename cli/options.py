@@ -161,6 +161,14 @@ class WorkerOptions:
             help="Use this Ray cluster for all walks. [env: GAITSWARM_RAY_ADDRESS]",
         ),
     ] = None
+    cache: Annotated[
+        bool | None,
+        typer.Option(
+            "--cache/--no-cache",
+            help="Walk a design only if no job in the database has walked it before; it changes no"
+            " result. [env: GAITSWARM_CACHE; default: cache]",
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -226,6 +226,7 @@ def print_job(job: JobView) -> None:
         "error": job.error,
         "iterations": _iterations(job),
         "evaluations": f"{job.evaluations} of {job.evaluations_planned}",
+        "evaluations saved": str(job.evaluations_saved),
         "speed": None
         if job.evaluations_per_second is None
         else f"{job.evaluations_per_second:.1f} designs/s",

@@ -41,6 +41,9 @@ class Settings(BaseSettings):
     cpus: int | None = Field(
         default=None, ge=1, description="Walks to compute at once on this machine; default all."
     )
+    cache: bool = Field(
+        default=True, description="Whether a design is walked only if no job has walked it before."
+    )
     concurrent_jobs: int = Field(default=2, ge=1, le=256, description="Jobs to run at once.")
     lease_seconds: float = Field(
         default=30.0,

@@ -77,6 +77,7 @@ def open_runtime(
     cpus: int | None = None,
     concurrent_jobs: int = 2,
     lease_seconds: float = 30.0,
+    cache: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Runtime]:
     """Open a database and run its queued jobs until the block is left; then close all.
@@ -89,6 +90,7 @@ def open_runtime(
         concurrent_jobs: Jobs to run at once.
         lease_seconds: After so long without a word from this process another one takes its jobs
             over [s].
+        cache: Whether a design is walked only if no job has walked it before.
         should_stop: As for `open_evaluator`.
 
     Yields:
@@ -108,7 +110,13 @@ def open_runtime(
             return
         workers = open_evaluator(evaluator, address=ray_address, cpus=cpus, should_stop=should_stop)
         stack.callback(workers.close)
-        runner = Runner(store, workers, concurrency=concurrent_jobs, lease_seconds=lease_seconds)
+        runner = Runner(
+            store,
+            workers,
+            concurrency=concurrent_jobs,
+            lease_seconds=lease_seconds,
+            cache=cache,
+        )
         stack.callback(runner.stop)
         runner.start()
         yield Runtime(service, workers, runner)

@@ -73,3 +73,12 @@ def test_the_start_up_benchmark_tells_how_long_people_wait() -> None:
         assert seconds[f"optimize, {cache}: first walk"] < seconds[f"optimize, {cache}: result"]
     # With an empty cache there is a kernel to compile first.
     assert seconds["optimize, warm: first walk"] < seconds["optimize, cold: first walk"]
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_known_walks_tells_what_the_cache_adds() -> None:
+    done = python("-m", "benchmarks.known_walks", "--rows", "1000", "--rounds", "2", "--json")
+    assert done.returncode == 0, done.stderr
+    seconds = json.loads(done.stdout)
+    parts = seconds["keys"] + seconds["query"] + seconds["index"]
+    assert seconds["added"] == pytest.approx(parts)

@@ -124,5 +124,6 @@ def _runtime(
         cpus=settings.cpus,
         concurrent_jobs=settings.concurrent_jobs,
         lease_seconds=settings.lease_seconds,
+        cache=settings.cache,
         should_stop=should_stop,
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final, get_args
 
 from gaitswarm.errors import Conflict, Interrupted, InvalidRequest, ProvenanceChanged
+from gaitswarm.settings import read_settings
 from gaitswarm.views import JobView
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
@@ -149,6 +150,7 @@ def run_here(
                 on_follow=lambda iteration: on_iteration(iteration.index),
                 stop=stop,
                 accepts_changes=accept_changes,
+                cache=read_settings().cache,
             )
     except KeyboardInterrupt as error:
         raise _interrupted(service.job(job_id), url) from error

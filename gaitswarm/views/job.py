@@ -119,6 +119,11 @@ class JobSummaryView(View):
     evaluations: int = Field(
         description="Designs judged so far, each in every scenario [1].", examples=[300]
     )
+    evaluations_saved: int = Field(
+        description="Of the designs judged, those whose results were known without a walk: asked"
+        " for twice, or walked before by this or another job of the database [1].",
+        examples=[25],
+    )
     evaluations_planned: int = Field(
         description="Designs that the whole budget will judge [1].", examples=[625]
     )
@@ -138,7 +143,8 @@ class JobSummaryView(View):
         examples=[20.3],
     )
     simulations_per_second: float | None = Field(
-        description="Walks (designs x scenarios) simulated per second of that time [1/s].",
+        description="Walks (designs x scenarios, but for saved ones) simulated per second of that"
+        " time [1/s].",
         examples=[121.6],
     )
     eta_seconds: float | None = Field(
@@ -328,6 +334,7 @@ def _summary(job: Job) -> dict[str, object]:
         **_asked(job.stored_spec),
         "iterations": progress.iterations,
         "evaluations": progress.evaluations,
+        "evaluations_saved": progress.evaluations_saved,
         "best_fitness": finite(progress.best_fitness),
         "best_iteration": progress.best_iteration,
         "compute_seconds": progress.compute_seconds,

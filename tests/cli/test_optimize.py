@@ -285,3 +285,48 @@ def test_json_has_every_bit_of_what_is_stored(finished: Finished, gaitswarm: Gai
     assert [list(e["design"].values()) for e in shown] == [e.design.tolist() for e in stored]
     walks = [list(e["scenarios"]["short"]["objectives"].values()) for e in shown]
     assert walks == [e.objectives[0].tolist() for e in stored]
+
+
+def test_a_job_that_is_run_again_walks_only_if_it_is_told_to(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("GAITSWARM_CACHE")
+    run = ("optimize", "--spec", small_spec, "--db", db, "--evaluator", "in-process", "--json")
+    first, again, anew = (
+        gaitswarm(*run).json,
+        gaitswarm(*run).json,
+        gaitswarm(*run, "--no-cache").json,
+    )
+    assert [job["evaluations_saved"] for job in (first, again, anew)] == [0, 6, 0]
+    assert first["best"] == again["best"] == anew["best"]
+
+
+def test_a_job_starts_from_the_best_of_another_or_from_a_file(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path
+) -> None:
+    run = ("optimize", "--spec", small_spec, "--db", db, "--evaluator", "in-process", "--json")
+    first = gaitswarm(*run).json
+    started = gaitswarm(*run, "--seed", "8", "--start-from", first["id"], "--start-count", "1")
+    assert started.code == 0, started.err
+    assert started.json["spec"]["start"] == [first["best"]["design"]]
+    assert started.json["best"]["fitness"] <= first["best"]["fitness"]
+    exported = db.with_name("designs.csv")
+    assert gaitswarm("export", first["id"], "--db", db, "--output", exported).code == 0
+    from_file = gaitswarm(*run, "--seed", "8", "--start-from", exported, "--start-count", "1")
+    assert from_file.json["spec"]["start"] == [first["best"]["design"]]
+
+
+def test_a_start_that_makes_no_sense_is_refused_with_its_place(
+    gaitswarm: Gaitswarm, small_spec: Path, db: Path
+) -> None:
+    run = ("optimize", "--spec", small_spec, "--db", db)
+    designs = db.with_name("designs.csv")
+    designs.write_text("I,FI1R\n0.5,1e9\n", encoding="utf-8")
+    for options, message in (
+        (("--start-from", designs), "line 2, column FI1R: 1e+09 is outside the bounds"),
+        (("--start-from", "nothing"), "start.jobs.0: there is no job 'nothing'"),
+        (("--start-count", "3"), "start-count: goes with --start-from"),
+    ):
+        result = gaitswarm(*run, *options)
+        assert result.code == 2
+        assert message in result.err

@@ -179,3 +179,16 @@ def test_a_job_that_is_stopped_and_taken_up_again_and_again_equals_one_never_sto
         lives += 1
     assert lives > 2
     assert history(store, job_id) == history(store, whole)
+
+
+def test_a_job_of_which_a_part_is_known_has_the_bits_of_one_that_walks_all(
+    store: Store, evaluator: Evaluator
+) -> None:
+    earlier = store.evaluations(run_alone(store, evaluator), 3)
+    start = tuple(SPEC.design_space().shown(row.design.tolist()) for row in earlier[1:4])
+    started = SPEC.model_copy(update={"seed": 5, "iterations": 3, "start": start})
+    known, walked = queue(store, started), queue(store, started)
+    saved = run_embedded(store, evaluator, known, cache=True).progress.evaluations_saved
+    assert saved == len(start)
+    assert run_embedded(store, evaluator, walked).progress.evaluations_saved == 0
+    assert history(store, known) == history(store, walked)

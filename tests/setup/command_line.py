@@ -34,6 +34,10 @@ def problem(arguments: Sequence[str]) -> str | None:
 def _leaves(command: Any, prefix: str) -> list[tuple[str, set[str]]]:
     children = getattr(command, "commands", None)
     if children is None:
-        options = {option for parameter in command.params for option in parameter.opts}
+        options = {
+            option
+            for parameter in command.params
+            for option in (*parameter.opts, *parameter.secondary_opts)
+        }
         return [(prefix.strip(), options | {"--help", "-h"})]
     return [leaf for name, child in children.items() for leaf in _leaves(child, f"{prefix} {name}")]

@@ -195,6 +195,7 @@ def _alike(job: Job, spec: Spec, asked: int) -> bool:
     progress = job.progress
     return (
         progress.compute_seconds > 0.0
+        and progress.evaluations_walked > 0
         and min(_MEASURED, round(progress.evaluations / progress.iterations))
         == min(_MEASURED, asked)
         and _kind_of_walk(job.spec) == _kind_of_walk(spec)
@@ -222,7 +223,7 @@ def _simulated_seconds(job: Job, fitted: float) -> float:
     """
     recorded = bool(job.spec.recording_ids)
     one = fitted if recorded else duration(job.spec, job.spec.cases({}))
-    return job.progress.evaluations * one
+    return job.progress.evaluations_walked * one
 
 
 def _typical(space: DesignSpace, name: str) -> float | None:

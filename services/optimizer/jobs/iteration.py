@@ -113,6 +113,19 @@ class Answered:
     fitness: NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """What a design came to in all cases of some job.
+
+    Attributes:
+        objectives: (K, m) raw objectives by case, NaN where there is none.
+        statuses: (K,) values of `sim.outcome.Status`.
+    """
+
+    objectives: NDArray[np.float64]
+    statuses: NDArray[np.uint8]
+
+
 @dataclass(frozen=True, slots=True)
 class CompletedIteration:
     """All that one transaction commits of an iteration.
@@ -126,6 +139,8 @@ class CompletedIteration:
         precision: of the search.
         reevaluation: of its best design, where the search is in single precision and no earlier
             design is as good.
+        keys: n, as `walk_keys` has them, None for a design whose outcome was known without a walk;
+            or none at all, of an iteration that is not to be found again.
     """
 
     iteration: int
@@ -135,6 +150,12 @@ class CompletedIteration:
     evaluate_seconds: float
     precision: Precision = "double"
     reevaluation: Reevaluation | None = None
+    keys: tuple[bytes | None, ...] = ()
+
+    @property
+    def saved(self) -> int:
+        """Designs whose outcome was known without a walk."""
+        return self.keys.count(None)
 
     @property
     def best(self) -> tuple[int, float] | None:

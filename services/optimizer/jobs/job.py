@@ -128,6 +128,7 @@ class Progress:
         best_iteration: iteration that found it.
         best_particle: particle that found it.
         compute_seconds: time that evaluating them took [s].
+        evaluations_saved: of the designs, those whose outcome was known without a walk.
     """
 
     iterations: int = 0
@@ -136,6 +137,12 @@ class Progress:
     best_iteration: int | None = None
     best_particle: int | None = None
     compute_seconds: float = 0.0
+    evaluations_saved: int = 0
+
+    @property
+    def evaluations_walked(self) -> int:
+        """Designs that walked for this job."""
+        return self.evaluations - self.evaluations_saved
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,8 +269,8 @@ class TimeLeft:
         eta_seconds: time to the end of the budget [s]; 0 for a job that succeeded, None unless it
             runs and has committed something.
         evaluations_per_second: designs judged [1/s]; None before the first commit.
-        simulations_per_second: walks, one per design and case [1/s]; None before the first commit,
-            and where the spec cannot be read.
+        simulations_per_second: walks, one per case and design that was not known [1/s]; None before
+            the first commit, and where the spec cannot be read.
     """
 
     eta_seconds: float | None
@@ -295,4 +302,5 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
         remaining = max(0, job.spec.budget - progress.evaluations) / rate
         under_way = min(one, max(0.0, (now - job.updated_at).total_seconds()))
         eta = max(0.0, remaining - under_way)
-    return TimeLeft(eta, rate, rate * len(job.spec.case_names) if job.readable else None)
+    walked = progress.evaluations_walked / progress.compute_seconds
+    return TimeLeft(eta, rate, walked * len(job.spec.case_names) if job.readable else None)

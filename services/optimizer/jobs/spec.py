@@ -13,7 +13,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +88,21 @@ class Spec(BaseModel):
     """An optimization: of which variables, for which robot, how long, from which seed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    unwalked: ClassVar[frozenset[str] | None] = frozenset(
+        {
+            "schema_version",
+            "name",
+            "variables",
+            "fixed",
+            "optimizer",
+            "iterations",
+            "seed",
+            "start",
+        }
+    )
+    """Fields on which no outcome of a given design depends. None: outcomes depend on more than
+    what is simulated, and are not looked for elsewhere."""
 
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
     name: str = Field(default="", max_length=200, description="For people; need not be unique.")

@@ -106,6 +106,9 @@ class TournamentSpec(Spec):
         },
     )
 
+    # A run depends on the code of searches, too.
+    unwalked = None
+
     kind: Literal["tournament"] = Field(description="Run a search method many times.")
     method: MethodChoice = Field(
         description="Search method and its settings, of the registry or of another library."

@@ -61,6 +61,8 @@ class JobSpec(Spec):
         },
     )
 
+    unwalked = (Spec.unwalked or frozenset()) | {"preference"}
+
     kind: Literal["tuning"] = Field(default="tuning", description="Tune a drive to walk well.")
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller to be tuned; see /v1/controllers."

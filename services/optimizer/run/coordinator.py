@@ -45,6 +45,7 @@ from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration,
 from services.optimizer.jobs.job import Job, JobState, refusal
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
+from services.optimizer.jobs.walk_keys import walk_keys
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.events import (
     Action,
@@ -250,6 +251,7 @@ def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tupl
         fitness=fitness,
         evaluate_seconds=event.seconds,
         precision=job.spec.precision,
+        keys=event.keys,
     )
     state = replace(state, done=done, failures=0)
     if done.precision != "double" and fitness.min() < state.best_fitness:
@@ -343,16 +345,15 @@ def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> 
     if state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
     asked = len(ask.positions)
-    return Evaluate(
-        EvaluationRequest(
-            job_id=job.id,
-            cases=spec.cases(state.recordings),
-            designs=spec.design_space().simulated(designs),
-            provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
-            # As many as there are if the next ones are as large as this one.
-            iterations_left=max(0, -(-(spec.budget - state.evaluations - asked) // asked)),
-        )
+    request = EvaluationRequest(
+        job_id=job.id,
+        cases=spec.cases(state.recordings),
+        designs=spec.design_space().simulated(designs),
+        provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
+        # As many as there are if the next ones are as large as this one.
+        iterations_left=max(0, -(-(spec.budget - state.evaluations - asked) // asked)),
     )
+    return Evaluate(request, walk_keys(spec, request.provenance, request.designs))
 
 
 def _following(spec: Spec, ask: Ask, fitness: NDArray[np.float64]) -> Ask | None:

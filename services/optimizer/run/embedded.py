@@ -55,6 +55,7 @@ def run_embedded(
     stop: threading.Event | None = None,
     backoff: Backoff | None = None,
     accepts_changes: bool = False,
+    cache: bool = False,
 ) -> Job:
     """Run one job here and now, until it ends or is paused; nothing is done if it has or is.
 
@@ -75,6 +76,7 @@ def run_embedded(
         backoff: How to wait for workers that cannot be reached.
         accepts_changes: Whether the job goes on here although what its numbers depend on has
             changed, which is then recorded with it; else it fails.
+        cache: Whether a design is walked only if no job has walked it before.
 
     Returns:
         The job as it is then.
@@ -98,6 +100,7 @@ def run_embedded(
         stop or threading.Event(),
         backoff or Backoff(),
         accepts_changes,
+        cache,
         runner=runner_name() if claim is None else claim.runner,
         seen=begun.progress.iterations - 1,
     )
@@ -118,6 +121,7 @@ class _EmbeddedRun:
     stop: threading.Event
     backoff: Backoff
     accepts_changes: bool
+    cache: bool
     runner: str
     seen: int
     news: str = field(default=_HELD, init=False)
@@ -163,6 +167,7 @@ class _EmbeddedRun:
             on_commit=self._committed,
             on_retry=self.on_retry,
             accepts_changes=self.accepts_changes,
+            cache=self.cache,
         )
         self.job = run_claim(claim, around, self.stop)
         # Whoever has it now has taken it from here.

@@ -33,10 +33,12 @@ class Evaluated:
     Attributes:
         outcomes: One per case, of all designs.
         seconds: How long it took [s].
+        keys: As in `CompletedIteration`.
     """
 
     outcomes: tuple[Outcome, ...]
     seconds: float
+    keys: tuple[bytes | None, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +147,11 @@ class Evaluate:
 
     Attributes:
         request: Its designs and cases.
+        keys: Of its designs, as `walk_keys` gives them.
     """
 
     request: EvaluationRequest
+    keys: tuple[bytes, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,7 @@ from services.optimizer.jobs.provenance import (
 )
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.coordinator import Backoff, Coordination, Phase, handle
+from services.optimizer.run.economy import evaluate_unknown
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
 from services.optimizer.run.events import (
     Action,
@@ -97,6 +98,7 @@ class Surroundings:
         on_retry: Called before a wait for the workers.
         provenance: Of what is computed from here for a spec.
         accepts_changes: Whether the job goes on although that has changed.
+        cache: Whether a design is walked only if no job has walked it before.
         clock: Monotonic time [s]; replaced in tests.
         sleep: Lets seconds pass; replaced in tests.
     """
@@ -109,6 +111,7 @@ class Surroundings:
     on_retry: OnRetry | None = None
     provenance: Callable[[Spec], JobProvenance] = job_provenance
     accepts_changes: bool = False
+    cache: bool = False
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
 
@@ -214,8 +217,8 @@ class _Run:
             case Begin(ask=ask):
                 self._stored(lambda: self.around.store.begin(self.claim, ask))
                 return None
-            case Evaluate(request=request):
-                return self._evaluate(request)
+            case Evaluate(request=request, keys=keys):
+                return self._evaluate(request, keys)
             case Commit(done=done, following=following):
                 state = self._stored(lambda: self.around.store.commit(self.claim, done, following))
                 if self.around.on_commit is not None:
@@ -227,12 +230,18 @@ class _Run:
                 self._stored(lambda: self.around.store.release(self.claim, state, error=error))
                 return LeaseWasLost()
 
-    def _evaluate(self, request: EvaluationRequest) -> Event:
+    def _evaluate(self, request: EvaluationRequest, keys: tuple[bytes, ...]) -> Event:
         if self._should_stop():
             raise EvaluationStopped
         begun = self.around.clock()
         try:
-            outcomes = self.around.evaluator.evaluate(request, self._should_stop)
+            outcomes, walked = evaluate_unknown(
+                self.around.evaluator,
+                self.around.store if self.around.cache else None,
+                request,
+                keys,
+                self._should_stop,
+            )
         except EvaluationStopped:
             raise
         except EvaluatorUnavailable as error:
@@ -243,7 +252,7 @@ class _Run:
         except Exception as error:  # noqa: BLE001
             _log.exception("job %s: the evaluation failed", request.job_id)
             return EvaluationFailed(f"the simulation failed: {type(error).__name__}: {error}")
-        return Evaluated(outcomes, self.around.clock() - begun)
+        return Evaluated(outcomes, self.around.clock() - begun, walked)
 
     def _wait(self, seconds: float, reason: str) -> Event:
         _log.warning(
@@ -296,6 +305,7 @@ class Runner:
         concurrency: Jobs to run at once.
         lease_seconds: After so long without a word from here another runner takes a job over [s].
         poll_seconds: How often the store is asked for a queued job while there is room for one [s].
+        cache: Whether a design is walked only if no job has walked it before.
         name: Of this runner, which no other one may have; a random one by default.
 
     Raises:
@@ -310,11 +320,12 @@ class Runner:
         concurrency: int = 2,
         lease_seconds: float = 30.0,
         poll_seconds: float = 0.5,
+        cache: bool = False,
         name: str | None = None,
     ) -> None:
         if concurrency < 1:
             raise ValueError(f"concurrency must be at least 1, it is {concurrency}")
-        self._around = Surroundings(store, evaluator, lease_seconds=lease_seconds)
+        self._around = Surroundings(store, evaluator, lease_seconds=lease_seconds, cache=cache)
         self._poll_seconds = poll_seconds
         self._name = name or runner_name()
         self._stop = threading.Event()

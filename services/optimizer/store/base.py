@@ -7,7 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Ask, CompletedIteration, Evaluation, Iteration
+from services.optimizer.jobs.iteration import (
+    Ask,
+    CompletedIteration,
+    Evaluation,
+    Iteration,
+    Known,
+)
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
@@ -322,6 +328,16 @@ class Store(Protocol):
 
         Returns:
             The particles, in order of iteration and particle.
+        """
+
+    def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
+        """Find what designs came to in any job.
+
+        Args:
+            keys: As `walk_keys` gives them.
+
+        Returns:
+            Outcomes of those that are known, by key; what cannot be read is not among them.
         """
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from functools import cache
 from typing import Any, Final
 
@@ -17,11 +18,15 @@ from pydantic import TypeAdapter
 from sqlalchemy import Connection, Text, cast, select
 
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.iteration import Known
 from services.optimizer.store.tables import evaluations
 from sim.outcome import Status
 
 # Faster than the standard library's parser by half, and as exact.
 _JSON: Final = TypeAdapter(Any)
+
+_KEYS: Final = 1000
+"""Keys of one query."""
 
 
 def select_columns(
@@ -64,6 +69,28 @@ def select_columns(
         statuses=_statuses(statuses),
         fitness=np.array([math.inf if f is None else f for f in fitness], dtype=np.float64),
     )
+
+
+def select_known(connection: Connection, keys: Sequence[bytes]) -> dict[bytes, Known]:
+    """Find what designs came to in any job.
+
+    Args:
+        connection: An open transaction.
+        keys: Of their walks.
+
+    Returns:
+        Outcomes of those that are known, by key; damaged ones are left out.
+    """
+    table, found = evaluations.c, dict[bytes, Known]()
+    for first in range(0, len(keys), _KEYS):
+        query = select(
+            table.walk_key, cast(table.objectives, Text), cast(table.statuses, Text)
+        ).where(table.walk_key.in_(keys[first : first + _KEYS]))
+        for key, objectives, statuses in connection.execute(query):
+            with suppress(ValueError, TypeError, KeyError):
+                numbers = np.array(_JSON.validate_json(objectives), dtype=np.float64)
+                found[key] = Known(numbers, np.array(_status_values(statuses), dtype=np.uint8))
+    return found
 
 
 def _numbers(texts: Iterable[str]) -> NDArray[np.float64]:

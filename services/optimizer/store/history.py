@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 from sqlalchemy import Select, Table, select
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation, Iteration
+from services.optimizer.jobs.iteration import Evaluation, Iteration, Known
 from services.optimizer.store.base import Page
-from services.optimizer.store.columns import select_columns
+from services.optimizer.store.columns import select_columns, select_known
 from services.optimizer.store.engine import Database
 from services.optimizer.store.records import job_row
 from services.optimizer.store.rows import LISTED, Row, to_evaluation, to_iteration, to_reevaluation
@@ -77,6 +78,11 @@ class SqlHistory:
         with self._database.transaction(write=False) as connection:
             job_row(connection, job_id)
             return select_columns(connection, job_id, _bounded(first), _bounded(last))
+
+    def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
+        """Find what designs came to in any job."""
+        with self._database.transaction(write=False) as connection:
+            return select_known(connection, keys)
 
     def best(self, job_id: str) -> Evaluation | None:
         """Read the design of least fitness."""

@@ -57,6 +57,7 @@ def to_job(row: Row) -> Job:
         progress=Progress(
             iterations=row["iterations"],
             evaluations=row["evaluations"],
+            evaluations_saved=row["evaluations_saved"] or 0,
             best_fitness=row["best_fitness"],
             best_iteration=row["best_iteration"],
             best_particle=row["best_particle"],

@@ -368,6 +368,7 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
     columns: dict[str, Any] = {
         "iterations": done.iteration + 1,
         "evaluations": job["evaluations"] + len(done.fitness),
+        "evaluations_saved": (job["evaluations_saved"] or 0) + done.saved,
         "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
     }
     if done.best is not None:

@@ -164,14 +164,16 @@ def evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any
             "iteration": done.iteration,
             "particle": particle,
             "design": design,
+            "walk_key": key,
             **_result_columns(by_case, labels, fitness),
         }
-        for particle, (design, by_case, labels, fitness) in enumerate(
+        for particle, (design, by_case, labels, fitness, key) in enumerate(
             zip(
                 done.designs.tolist(),
                 objectives.tolist(),
                 statuses.tolist(),
                 done.fitness.tolist(),
+                done.keys or [None] * len(done.fitness),
                 strict=True,
             )
         )

@@ -22,6 +22,7 @@ from sqlalchemy import (
     ForeignKeyConstraint,
     Index,
     Integer,
+    LargeBinary,
     MetaData,
     PrimaryKeyConstraint,
     Table,
@@ -165,6 +166,8 @@ jobs: Final = Table(
     Column("provenance", Document(none_as_null=True)),
     # From a resumption that accepts changes to the next claim; NULL is false.
     Column("accepts_changes", Boolean),
+    # Of `evaluations`, those that needed no walk; NULL is none.
+    Column("evaluations_saved", BigInteger),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),
@@ -205,8 +208,11 @@ evaluations: Final = Table(
     Column("objectives", JSON, nullable=False),
     Column("statuses", JSON, nullable=False),
     Column("fitness", Double),
+    # Of what it was walked for; NULL for what was taken from another row, or stored before.
+    Column("walk_key", LargeBinary),
     PrimaryKeyConstraint("job_id", "iteration", "particle"),
     ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
+    Index(None, "walk_key"),
 )
 
 # Designs of a search in single precision, evaluated anew in double; columns as in `evaluations`.

@@ -20,6 +20,7 @@ from services.optimizer.search.local.annealing import AnnealingSettings
 from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
+from services.optimizer.search.model.bayesian import BayesianSettings
 from services.optimizer.search.multistart.global_search import (
     GlobalBfgsSettings,
     GlobalNelderMeadSettings,
@@ -38,6 +39,7 @@ Floats = NDArray[np.float64]
 
 OptimizerSettings = (
     AnnealingSettings
+    | BayesianSettings
     | CmaEsSettings
     | DeSettings
     | DirectedTabuSettings
@@ -56,6 +58,7 @@ OptimizerSettings = (
 """Settings of every method; their `name` tells them apart."""
 
 MethodName = Literal[
+    "bayesian",
     "cma-es",
     "de",
     "dts",
@@ -74,6 +77,7 @@ MethodName = Literal[
 ]
 
 OptimizerName = Literal[
+    "bayesian",
     "cma-es",
     "de",
     "dts",
@@ -174,6 +178,15 @@ def _replayed(place: str) -> Create:
 
 
 METHODS: Final[dict[MethodName, Method]] = {
+    "bayesian": Method(
+        BayesianSettings,
+        "Gaussian process with batches, in a trust region (scikit-learn; TuRBO, Eriksson 2019)",
+        _replayed("model.bayesian:bayesian"),
+        replays=True,
+        uses_start=True,
+        extra="search",
+        libraries=("scikit-learn", "scipy", "threadpoolctl"),
+    ),
     "cma-es": Method(
         CmaEsSettings,
         "Covariance matrix adaptation, with margin for integers and choices (cmaes; Hamano 2025)",

@@ -13,7 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cli.tournament.plan import PRESETS, Size, tournament_jobs
 from cli.tournament.runs import read_runs
+from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.jobs.problem import TuningProblem
 from tests.examples.commands import Result, run_command
 from tests.examples.processes import COMMAND_LINE, output, python, start_python
 
@@ -169,3 +172,32 @@ def test_a_tournament_that_is_killed_and_goes_on_has_the_same_numbers(tmp_path: 
     last = python(*arguments)
     assert last.returncode == 0, last.stderr
     assert numbers(killed) == numbers(whole)
+
+
+def test_the_robot_races_on_chapter_4_and_on_chapter_3_with_its_gait() -> None:
+    preset = PRESETS["robot"]
+    size = Size(repetitions=1, evaluations=30, seed=1, settings="default")
+    spec = tournament_jobs({"random": "random"}, preset.problems, size, "single")["random"]
+    jobs = {p.name: p.job for p in spec.problems if isinstance(p, TuningProblem)}
+    assert [job.resolved_preference() for job in jobs.values()] == [
+        *(PREFERENCES["A"], PREFERENCES["B"], PREFERENCES["C"]),
+        *2 * [PREFERENCES["chapter-3"]],
+    ]
+    assert [len(job.scenarios) for job in jobs.values()] == [6, 6, 6, 1, 1]
+    # Tables 4.4, 3.2 and 3.4: nine, or a controller's and five of the gait.
+    assert [p.space.dimension for p in spec.problems] == [9, 9, 9, 2 + 5, 12 + 5]
+    assert {job.precision for job in jobs.values()} == {"single"}
+
+
+def test_a_race_on_the_robot_is_reported_like_any_other(tmp_path: Path) -> None:
+    result = run_command(
+        "tournament", "robot", "--methods", "pso,random", "--problems", "chapter-3.pi",
+        "--evaluations", 10, "--repetitions", 2, "--evaluator", "in-process", "--json",
+        "--db", tmp_path / "jobs.db", "--output", tmp_path / "report",
+    )  # fmt: skip
+    assert result.code == 0, result.err
+    (problem,) = result.json["problems"].values()
+    # Without a target of its own: 1 % above the least value.
+    least = min(method["least"] for method in problem["methods"].values())
+    assert problem["target"] == pytest.approx(1.01 * least)
+    assert sum(method["solved"] for method in problem["methods"].values()) >= 1

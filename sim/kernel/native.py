@@ -76,7 +76,9 @@ class _Law(ctypes.Structure):
     ]
 
 
-class _Walker(ctypes.Structure):
+class Walker(ctypes.Structure):
+    """A walk as the kernel reads it, with where its results go and what they are."""
+
     _fields_ = [
         ("q0", ctypes.c_void_p),
         ("internal_state", ctypes.c_void_p),
@@ -96,7 +98,7 @@ class _Walker(ctypes.Structure):
     ]
 
 
-_STRUCTURES: Final = {"coding": _Coding, "table": _Table, "walker": _Walker, **STRUCTURES}
+_STRUCTURES: Final = {"coding": _Coding, "table": _Table, "walker": Walker, **STRUCTURES}
 """By their names in the library's functions that tell their sizes."""
 
 
@@ -234,7 +236,7 @@ class NativeKernel:
         n = len(setups)
         sums, end = np.empty((n, self._integrands)), np.empty((n, 7 + self._joints))
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
-        walkers = (_Walker * n)()
+        walkers = (Walker * n)()
         addresses = _Addresses()
         sums_at, end_at = int(sums.ctypes.data), int(end.ctypes.data)
         order = _order(tuple(setup.ticks for setup in setups), self.lanes)

@@ -22,6 +22,7 @@ import pytest
 
 from sim.compiler.target import ARM, ARM_TARGET, Target, host_architecture
 from sim.compiler.toolchain import find_compiler
+from sim.kernel.native import Walker
 from tests.examples.paths import ROOT
 
 TOOLS: Final = Path(sys.prefix) / "cross"
@@ -119,9 +120,7 @@ class _Function:
             value = getattr(argument, "_obj", argument)
             values[k] = memory.copy_of(ctypes.addressof(value), ctypes.sizeof(value))
             pointers |= 1 << k
-            for structure in value if isinstance(value, ctypes.Array) else [value]:
-                at = values[k] + ctypes.addressof(structure) - ctypes.addressof(value)
-                self._follow(memory, structure, at)
+            self._follow(memory, value, values[k])
         head = [self._number, len(memory.pointers), len(memory.content), *values, pointers]
         numbers = [*head, *memory.pointers]
         message = (ctypes.c_int64 * len(numbers))(*numbers)
@@ -132,11 +131,18 @@ class _Function:
         return int.from_bytes(done.stdout[:8], sys.byteorder, signed=True)
 
     def _follow(self, memory: _Memory, structure: ctypes.Structure, at: int) -> None:
-        """Copy the arrays that a walker, at this place of the memory, points to."""
+        """Copy what a structure, at this place of the memory, points to: walkers with their own."""
         for owner, name, place in _pointers(structure, at):
             address = getattr(owner, name)
-            if address is not None:
+            if address is None:
+                continue
+            if name != "walkers":
                 memory.point(place, address, self._size(structure, owner, name))
+                continue
+            walkers = (Walker * owner.n).from_address(address)
+            first = memory.point(place, address, ctypes.sizeof(walkers))
+            for k, walker in enumerate(walkers):
+                self._follow(memory, walker, first + k * ctypes.sizeof(Walker))
 
     def _size(self, walker: Any, owner: Any, name: str) -> int:
         if name == "values":
@@ -169,10 +175,11 @@ class _Memory:
         self._copies.append((address, place, size))
         return place
 
-    def point(self, place: int, address: int, size: int) -> None:
+    def point(self, place: int, address: int, size: int) -> int:
         self.pointers[place] = address
         target = self.copy_of(address, size)
         self.content[place : place + 8] = target.to_bytes(8, sys.byteorder)
+        return target
 
     def write_back(self, content: bytes) -> None:
         left = bytearray(content)

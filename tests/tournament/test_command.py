@@ -20,12 +20,19 @@ from services.optimizer.jobs.problem import TuningProblem
 from tests.examples.commands import Result, run_command
 from tests.examples.processes import COMMAND_LINE, output, python, start_python
 
-SMALL = ("--problems", "D4C1R0I1,D7C0R0I1", "--evaluations", 60, "--evaluator", "in-process")
+TWO = "D4C1R0I1,D7C0R0I1"
+"""A page has two pictures and one of every problem, which take longer than the runs."""
 
 
-def command(folder: Path, *options: Any, methods: str = "pso,random") -> Result:
+def small(problems: str) -> tuple[Any, ...]:
+    return ("--problems", problems, "--evaluations", 60, "--evaluator", "in-process")
+
+
+def command(
+    folder: Path, *options: Any, methods: str = "pso,random", problems: str = "D4C1R0I1"
+) -> Result:
     return run_command(
-        "tournament", "thesis", *SMALL, "--methods", methods,
+        "tournament", "thesis", *small(problems), "--methods", methods,
         "--db", folder / "jobs.db", "--output", folder / "report", *options,
     )  # fmt: skip
 
@@ -46,7 +53,7 @@ def jobs(folder: Path) -> dict[str, int]:
 
 
 def test_the_report_holds_what_was_measured(tmp_path: Path) -> None:
-    result = command(tmp_path, "--repetitions", 4, "--json")
+    result = command(tmp_path, "--repetitions", 4, "--json", problems=TWO)
     assert result.code == 0, result.err
     found = result.json
     runs = read_runs(tmp_path / "report", "output")
@@ -71,7 +78,7 @@ def test_the_report_holds_what_was_measured(tmp_path: Path) -> None:
 
 
 def test_the_table_on_the_terminal_names_every_method_and_problem(tmp_path: Path) -> None:
-    result = command(tmp_path, "--repetitions", 1, "--settings", "default")
+    result = command(tmp_path, "--repetitions", 1, "--settings", "default", problems=TWO)
     assert result.code == 0, result.err
     for word in ("pso", "random", "D4C1R0I1", "D7C0R0I1", "mean rank", "report.html"):
         assert word in result.out
@@ -152,10 +159,10 @@ def test_a_tournament_that_is_killed_and_goes_on_has_the_same_numbers(tmp_path: 
     methods = "pso,random,ps"
     for folder in (whole, killed):
         folder.mkdir()
-    assert command(whole, "--repetitions", 8, methods=methods).code == 0
+    assert command(whole, "--repetitions", 8, methods=methods, problems=TWO).code == 0
 
     arguments = (
-        *COMMAND_LINE, "tournament", "thesis", *map(str, SMALL), "--methods", methods,
+        *COMMAND_LINE, "tournament", "thesis", *map(str, small(TWO)), "--methods", methods,
         "--repetitions", "8", "--db", str(killed / "jobs.db"), "--output", str(killed / "report"),
     )  # fmt: skip
     for number in (signal.SIGKILL, signal.SIGINT):

@@ -124,8 +124,8 @@ def test_every_method_depends_on_its_seed_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", [n for n in RIVALS if n in INSTALLED])
 def test_every_rival_finds_more_than_chance_does(name: str) -> None:
-    best = np.median([run_of(name, evaluations=200, seed=s).best[-1] for s in (1, 2, 3)])
-    random = np.median([run_of("random", evaluations=200, seed=s).best[-1] for s in (1, 2, 3)])
+    best = np.median([run_of(name, evaluations=120, seed=s).best[-1] for s in (1, 2, 3)])
+    random = np.median([run_of("random", evaluations=120, seed=s).best[-1] for s in (1, 2, 3)])
     assert best < random
 
 

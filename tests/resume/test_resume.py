@@ -9,7 +9,9 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,7 +20,7 @@ from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
 from services.optimizer.store.base import Store
-from services.runtime import open_evaluator, run_embedded
+from services.runtime import open_evaluator, open_store, run_embedded
 from sim.kernel.walk import Precision
 from tests.examples.jobs import history
 from tests.examples.processes import output, start_python
@@ -63,6 +65,21 @@ def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
     return job_id
 
 
+Walked = tuple[list[Any], tuple[bytes, float] | None]
+"""All iterations of a job, and what its best design was evaluated anew to."""
+
+
+def walked(store: Store, job_id: str) -> Walked:
+    return history(store, job_id), best_in_double(store, job_id)
+
+
+@pytest.fixture(scope="module")
+def alone(evaluator: Evaluator, tmp_path_factory: pytest.TempPathFactory) -> Walked:
+    """What `SPEC` comes to, run alone once for all tests."""
+    with closing(open_store(f"sqlite:///{tmp_path_factory.mktemp('alone')}/jobs.db")) as store:
+        return walked(store, run_alone(store, evaluator))
+
+
 def best_in_double(store: Store, job_id: str) -> tuple[bytes, float] | None:
     """What the best design was evaluated anew to; None for a search in double precision."""
     best = store.best(job_id)
@@ -95,8 +112,8 @@ def test_resumed_job_equals_one_never_killed(
     job_id = queue(store, spec)
     chance = random.Random(7)
     progress: list[int] = []
-    # Five lives, or fewer where the machine becomes so fast that they would reach the end.
-    while len(progress) < 5 and (not progress or progress[-1] < SPEC.iterations - 4):
+    # Three lives, or fewer where the machine becomes so fast that they would reach the end.
+    while len(progress) < 3 and (not progress or progress[-1] < SPEC.iterations - 4):
         process = start(url, job_id)
         # A life begins at its first commit, so that start-up is not all that is killed.
         output(process.stdout).readline()
@@ -109,8 +126,7 @@ def test_resumed_job_equals_one_never_killed(
     assert last.returncode == 0
     assert store.job(job_id).state is JobState.SUCCEEDED
     assert len(progress) >= 2 and progress[0] >= 1 and progress == sorted(progress)
-    assert history(store, job_id) == history(store, whole)
-    assert best_in_double(store, job_id) == best_in_double(store, whole)
+    assert walked(store, job_id) == walked(store, whole)
 
 
 def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
@@ -133,9 +149,8 @@ def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
 
 
 def test_a_job_resumed_on_ray_equals_one_run_in_threads(
-    store: Store, url: str, evaluator: Evaluator
+    store: Store, url: str, alone: Walked
 ) -> None:
-    whole = run_alone(store, evaluator)
     job_id = queue(store)
     killed = start(url, job_id, "ray")
     output(killed.stdout).readline()
@@ -143,12 +158,15 @@ def test_a_job_resumed_on_ray_equals_one_run_in_threads(
     resumed = start(url, job_id, "ray")
     resumed.communicate(timeout=120)
     assert resumed.returncode == 0
-    assert history(store, job_id) == history(store, whole)
+    assert walked(store, job_id) == alone
 
 
-def test_two_jobs_at_once_equal_the_same_jobs_run_alone(store: Store, evaluator: Evaluator) -> None:
+def test_two_jobs_at_once_equal_the_same_jobs_run_alone(
+    store: Store, evaluator: Evaluator, alone: Walked
+) -> None:
     specs = [SPEC, SPEC.model_copy(update={"seed": 5, "iterations": 6})]
-    alone = [history(store, run_alone(store, evaluator, spec)) for spec in specs]
+    other = run_alone(store, evaluator, specs[1])
+    apart = [alone, walked(store, other)]
     together = [queue(store, spec) for spec in specs]
     runner = Runner(store, evaluator, concurrency=2, poll_seconds=0.05)
     runner.start()
@@ -161,13 +179,12 @@ def test_two_jobs_at_once_equal_the_same_jobs_run_alone(store: Store, evaluator:
         time.sleep(0.05)
     runner.stop()
     assert both_running
-    assert [history(store, job_id) for job_id in together] == alone
+    assert [walked(store, job_id) for job_id in together] == apart
 
 
 def test_a_job_that_is_stopped_and_taken_up_again_and_again_equals_one_never_stopped(
-    store: Store, evaluator: Evaluator
+    store: Store, evaluator: Evaluator, alone: Walked
 ) -> None:
-    whole = run_alone(store, evaluator)
     job_id = queue(store)
     lives = 0
     while not store.job(job_id).state.terminal:
@@ -178,7 +195,7 @@ def test_a_job_that_is_stopped_and_taken_up_again_and_again_equals_one_never_sto
         timer.cancel()
         lives += 1
     assert lives > 2
-    assert history(store, job_id) == history(store, whole)
+    assert walked(store, job_id) == alone
 
 
 def test_a_job_of_which_a_part_is_known_has_the_bits_of_one_that_walks_all(

@@ -112,6 +112,7 @@ class Embedded:
                     stop=stop,
                     accepts_changes=self._accepts_changes,
                     cache=self._settings.cache,
+                    known=job.progress.iterations,
                 )
             except Exception as error:
                 error.add_note(_how_to_go_on(job.id, jobs.place))

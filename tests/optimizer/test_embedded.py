@@ -170,6 +170,18 @@ def test_a_job_that_another_process_runs_is_followed_to_its_end(store: Store, to
     assert len(told.news) == 1 and "another process runs" in told.news[0]
 
 
+def test_following_begins_after_the_iterations_that_the_caller_knows_of(
+    store: Store, told: Told
+) -> None:
+    first, stop = held_by_another(store), threading.Event()
+    run_claim(first, Surroundings(store, FormulaEvaluator(), on_commit=lambda *_: stop.set()), stop)
+    claim = store.claim("another", lease_seconds=60.0)
+    assert claim is not None and claim.job.progress.iterations == 1
+    with running(store, claim, after=told.any_news):
+        run_embedded(store, no_workers, claim.job.id, known=0, **told.callbacks())
+    assert told.followed == ALL
+
+
 def test_a_job_that_another_process_gives_back_goes_on_here(store: Store, told: Told) -> None:
     claim = held_by_another(store)
     stop = threading.Event()

@@ -56,6 +56,7 @@ def run_embedded(
     backoff: Backoff | None = None,
     accepts_changes: bool = False,
     cache: bool = False,
+    known: int | None = None,
 ) -> Job:
     """Run one job here and now, until it ends or is paused; nothing is done if it has or is.
 
@@ -77,6 +78,8 @@ def run_embedded(
         accepts_changes: Whether the job goes on here although what its numbers depend on has
             changed, which is then recorded with it; else it fails.
         cache: Whether a design is walked only if no job has walked it before.
+        known: How many committed iterations the caller knows of; `on_follow` is told of those after
+            them. Default: as many as there are now.
 
     Returns:
         The job as it is then.
@@ -102,7 +105,7 @@ def run_embedded(
         accepts_changes,
         cache,
         runner=runner_name() if claim is None else claim.runner,
-        seen=begun.progress.iterations - 1,
+        seen=(begun.progress.iterations if known is None else known) - 1,
     )
     return run.to_the_end(claim)
 

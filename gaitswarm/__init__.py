@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from services.optimizer.search.evolution.genetic import GaSettings
     from services.optimizer.search.local.annealing import AnnealingSettings
     from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
+    from services.optimizer.search.local.mads import MadsSettings
     from services.optimizer.search.local.nelder_mead import NelderMeadSettings
     from services.optimizer.search.local.pattern_search import PatternSearchSettings
     from services.optimizer.search.multistart.global_search import (
@@ -137,6 +138,7 @@ __all__ = [
     "JobView",
     "Jobs",
     "LeaseLost",
+    "MadsSettings",
     "NelderMeadSettings",
     "NotFound",
     "OptimizationResult",
@@ -217,6 +219,7 @@ _MODULES: Final = {
     "services.optimizer.search.evolution.genetic": ("GaSettings",),
     "services.optimizer.search.local.annealing": ("AnnealingSettings",),
     "services.optimizer.search.local.directed_tabu": ("DirectedTabuSettings",),
+    "services.optimizer.search.local.mads": ("MadsSettings",),
     "services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
     "services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
     "services.optimizer.search.multistart.global_search": (

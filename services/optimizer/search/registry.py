@@ -18,6 +18,7 @@ from services.optimizer.search.evolution.differential_evolution import (
 from services.optimizer.search.evolution.genetic import GaSettings
 from services.optimizer.search.local.annealing import AnnealingSettings
 from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
+from services.optimizer.search.local.mads import MadsSettings
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
 from services.optimizer.search.model.bayesian import BayesianSettings
@@ -48,6 +49,7 @@ OptimizerSettings = (
     | GlobalNelderMeadSettings
     | GlobalUnirandiSettings
     | GsaSettings
+    | MadsSettings
     | NelderMeadSettings
     | PatternSearchSettings
     | PsoPsSettings
@@ -67,6 +69,7 @@ MethodName = Literal[
     "global-nelder-mead",
     "global-unirandi",
     "gsa",
+    "mads",
     "nelder-mead",
     "ps",
     "pso",
@@ -86,6 +89,7 @@ OptimizerName = Literal[
     "global-nelder-mead",
     "global-unirandi",
     "gsa",
+    "mads",
     "nelder-mead",
     "ps",
     "pso",
@@ -244,6 +248,15 @@ METHODS: Final[dict[MethodName, Method]] = {
         "Gravitational search algorithm (Rashedi, Nezamabadi-pour and Saryazdi 2009)",
         _replayed("swarm.gsa:gsa"),
         replays=True,
+    ),
+    "mads": Method(
+        MadsSettings,
+        "Mesh adaptive direct search (NOMAD 4; Audet, Le Digabel, Rochon Montplaisir et al. 2022)",
+        _replayed("local.mads:mads"),
+        replays=True,
+        uses_start=True,
+        extra="search",
+        libraries=("PyNomadBBO",),
     ),
     "nelder-mead": Method(
         NelderMeadSettings,

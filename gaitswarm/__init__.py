@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from services.optimizer.search.local.mads import MadsSettings
     from services.optimizer.search.local.nelder_mead import NelderMeadSettings
     from services.optimizer.search.local.pattern_search import PatternSearchSettings
+    from services.optimizer.search.model.bayesian import BayesianSettings
     from services.optimizer.search.multistart.global_search import (
         GlobalBfgsSettings,
         GlobalNelderMeadSettings,
@@ -108,6 +109,7 @@ __all__ = [
     "AsyncServerJobs",
     "AutoSettings",
     "Backoff",
+    "BayesianSettings",
     "BestView",
     "CalibrationSpec",
     "CmaEsSettings",
@@ -222,6 +224,7 @@ _MODULES: Final = {
     "services.optimizer.search.local.mads": ("MadsSettings",),
     "services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
     "services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
+    "services.optimizer.search.model.bayesian": ("BayesianSettings",),
     "services.optimizer.search.multistart.global_search": (
         "GlobalBfgsSettings", "GlobalNelderMeadSettings", "GlobalUnirandiSettings",
     ),

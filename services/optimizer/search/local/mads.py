@@ -61,8 +61,8 @@ def mads(
     judged in blocks of up to `particles` designs, and what is left is dropped after a success. A
     run begins at a random design. When its mesh is below the tolerance it begins anew at another
     one, with another seed, and keeps nothing. A random design that fails is left at once. A choice
-    of more than two is an integer to NOMAD, its index. No design is judged twice, but where a run
-    could begin at no other.
+    of more than two is an integer to NOMAD, its index. No design is judged twice, but where
+    draws find no other.
 
     Args:
         settings: Of the method.
@@ -83,7 +83,10 @@ def mads(
                 yield from _run(nomad, settings, space, centre, known, random.seed())
         while True:
             centre = _random_design(space, random, known)
-            known.pop(_keys(centre[np.newaxis])[0], None)
+            if _keys(centre[np.newaxis])[0] in known:
+                # There is hardly a design left; NOMAD would ask for nothing else.
+                yield space.positions(centre[np.newaxis])
+                continue
             yield from _run(nomad, settings, space, centre, known, random.seed())
     finally:
         nomad.close()

@@ -160,7 +160,7 @@ def test_a_job_of_other_code_is_not_taken_for_one_of_this(
         (("--chapters", "5"), "chapters"),
         (("--chapters", ""), "chapters"),
         (("--robots", "spot"), "unknown robot 'spot'"),
-        (("--optimizer", "ga"), "unknown optimizer 'ga'"),
+        (("--optimizer", "annealer"), "unknown optimizer 'annealer'"),
         (("--iterations", "0"), "iterations"),
         (("--particles", "0"), "optimizer.particles"),
     ],

@@ -339,7 +339,8 @@ def stream(events: str, *, breaks: bool = False) -> httpx2.Response:
 
 
 def state(name: str) -> str:
-    data = {"id": "k2q7zr5dm9xw", "state": name, "error": None, "iterations": 0}
+    counts = {"iterations": 0, "evaluations": 0}
+    data = {"id": "k2q7zr5dm9xw", "state": name, "error": None, **counts}
     return f"event: state\ndata: {json.dumps(data)}\n\n"
 
 

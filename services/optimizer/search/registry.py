@@ -79,27 +79,7 @@ MethodName = Literal[
     "tlbo",
 ]
 
-OptimizerName = Literal[
-    "bayesian",
-    "cma-es",
-    "de",
-    "dts",
-    "ga",
-    "global-bfgs",
-    "global-nelder-mead",
-    "global-unirandi",
-    "gsa",
-    "mads",
-    "nelder-mead",
-    "ps",
-    "pso",
-    "pso-constriction",
-    "pso-ps",
-    "pso-thesis",
-    "random",
-    "sa",
-    "tlbo",
-]
+OptimizerName = Literal[MethodName, "pso-constriction", "pso-thesis"]
 """What a job may name: a method with its default settings, or a preset."""
 
 _MISSING: Final = "none"
@@ -170,32 +150,46 @@ LONGEST_REPLAY: Final = 250_000
 """Most evaluations of a job whose search is replayed when it is resumed."""
 
 
-def _replayed(place: str) -> Create:
-    """How a generator function makes an optimizer; `place` is module:function."""
+def _generator(
+    settings: type[OptimizerSettings],
+    summary: str,
+    place: str,
+    *,
+    uses_start: bool = False,
+    extra: str = "",
+    libraries: tuple[str, ...] = (),
+) -> Method:
+    """A method that is a generator function, which is replayed; `place` is module:function."""
     module, _, function = place.partition(":")
 
     def create(settings: SearchSettings, space: Space, budget: int, seed: int) -> Optimizer:
         search = getattr(import_module(f"services.optimizer.search.{module}"), function)
         return Replayed(search, settings, space, budget, seed)
 
-    return create
+    return Method(
+        settings,
+        summary,
+        create,
+        replays=True,
+        uses_start=uses_start,
+        extra=extra,
+        libraries=libraries,
+    )
 
 
 METHODS: Final[dict[MethodName, Method]] = {
-    "bayesian": Method(
+    "bayesian": _generator(
         BayesianSettings,
         "Gaussian process with batches, in a trust region (scikit-learn; TuRBO, Eriksson 2019)",
-        _replayed("model.bayesian:bayesian"),
-        replays=True,
+        "model.bayesian:bayesian",
         uses_start=True,
         extra="search",
         libraries=("scikit-learn", "scipy", "threadpoolctl"),
     ),
-    "cma-es": Method(
+    "cma-es": _generator(
         CmaEsSettings,
         "Covariance matrix adaptation, with margin for integers and choices (cmaes; Hamano 2025)",
-        _replayed("evolution.cma_es:cma_es"),
-        replays=True,
+        "evolution.cma_es:cma_es",
         uses_start=True,
         extra="search",
         libraries=("cmaes", "scipy"),
@@ -207,69 +201,60 @@ METHODS: Final[dict[MethodName, Method]] = {
         uses_start=True,
         libraries=("scipy",),
     ),
-    "dts": Method(
+    "dts": _generator(
         DirectedTabuSettings,
         "Directed tabu search (Hedar and Fukushima 2006): explores, intensifies, diversifies",
-        _replayed("local.directed_tabu:directed_tabu"),
-        replays=True,
+        "local.directed_tabu:directed_tabu",
         uses_start=True,
     ),
-    "ga": Method(
+    "ga": _generator(
         GaSettings,
         "Genetic algorithm for mixed variables (pymoo; Blank and Deb 2020)",
-        _replayed("evolution.genetic:genetic_algorithm"),
-        replays=True,
+        "evolution.genetic:genetic_algorithm",
         extra="search",
         libraries=("pymoo",),
     ),
-    "global-bfgs": Method(
+    "global-bfgs": _generator(
         GlobalBfgsSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by BFGS",
-        _replayed("multistart.global_search:global_search"),
-        replays=True,
+        "multistart.global_search:global_search",
         uses_start=True,
     ),
-    "global-nelder-mead": Method(
+    "global-nelder-mead": _generator(
         GlobalNelderMeadSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by Nelder-Mead",
-        _replayed("multistart.global_search:global_search"),
-        replays=True,
+        "multistart.global_search:global_search",
         uses_start=True,
     ),
-    "global-unirandi": Method(
+    "global-unirandi": _generator(
         GlobalUnirandiSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by UniRandi",
-        _replayed("multistart.global_search:global_search"),
-        replays=True,
+        "multistart.global_search:global_search",
         uses_start=True,
     ),
-    "gsa": Method(
+    "gsa": _generator(
         GsaSettings,
         "Gravitational search algorithm (Rashedi, Nezamabadi-pour and Saryazdi 2009)",
-        _replayed("swarm.gsa:gsa"),
-        replays=True,
+        "swarm.gsa:gsa",
     ),
-    "mads": Method(
+    "mads": _generator(
         MadsSettings,
         "Mesh adaptive direct search (NOMAD 4; Audet, Le Digabel, Rochon Montplaisir et al. 2022)",
-        _replayed("local.mads:mads"),
-        replays=True,
+        "local.mads:mads",
         uses_start=True,
         extra="search",
         libraries=("PyNomadBBO",),
     ),
-    "nelder-mead": Method(
+    "nelder-mead": _generator(
         NelderMeadSettings,
         "Simplex of Nelder and Mead (1965), adaptive coefficients (Gao and Han 2012), restarts",
-        _replayed("local.nelder_mead:nelder_mead"),
-        replays=True,
+        "local.nelder_mead:nelder_mead",
         uses_start=True,
     ),
-    "ps": Method(
+    "ps": _generator(
         PatternSearchSettings,
         "Generalized pattern search on a mesh (Torczon 1997; Audet and Dennis 2003)",
-        _replayed("local.pattern_search:pattern_search"),
-        replays=True,
+        "local.pattern_search:pattern_search",
         uses_start=True,
     ),
     "pso": Method(
@@ -278,31 +263,27 @@ METHODS: Final[dict[MethodName, Method]] = {
         ParticleSwarm,
         uses_start=True,
     ),
-    "pso-ps": Method(
+    "pso-ps": _generator(
         PsoPsSettings,
         "Particle swarm, then pattern search from its best designs (thesis 3.2.2)",
-        _replayed("swarm.pso_ps:pso_ps"),
-        replays=True,
+        "swarm.pso_ps:pso_ps",
         uses_start=True,
     ),
-    "random": Method(
+    "random": _generator(
         RandomSearchSettings,
         "Uniform random designs, each independent of all others: what a search has to beat",
-        _replayed("random_search:random_search"),
-        replays=True,
+        "random_search:random_search",
     ),
-    "sa": Method(
+    "sa": _generator(
         AnnealingSettings,
         "Simulated annealing with adapted steps (Corana et al. 1987), cooling over the budget",
-        _replayed("local.annealing:annealing"),
-        replays=True,
+        "local.annealing:annealing",
         uses_start=True,
     ),
-    "tlbo": Method(
+    "tlbo": _generator(
         TlboSettings,
         "Teaching-learning-based optimization (Rao, Savsani and Vakharia 2011)",
-        _replayed("swarm.tlbo:tlbo"),
-        replays=True,
+        "swarm.tlbo:tlbo",
         uses_start=True,
     ),
 }
@@ -322,7 +303,7 @@ _PRESETS: Final[dict[str, OptimizerSettings]] = {
 
 OPTIMIZERS: Final[dict[str, OptimizerSettings]] = {
     name: _PRESETS[name] if name in _PRESETS else METHODS[name].settings()
-    for name in get_args(OptimizerName)
+    for name in sorted(get_args(OptimizerName))
 }
 """Each method by its default settings, and presets of `pso`.
 

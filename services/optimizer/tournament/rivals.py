@@ -9,7 +9,7 @@ elsewhere. None draws on random numbers that a process shares, as runs share a p
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -24,7 +24,6 @@ from services.optimizer.tournament.race import Evaluate
 
 if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution
-    from optuna.samplers import BaseSampler
 
 Floats = NDArray[np.float64]
 
@@ -198,13 +197,8 @@ def optuna_tpe(settings: OptunaTpeSettings, space: Space, seed: int, evaluate: E
         seed: Of its random numbers.
         evaluate: Judges positions; raises when the run is over.
     """
-    optuna = import_module("optuna")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-        sampler = optuna.samplers.TPESampler(
-            seed=seed, multivariate=settings.multivariate, constant_liar=True
-        )
-        _study(sampler, settings.particles, space, evaluate)
+    options = {"multivariate": settings.multivariate, "constant_liar": True}
+    _study("TPESampler", options, settings.particles, space, seed, evaluate)
 
 
 def optuna_cma_es(
@@ -220,13 +214,8 @@ def optuna_cma_es(
         seed: Of its random numbers.
         evaluate: Judges positions; raises when the run is over.
     """
-    optuna = import_module("optuna")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-        sampler = optuna.samplers.CmaEsSampler(
-            seed=seed, popsize=settings.particles, warn_independent_sampling=False
-        )
-        _study(sampler, settings.particles, space, evaluate)
+    options = {"popsize": settings.particles, "warn_independent_sampling": False}
+    _study("CmaEsSampler", options, settings.particles, space, seed, evaluate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,18 +247,28 @@ def _told(fitness: Floats) -> Floats:
     return np.where(np.isfinite(fitness), fitness, _FAILED)
 
 
-def _study(sampler: BaseSampler, batch: int, space: Space, evaluate: Evaluate) -> None:
+def _study(
+    sampler: str,
+    options: Mapping[str, Any],
+    batch: int,
+    space: Space,
+    seed: int,
+    evaluate: Evaluate,
+) -> None:
+    """Let one of Optuna's samplers search, a batch at a time."""
     optuna = import_module("optuna")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = optuna.create_study(sampler=sampler)
     distributions = {f"x{j}": _distribution(axis) for j, axis in enumerate(space.axes)}
-    while True:
-        trials = [study.ask(distributions) for _ in range(batch)]
-        designs = np.array([[t.params[name] for name in distributions] for t in trials], float)
-        for trial, value in zip(
-            trials, _told(evaluate(space.positions(designs))).tolist(), strict=True
-        ):
-            study.tell(trial, value)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+        chosen = getattr(optuna.samplers, sampler)(seed=seed, **options)
+        study = optuna.create_study(sampler=chosen)
+        while True:
+            trials = [study.ask(distributions) for _ in range(batch)]
+            designs = np.array([[t.params[name] for name in distributions] for t in trials], float)
+            fitness = _told(evaluate(space.positions(designs)))
+            for trial, value in zip(trials, fitness.tolist(), strict=True):
+                study.tell(trial, value)
 
 
 def _distribution(axis: Axis) -> BaseDistribution:

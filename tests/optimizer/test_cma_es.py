@@ -1,4 +1,4 @@
-"""CMA-ES: what the adapter adds to the library, and that it finds what it is to find."""
+"""CMA-ES: that it learns scales and valleys, keeps trying, restarts, and stays in its box."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from services.optimizer.search.evolution.symmetric import eigen, product
 from services.optimizer.search.registry import METHODS, create_search
 from services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl
-
-pytest.importorskip("cmaes")
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +29,56 @@ def test_a_narrow_valley_across_the_axes_is_learned() -> None:
     assert float(ridge(np.vstack(asked)).min()) < 1e-6
 
 
+def test_scales_of_the_variables_are_learned_faster_than_valleys_across_them() -> None:
+    scales = 10.0 ** np.linspace(0.0, 6.0, 10)
+    box = Space.continuous([-5.0] * 10, [5.0] * 10)
+    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((10, 10)))[0]
+
+    def along_the_axes(x: Floats) -> Floats:
+        height: Floats = (scales * np.square(x - 1.0)).sum(axis=1)
+        return height
+
+    def across_them(x: Floats) -> Floats:
+        return along_the_axes((x - 1.0) @ turn + 1.0)
+
+    for seed in range(2):
+        asked = designs_asked("cma-es", box, along_the_axes, 2_500, seed)
+        assert calls_to(1e-6, asked, along_the_axes) < 2_500
+        turned = designs_asked("cma-es", box, across_them, 2_500, seed)
+        assert across_them(np.vstack(turned)).min() > 1e-3
+
+
+def test_a_minimum_in_a_corner_is_reached_to_the_bit() -> None:
+    """Samples beyond a bound are judged at it."""
+    asked = np.vstack(designs_asked("cma-es", BOX, lambda x: x.sum(axis=1), 150))
+    assert (asked == BOX.low).all(axis=1).any()
+
+
+def test_a_minimum_along_a_bound_does_not_stop_the_other_variables() -> None:
+    """However long two variables lie at their bounds, the rest converges."""
+
+    def half_bounded(x: Floats) -> Floats:
+        total: Floats = x[:, :2].sum(axis=1) + 10.0 + np.square(x[:, 2:] - 1.0).sum(axis=1)
+        return total
+
+    asked = designs_asked("cma-es", BOX, half_bounded, 1_500)
+    assert half_bounded(np.vstack(asked)).min() < 1e-6
+
+
+def test_its_state_is_its_own_and_needs_no_replay() -> None:
+    assert not METHODS["cma-es"].replays
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 9, 40])
+def test_the_decomposition_is_that_of_lapack(dimension: int) -> None:
+    root = np.random.default_rng(dimension).standard_normal((dimension, dimension))
+    symmetric = root @ root.T + 1e-3 * np.eye(dimension)
+    values, vectors = eigen(symmetric)
+    np.testing.assert_allclose(np.sort(values), np.linalg.eigvalsh(symmetric), rtol=1e-9)
+    np.testing.assert_allclose(product(vectors * values, vectors.T), symmetric, atol=1e-9)
+    np.testing.assert_allclose(product(vectors.T, vectors), np.eye(dimension), atol=1e-12)
+
+
 def test_integers_and_choices_are_found_with_the_rest() -> None:
     calls = [
         calls_to(1e-2, designs_asked("cma-es", MIXED, mixed_bowl, 2_500, seed), mixed_bowl)
@@ -45,7 +94,7 @@ def test_a_generation_is_the_population_and_grows_with_each_restart() -> None:
         lambda x: np.abs(x[:, 0] - 0.3),
         3_000,
         population=6,
-        particles=100,
+        particles=400,
     )
     sizes = [len(designs) for designs in asked[:-1]]
     assert sizes == sorted(sizes) and set(sizes) >= {6, 12, 24}
@@ -80,7 +129,7 @@ def test_a_variable_never_stops_trying_other_integers_and_choices() -> None:
 def test_integers_of_two_and_of_very_many_values_are_searched_too() -> None:
     space = Space([Axis(0.0, 1.0, "integer"), Axis(0.0, 1e6, "integer")])
     asked = designs_asked(
-        "cma-es", space, lambda x: np.abs(x[:, 1] - 123_456.0) / 1e6 + x[:, 0], 400
+        "cma-es", space, lambda x: np.abs(x[:, 1] - 123_456.0) / 1e6 + x[:, 0], 800
     )
     best = min(np.vstack(asked).tolist(), key=lambda x: abs(x[1] - 123_456.0) / 1e6 + x[0])
     assert best[0] == 0.0 and abs(best[1] - 123_456.0) < 100.0

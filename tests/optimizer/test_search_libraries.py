@@ -16,7 +16,7 @@ from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
 from tests.optimizer.formula import HERE, SPEC
 
-OPTIONAL = ("cmaes", "pymoo", "PyNomad", "scipy.stats", "sklearn")
+OPTIONAL = ("pymoo", "PyNomad", "scipy.stats", "sklearn")
 """Modules that take long to import, or may be missing."""
 
 

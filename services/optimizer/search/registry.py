@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.evolution.cma_es import CmaEsSettings
+from services.optimizer.search.evolution.cma_es import CmaEs, CmaEsSettings
 from services.optimizer.search.evolution.differential_evolution import (
     DeSettings,
     DifferentialEvolution,
@@ -186,13 +186,12 @@ METHODS: Final[dict[MethodName, Method]] = {
         extra="search",
         libraries=("scikit-learn", "scipy", "threadpoolctl"),
     ),
-    "cma-es": _generator(
+    "cma-es": Method(
         CmaEsSettings,
-        "Covariance matrix adaptation, with margin for integers and choices (cmaes; Hamano 2025)",
-        "evolution.cma_es:cma_es",
+        "CMA-ES with diagonal acceleration, margin and restarts (Akimoto and Hansen 2020)",
+        CmaEs,
         uses_start=True,
-        extra="search",
-        libraries=("cmaes", "scipy"),
+        libraries=("scipy",),
     ),
     "de": Method(
         DeSettings,

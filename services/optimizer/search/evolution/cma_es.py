@@ -1,31 +1,33 @@
-"""CMA-ES with margin, of the library cmaes, with restarts."""
+"""CMA-ES with diagonal acceleration and a margin for integers and choices, with restarts."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, NonNegativeInt
 
+from services.optimizer.search.evolution.normal_distribution import (
+    DistributionState,
+    NormalDistribution,
+)
+from services.optimizer.search.generational import Generational, GenerationState, Worth, of_worth
+from services.optimizer.search.generational import worth as as_json
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
-
-if TYPE_CHECKING:
-    from cmaes import CatCMAwM
 
 Floats = NDArray[np.float64]
 
-_MOST_VALUES: Final = 1_000
-"""Values of an integer up to which each is a step of its own; beyond, it is sampled as real."""
+_SAMPLE: Final = 5
+_RESTART: Final = 6
+"""Purposes of random streams: never renumbered, or stored jobs would change their future."""
 
 _LARGEST_POPULATION: Final = 10_000
 
-_FLAT: Final = 1e-12
+_FLAT: Final = 1e-4
 """Share of the fitness by which generations differ in their best that no longer improve."""
 
 
@@ -53,105 +55,124 @@ class CmaEsSettings(SearchSettings):
     )
 
 
-def cma_es(
-    settings: CmaEsSettings,
-    space: Space,
-    budget: int,  # noqa: ARG001 - the same for every budget
-    random: RandomNumbers,
-    start: Start | None = None,
-) -> Proposals:
-    """Search by a normal distribution that adapts to where the better half of its samples is.
+class _CmaEsState(GenerationState):
+    """What `dump` writes.
 
-    CatCMA with margin (Hamano et al. 2025, arXiv 2504.07884) of the library cmaes: integers and
-    choices keep a least chance to change. Only the order of fitness values counts. Where it has
-    converged, it starts anew at a random place with a larger population (IPOP, Auger and Hansen
-    2005), keeping nothing. Eigenvectors are LAPACK's, so that bits may differ between processors.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: The first distribution is about the best of these; None: about the box's middle.
-
-    Yields:
-        (population, d) positions.
+    Attributes:
+        restarts: How often a new distribution was begun.
+        bests: Least fitness of the latest generations.
+        distribution: That is sampled.
     """
-    size = settings.population or 4 + math.floor(3.0 * math.log(space.dimension))
-    mean = np.full(space.dimension, 0.5)
-    if start is not None and len(start.best_first[0]):
-        mean = space.to_unit(start.best_first[0][0])
-    while True:
-        yield from _descent(_Distribution(space, size, mean, settings.sigma, random.seed()))
-        size = min(_LARGEST_POPULATION, math.ceil(size * settings.growth))
-        mean = random.uniform(space.dimension)
+
+    restarts: NonNegativeInt
+    bests: Worth
+    distribution: DistributionState
 
 
-def _descent(distribution: _Distribution) -> Proposals:
-    """Generations until they are all alike, or differ in nothing that counts."""
-    bests = deque[float](maxlen=distribution.patience)
-    while not distribution.has_converged():
-        fitness = yield distribution.sample()
-        distribution.learn(fitness)
-        bests.append(float(fitness.min()))
-        spread = max(bests) - min(bests) if math.isfinite(max(bests)) else math.inf
-        if len(bests) == bests.maxlen and spread <= _FLAT * abs(min(bests)):
-            return
+class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
+    """A normal distribution that adapts to where the better half of its samples is.
 
+    dd-CMA-ES (Akimoto and Hansen 2020): the scale of each variable is learned beside, and faster
+    than, how they go together. Only the order of fitness values counts; failures are the last.
 
-class _Distribution:
-    """CatCMAwM over a box: real, stepped and chosen variables are told apart and put together."""
+    The first distribution is about the box's middle, or about the best of the start positions,
+    which are judged before. One that has converged is given up for another at a random place, of a
+    larger population (IPOP, Auger and Hansen 2005), which keeps nothing.
+    """
 
-    def __init__(self, space: Space, size: int, mean: Floats, sigma: float, seed: int) -> None:
-        from cmaes import CatCMAwM  # noqa: PLC0415 - an optional extra, and slow to import
+    state_model = _CmaEsState
 
-        self._space, self._size = space, size
-        values = np.where(space.integer, space.span + 1.0, np.inf)
-        self._chosen = np.flatnonzero(space.categorical | (values == 2.0))
-        self._stepped = np.flatnonzero((values > 2.0) & (values <= _MOST_VALUES))
-        others = np.setdiff1d(np.arange(space.dimension), self._chosen)
-        self._real = np.setdiff1d(others, self._stepped)
-        given: dict[str, Any] = {}
-        if len(self._real):
-            given["x_space"] = [[0.0, 1.0]] * len(self._real)
-        if len(self._stepped):
-            given["z_space"] = [np.linspace(0.0, 1.0, round(values[j])) for j in self._stepped]
-        if len(self._chosen):
-            given["c_space"] = [round(space.span[j]) + 1 for j in self._chosen]
-        if len(others):
-            order = np.concatenate([self._real, self._stepped])
-            given |= {"mean": mean[order], "sigma": sigma, "cov": np.eye(len(others))}
-        self._library: CatCMAwM = CatCMAwM(**given, population_size=size, seed=seed)
-        self._samples: list[CatCMAwM.Solution] = []
+    def __init__(self, settings: CmaEsSettings, space: Space, budget: int, seed: int) -> None:
+        """Create a search that has not been asked yet.
+
+        Args:
+            settings: Of the method.
+            space: The box that is searched.
+            budget: Evaluations of the planned run; it changes nothing.
+            seed: Of all random numbers.
+        """
+        super().__init__(settings, space, budget, seed)
+        self._restarts = 0
+        self._bests: list[float] = []
+        self._distribution = self._about(np.full(space.dimension, 0.5))
 
     @property
-    def patience(self) -> int:
-        """Generations after which one that has not improved gives up (Hansen's TolFun)."""
-        return 10 + math.ceil(30 * self._space.dimension / self._size)
+    def population(self) -> int:
+        """Size of the generations until the next restart."""
+        first = self.settings.population or 4 + math.floor(3.0 * math.log(self.space.dimension))
+        return min(_LARGEST_POPULATION, math.ceil(first * self.settings.growth**self._restarts))
 
-    def sample(self) -> Floats:
-        """(size, d) positions."""
-        space = self._space
-        self._samples = [self._library.ask() for _ in range(self._size)]
-        unit = np.zeros((self._size, space.dimension))
-        for row, sample in zip(unit, self._samples, strict=True):
-            if len(self._real):
-                row[self._real] = sample.x
-            if len(self._stepped):
-                row[self._stepped] = sample.z
-        designs = space.from_unit(unit)
-        for j, column in enumerate(self._chosen):
-            # One-hot: which of the choices.
-            designs[:, column] = space.low[column] + [np.argmax(s.c[j]) for s in self._samples]
-        return space.positions(designs)
+    @property
+    def first_size(self) -> int:
+        """Start positions that are learned from, at most."""
+        return self.population
 
-    def learn(self, fitness: Floats) -> None:
-        """Adapt to the order of the samples' fitness, failed ones last."""
-        rank = np.empty(self._size)
-        rank[np.argsort(fitness, kind="stable")] = np.arange(self._size, dtype=np.float64)
-        self._library.tell(list(zip(self._samples, rank.tolist(), strict=True)))
+    def propose(self) -> Floats:
+        """Sample the distribution; before that, judge the start positions.
 
-    def has_converged(self) -> bool:
-        """Whether the library would stop; it knows nothing of choices alone."""
-        continuous = len(self._real) + len(self._stepped) > 0
-        return continuous and bool(self._library.should_stop())
+        Returns:
+            (n, d), inside the bounds.
+        """
+        if not self.generations and len(self._start):
+            return np.empty((0, self.space.dimension))
+        return self._distribution.sample(self._random())
+
+    def learn(self, positions: Floats, fitness: Floats) -> None:
+        """Adapt to the samples' order, or begin about the best start position.
+
+        Args:
+            positions: (n, d) as `propose` made them.
+            fitness: (n,) of each, +inf for a failed evaluation.
+        """
+        if not self.generations and len(self._start):
+            best = positions[np.argmin(fitness)]
+            self._distribution = self._about(self.space.to_unit(best[np.newaxis])[0])
+            return
+        self._distribution.learn(self._random(), np.argsort(fitness, kind="stable"))
+        patience = 10 + math.ceil(30 * self.space.dimension / self.population)
+        self._bests = [*self._bests, float(fitness.min())][-patience:]
+        if self._distribution.has_converged() or (len(self._bests) == patience and self._is_flat()):
+            self._restarts += 1
+            random = RandomNumbers(self.seed, _RESTART, iteration=self._restarts)
+            self._distribution = self._about(random.uniform(self.space.dimension))
+            self._bests = []
+
+    def memory(self) -> dict[str, Any]:
+        """Give the distribution and what led to it."""
+        return {
+            "restarts": self._restarts,
+            "bests": as_json(self._bests),
+            "distribution": self._distribution.dump(),
+        }
+
+    def recall(self, state: _CmaEsState) -> None:
+        """Take on a distribution.
+
+        Args:
+            state: As it was parsed.
+
+        Raises:
+            ValueError: A shape is another.
+        """
+        before, self._restarts = self._restarts, state.restarts
+        try:
+            distribution = self._about(np.full(self.space.dimension, 0.5))
+            distribution.load(state.distribution)
+        except ValueError:
+            self._restarts = before
+            raise
+        self._distribution, self._bests = distribution, of_worth(state.bests).tolist()
+
+    def _about(self, mean: Floats) -> NormalDistribution:
+        """A new distribution about a unit position."""
+        return NormalDistribution(self.space, self.population, mean, self.settings.sigma)
+
+    def _random(self) -> RandomNumbers:
+        """Numbers of this generation, from the first on."""
+        return RandomNumbers(self.seed, _SAMPLE, iteration=self.generations)
+
+    def _is_flat(self) -> bool:
+        """Whether the latest generations differ in nothing that counts."""
+        if not math.isfinite(max(self._bests)):
+            return not math.isfinite(min(self._bests))
+        return max(self._bests) - min(self._bests) <= _FLAT * abs(min(self._bests))

@@ -1,0 +1,344 @@
+"""The distribution of CMA-ES: sampled in a box, and moved towards its better samples."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, FiniteFloat, PositiveFloat
+
+from services.optimizer.search.evolution.symmetric import eigen, product
+from services.optimizer.search.optimizer import matrix
+from services.optimizer.search.random_stream import RandomNumbers
+from services.optimizer.search.space import Space
+
+Floats = NDArray[np.float64]
+
+_REACH: Final = 2.0
+"""Standard deviations by which the mean may lie beyond a bound, so that most samples are on it."""
+
+_WIDEST: Final = 1.0
+"""Standard deviation of a variable, at most, as a share of its range."""
+
+_OTHERS: Final = 0.5
+"""Samples of a generation that have another integer, or another choice, than most, on average."""
+
+_CONVERGED: Final = 1e-9
+"""Standard deviation of every real variable, as a share of its range, of one that has converged."""
+
+_WORST_CONDITION: Final = 1e7
+"""Of the root of a correlation matrix that can still be decomposed."""
+
+_NEARLY_DIAGONAL: Final = 2.0
+"""Root of the correlations' condition up to which scales learn at full speed (beta_thresh)."""
+
+
+class DistributionState(BaseModel):
+    """What `NormalDistribution.dump` writes; unit coordinates.
+
+    Attributes:
+        mean: (d,).
+        sigma: Overall standard deviation.
+        scale: (d,) of each variable, which `sigma` is multiplied by.
+        correlation: (d, d).
+        sigma_path: (d,) evolution path of `sigma`.
+        correlation_path: (d,) that of the correlations.
+        scale_path: (d,) that of the scales.
+        weights: Of the three paths, how much of its steady state each has reached.
+        chances: Of every choice of each categorical variable.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    mean: list[FiniteFloat]
+    sigma: PositiveFloat
+    scale: list[PositiveFloat]
+    correlation: list[list[FiniteFloat]]
+    sigma_path: list[FiniteFloat]
+    correlation_path: list[FiniteFloat]
+    scale_path: list[FiniteFloat]
+    weights: list[FiniteFloat]
+    chances: list[list[PositiveFloat]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rates:
+    """How fast a part of the covariance is learned.
+
+    Attributes:
+        path: Of the evolution path, c_c.
+        one: Of the path's update, c_1.
+        many: Of all samples' update, c_mu.
+        weights: (n,) of the samples in order, negative in the worse half (active CMA).
+    """
+
+    path: float
+    one: float
+    many: float
+    weights: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Root:
+    """Of a correlation matrix.
+
+    Attributes:
+        matrix: (d, d), symmetric; its square is the matrix.
+        inverse: (d, d) of that root.
+        condition: Of that root.
+    """
+
+    matrix: Floats
+    inverse: Floats
+    condition: float
+
+
+class NormalDistribution:
+    """Samples m + sigma D y, y ~ N(0, C), of dd-CMA-ES; choices have chances of their own.
+
+    A sample beyond a bound is judged at the bound, and learned from where it was. The mean stays
+    near the box. An integer's scale never falls so far that no sample tries another one (CMA-ES
+    with margin, Hamano et al. 2022), nor do a choice's chances, which are learned as fast as
+    scales. Sums are made in a stated order and no library decomposes, so that bits are the same on
+    all processors.
+    """
+
+    def __init__(self, space: Space, size: int, mean: Floats, sigma: float) -> None:
+        """Make one that knows nothing.
+
+        Args:
+            space: The box.
+            size: Samples of a generation, at least 4.
+            mean: (d,) unit position.
+            sigma: Standard deviation, as a share of each range.
+        """
+        d = space.dimension
+        self._space: Final = space
+        self._size: Final = size
+        self._mean, self._sigma = mean.copy(), sigma
+        self._scale, self._correlation = np.ones(d), np.eye(d)
+        self._decomposed: _Root | None = None
+        self._sigma_path, self._correlation_path, self._scale_path = np.zeros((3, d))
+        self._reached = [0.0, 0.0, 0.0]
+        self._chosen: Final = np.flatnonzero(space.categorical).tolist()
+        self._chances = [
+            np.full(k, 1.0 / k) for k in (round(space.span[j]) + 1 for j in self._chosen)
+        ]
+        raw = [math.log((size + 1) / 2.0) - math.log(i + 1.0) for i in range(size)]
+        better = [max(w, 0.0) for w in raw]
+        worse = [min(w, 0.0) for w in raw]
+        self._better: Final = np.array(better) / math.fsum(better)
+        self._mass: Final = 1.0 / math.fsum(self._better**2)
+        self._worse: Final = np.array(worse) / -math.fsum(worse)
+        self._worse_mass: Final = 1.0 / math.fsum(self._worse**2)
+        self._of_correlation: Final = self._rates(d * (d + 1) / 2.0)
+        self._of_scale: Final = self._rates(float(d))
+
+    def sample(self, random: RandomNumbers) -> Floats:
+        """Draw a generation.
+
+        Args:
+            random: Numbers of the generation, from the first on.
+
+        Returns:
+            (size, d) positions inside the bounds.
+        """
+        _, y = self._steps(random)
+        unit = self._mean + self._sigma * self._scale * y
+        designs = self._space.designs(self._space.from_unit(unit))
+        if self._chosen:
+            designs[:, self._chosen] = self._choices(random)
+        return self._space.positions(designs)
+
+    def learn(self, random: RandomNumbers, order: NDArray[np.intp]) -> None:
+        """Move towards the better samples.
+
+        Args:
+            random: The numbers that the generation was sampled with, from the first on.
+            order: (size,) the samples, best first.
+        """
+        root = self._root()
+        z, y = self._steps(random)
+        choices = self._choices(random)[order] if self._chosen else None
+        z, y = z[order], y[order]
+        step = product(self._better[np.newaxis], y)[0]
+        self._mean = self._mean + self._sigma * self._scale * step
+        steady = self._adapt_sigma(product(self._better[np.newaxis], z)[0])
+        moved = steady * self._scale * step
+        squares = np.ascontiguousarray(np.square(z).T).sum(axis=0)
+        # Worse samples far away would take more variance than there is; those nearby need not count
+        # for more.
+        kept = np.minimum(4.0, self._space.dimension / np.maximum(squares, 1e-12))
+        correlation = self._learned_correlation(moved, y, kept)
+        change = self._learned_scale(moved, z, kept)
+        slowed = 1.0 / max(1.0, root.condition - _NEARLY_DIAGONAL + 1.0)
+        factor = np.array([math.exp(c) for c in (0.5 * slowed * change).tolist()])
+        spread = np.sqrt(np.maximum(np.diag(correlation), 1e-20))
+        self._scale = self._scale * factor * spread
+        self._correlation = correlation / (spread[:, np.newaxis] * spread)
+        self._decomposed = None
+        self._scale = np.minimum(self._scale, _WIDEST / self._sigma)
+        reach = _REACH * self._sigma * self._scale
+        self._mean = np.clip(self._mean, -reach, 1.0 + reach)
+        self._keep_trying_integers()
+        if choices is not None:
+            self._learn_choices(choices)
+
+    def has_converged(self) -> bool:
+        """Whether samples differ in nothing any more, or the covariance cannot be decomposed."""
+        real = ~(self._space.integer | self._space.categorical)
+        widest = float(self._scale[real].max()) if real.any() else math.inf
+        return self._sigma * widest < _CONVERGED or self._root().condition > _WORST_CONDITION
+
+    def dump(self) -> dict[str, Any]:
+        """Give the whole state, JSON-able."""
+        return {
+            "mean": self._mean.tolist(),
+            "sigma": self._sigma,
+            "scale": self._scale.tolist(),
+            "correlation": self._correlation.tolist(),
+            "sigma_path": self._sigma_path.tolist(),
+            "correlation_path": self._correlation_path.tolist(),
+            "scale_path": self._scale_path.tolist(),
+            "weights": list(self._reached),
+            "chances": [chances.tolist() for chances in self._chances],
+        }
+
+    def load(self, state: DistributionState) -> None:
+        """Take on a state of the same space and size.
+
+        Args:
+            state: As `dump` gave it.
+
+        Raises:
+            ValueError: A shape is another; the state before is kept.
+        """
+        d = self._space.dimension
+        rows = {
+            name: matrix([getattr(state, name)], (1, d), f"distribution.{name}")[0]
+            for name in ("mean", "scale", "sigma_path", "correlation_path", "scale_path")
+        }
+        correlation = matrix(state.correlation, (d, d), "distribution.correlation")
+        if len(state.weights) != len(self._reached):
+            raise ValueError(f"distribution.weights: expected {len(self._reached)} of them")
+        if [len(row) for row in state.chances] != [len(row) for row in self._chances]:
+            raise ValueError("distribution.chances: of other choices than this job's")
+        self._mean, self._sigma, self._scale = rows["mean"], state.sigma, rows["scale"]
+        self._correlation, self._decomposed = correlation, None
+        self._reached = list(state.weights)
+        self._sigma_path, self._scale_path = rows["sigma_path"], rows["scale_path"]
+        self._correlation_path = rows["correlation_path"]
+        self._chances = [np.array(row) for row in state.chances]
+
+    def _rates(self, parameters: float) -> _Rates:
+        """Rates of a part of so many parameters (Akimoto and Hansen 2020, table 1)."""
+        d, n, mass = self._space.dimension, self._size, self._mass
+        half = math.sqrt(d + 1.0)
+        one = 1.0 / (2.0 * (parameters / d + 1.0) * half * math.sqrt(half) + 0.5 * mass)
+        gain = mass + 1.0 / mass - 2.0 + 0.5 * n / (n + 5.0)
+        many = min(gain * one, 1.0 - one)
+        negative = min(1.0 + one / many, 1.0 + 2.0 * self._worse_mass / (mass + 2.0))
+        return _Rates(math.sqrt(0.5 * gain * one), one, many, self._better + negative * self._worse)
+
+    def _root(self) -> _Root:
+        """Of the correlations; decomposed once after they have changed."""
+        if self._decomposed is None:
+            values, vectors = eigen(self._correlation)
+            roots = np.sqrt(np.maximum(values, 1e-20))
+            self._decomposed = _Root(
+                product(vectors * roots, vectors.T),
+                product(vectors / roots, vectors.T),
+                float(roots.max() / roots.min()),
+            )
+        return self._decomposed
+
+    def _steps(self, random: RandomNumbers) -> tuple[Floats, Floats]:
+        """(size, d) z ~ N(0, I) and y ~ N(0, C); the first numbers of a generation."""
+        z = random.normal(self._size, self._space.dimension)
+        return z, product(z, self._root().matrix)
+
+    def _choices(self, random: RandomNumbers) -> Floats:
+        """(size, c) choices of the categorical variables; what a generation draws next."""
+        lots = random.uniform(self._size, len(self._chosen))
+        columns = [
+            np.minimum(np.searchsorted(np.cumsum(chances), lot, side="right"), len(chances) - 1)
+            for chances, lot in zip(self._chances, lots.T, strict=True)
+        ]
+        return np.array(columns, dtype=np.float64).T
+
+    def _adapt_sigma(self, step: Floats) -> float:
+        """Lengthen or shorten steps (CSA); tells how much of a step the other paths take."""
+        d, mass = self._space.dimension, self._mass
+        rate = (mass + 2.0) / (d + mass + 5.0)
+        damping = 1.0 + rate + 2.0 * max(0.0, math.sqrt((mass - 1.0) / (d + 1.0)) - 1.0)
+        self._sigma_path = (1.0 - rate) * self._sigma_path + math.sqrt(
+            rate * (2.0 - rate) * mass
+        ) * step
+        self._reached[0] = (1.0 - rate) ** 2 * self._reached[0] + rate * (2.0 - rate)
+        length = math.fsum(self._sigma_path**2)
+        expected = math.sqrt(d) * (1.0 - 1.0 / (4.0 * d) + 1.0 / (21.0 * d * d))
+        excess = math.sqrt(length) / expected - math.sqrt(self._reached[0])
+        self._sigma = min(_WIDEST, self._sigma * math.exp(rate / damping * excess))
+        return 1.0 if length / self._reached[0] < (2.0 + 4.0 / (d + 1.0)) * d else 0.0
+
+    def _learned_correlation(self, moved: Floats, y: Floats, kept: Floats) -> Floats:
+        """The covariance of y after this generation; its diagonal has left 1."""
+        rates = self._of_correlation
+        self._correlation_path, self._reached[1] = self._path(
+            rates, self._correlation_path, moved, self._reached[1]
+        )
+        path = self._correlation_path / self._scale
+        weights = np.where(rates.weights < 0.0, rates.weights * kept, rates.weights)
+        rank_one = path[:, np.newaxis] * path - self._reached[1] * self._correlation
+        rank_many = (
+            product((y * weights[:, np.newaxis]).T, y) - math.fsum(weights) * self._correlation
+        )
+        return self._correlation + rates.one * rank_one + rates.many * rank_many
+
+    def _learned_scale(self, moved: Floats, z: Floats, kept: Floats) -> Floats:
+        """(d,) by how much the logarithm of each variance is to change."""
+        rates = self._of_scale
+        self._scale_path, self._reached[2] = self._path(
+            rates, self._scale_path, moved, self._reached[2]
+        )
+        path = product((self._scale_path / self._scale)[np.newaxis], self._root().inverse)[0]
+        weights = np.where(rates.weights < 0.0, rates.weights * kept, rates.weights)
+        rank_many = product(weights[np.newaxis], np.square(z))[0] - math.fsum(weights)
+        change: Floats = rates.one * (np.square(path) - self._reached[2]) + rates.many * rank_many
+        return change
+
+    def _path(
+        self, rates: _Rates, path: Floats, moved: Floats, reached: float
+    ) -> tuple[Floats, float]:
+        """An evolution path after this generation, and how much of its steady state it has."""
+        kept, taken = 1.0 - rates.path, rates.path * (2.0 - rates.path)
+        paused = not moved.any()
+        reached = kept * kept * reached + (0.0 if paused else taken)
+        return kept * path + math.sqrt(taken * self._mass) * moved, reached
+
+    def _keep_trying_integers(self) -> None:
+        """Widen integers' scales, so that some samples still have other values."""
+        from scipy.special import ndtri  # noqa: PLC0415 - slow, and few searches need it
+
+        away = float(-ndtri(_OTHERS / self._size))
+        for j in np.flatnonzero(self._space.integer).tolist():
+            last = float(self._space.span[j])
+            value = min(max(round(float(self._mean[j]) * last), 0), round(last))
+            edges = [value - 0.5] * (value > 0) + [value + 0.5] * (value < last)
+            nearest = min(abs(float(self._mean[j]) * last - edge) for edge in edges) / last
+            least = nearest / away / self._sigma
+            self._scale[j] = max(self._scale[j], least)
+
+    def _learn_choices(self, choices: Floats) -> None:
+        """Move chances towards the better samples' choices, and keep the least one."""
+        rate = min(1.0, self._of_scale.one + self._of_scale.many)
+        for column, chances in zip(choices.T, self._chances, strict=True):
+            taken = [math.fsum(self._better[column == choice]) for choice in range(len(chances))]
+            least = min(_OTHERS / self._size, 0.5) / (len(chances) - 1)
+            moved = np.maximum(chances + rate * (np.array(taken) - chances), least)
+            excess = moved - least
+            total = math.fsum(excess)
+            chances[:] = least + excess * ((1.0 - least * len(chances)) / total)

@@ -31,6 +31,7 @@ from api.routes import (
     identification,
     jobs,
     simulations,
+    tournaments,
 )
 from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
@@ -85,6 +86,7 @@ def create_app(
         analysis,
         calibration,
         identification,
+        tournaments,
         simulations,
         catalogue,
         health,

@@ -59,6 +59,11 @@ if TYPE_CHECKING:
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.surface import SurfaceView
+    from gaitswarm.views.tournament import (
+        ProblemRunsView,
+        TournamentStandingsView,
+        TournamentView,
+    )
     from services.optimizer.jobs.calibration import CalibrationSpec
     from services.optimizer.jobs.identification import IdentificationSpec
     from services.optimizer.jobs.preference import PREFERENCES, Preference
@@ -146,6 +151,7 @@ __all__ = [
     "OptimizationResult",
     "PatternSearchSettings",
     "Preference",
+    "ProblemRunsView",
     "ProvenanceChanged",
     "PsoPsSettings",
     "PsoSettings",
@@ -169,6 +175,8 @@ __all__ = [
     "TargetsView",
     "TlboSettings",
     "TournamentSpec",
+    "TournamentStandingsView",
+    "TournamentView",
     "Unavailable",
     "Unreadable",
     "Variable",
@@ -210,6 +218,9 @@ _MODULES: Final = {
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.surface": ("SurfaceView",),
+    "gaitswarm.views.tournament": (
+        "ProblemRunsView", "TournamentStandingsView", "TournamentView",
+    ),
     "services.optimizer.jobs.calibration": ("CalibrationSpec",),
     "services.optimizer.jobs.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),

@@ -12,7 +12,7 @@ from cli.options import Json, WorkerOptions, with_groups
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from cli.tournament.standings import Standings
+    from services.optimizer.analysis.standings import Standings
     from services.optimizer.jobs.tournament import TournamentSpec
 
 Preset = Annotated[
@@ -103,7 +103,8 @@ def tournament(
     from cli.tournament.plan import PRESETS, Size, chosen_methods, chosen_problems, tournament_jobs
     from cli.tournament.report import write_report
     from cli.tournament.runs import read_runs, results_of, run_jobs, write_runs
-    from cli.tournament.standings import standings_of
+    from gaitswarm.views.tournament import StandingsView
+    from services.optimizer.analysis.standings import standings_of
     from services.optimizer.errors import InvalidRequest
 
     known = PRESETS[preset]
@@ -142,7 +143,8 @@ def tournament(
     }
     path = write_report(output, found, entries, facts)
     if as_json:
-        print_text(json.dumps({"report": str(path), **found.document()}, indent=2, allow_nan=False))
+        document = StandingsView.from_standings(found).model_dump(mode="json")
+        print_text(json.dumps({"report": str(path), **document}, indent=2, allow_nan=False))
     else:
         _show(found)
         print_text(str(path))

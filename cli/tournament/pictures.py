@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from services.optimizer.analysis.tournament import Interval, Results, Runs, data_profile
+from services.optimizer.analysis.standings import Profile
+from services.optimizer.analysis.tournament import Interval, Runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-PRECISIONS: Final = (1e-1, 1e-3)
-"""tau of the data profiles that are drawn."""
 
 _LEAST: Final = 1e-9
 """Values below are drawn here, as a logarithm has no place for 0."""
@@ -62,12 +60,11 @@ def draw_problem(name: str, by_method: Mapping[str, Runs]) -> Figure:
     return figure
 
 
-def draw_profiles(results: Results, methods: Sequence[str]) -> Figure:
+def draw_profiles(profiles: Sequence[Profile]) -> Figure:
     """Data profiles: share of runs that are solved, over the budget in simplex gradients.
 
     Args:
-        results: Of all methods.
-        methods: Their names.
+        profiles: Of all methods, by precision.
 
     Returns:
         The picture, a panel for each precision.
@@ -75,19 +72,16 @@ def draw_profiles(results: Results, methods: Sequence[str]) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.0), layout="constrained")
-    panels = figure.subplots(1, len(PRECISIONS), sharey=True)
-    most = max(
-        runs.budget / (runs.dimension + 1)
-        for by_method in results.values()
-        for runs in by_method.values()
-    )
-    budgets = np.geomspace(1.0, most, 60)
-    for axes, precision in zip(panels, PRECISIONS, strict=True):
-        for label, color in zip(methods, _colors(len(methods)), strict=True):
-            shares = data_profile(results, label, precision, budgets.tolist())
-            axes.step(budgets, 100.0 * shares, where="post", color=color, lw=1.6, label=label)
+    panels = figure.subplots(1, len(profiles), sharey=True)
+    for axes, profile in zip(panels, profiles, strict=True):
+        for (label, shares), color in zip(
+            profile.shares.items(), _colors(len(profile.shares)), strict=True
+        ):
+            axes.step(
+                profile.budgets, 100.0 * shares, where="post", color=color, lw=1.6, label=label
+            )
         _log_x(axes)
-        axes.set_title(f"tau = {precision:g}", loc="left")
+        axes.set_title(f"tau = {profile.precision:g}", loc="left")
         axes.set_xlabel("function calls / (variables + 1)")
         _finish(axes)
     panels[0].set_ylabel("runs that have solved their problem  [%]")

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from cli.spec_file import parse_spec
+from services.optimizer.analysis.entrants import NAME_PREFIX
+from services.optimizer.analysis.standings import looked_at
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.tournament import TournamentSpec
 from services.optimizer.jobs.tuning import JobSpec
@@ -25,9 +27,6 @@ from services.optimizer.tournament.rivals import RIVALS
 PresetName = Literal["thesis", "robot"]
 
 Settings = Literal["random", "default"]
-
-_LOOKED_AT: Final = (100, 250, 625, 2500)
-"""Evaluations after which medians are reported, where the budget reaches as far."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +68,12 @@ class Size:
     def checkpoints(self) -> tuple[int, ...]:
         """Evaluations at which runs are looked at."""
         usual = default_checkpoints(self.evaluations)
-        return tuple(sorted({*usual, *(c for c in _LOOKED_AT if c < self.evaluations)}))
+        return tuple(sorted({*usual, *self.looked_at}))
 
     @property
     def looked_at(self) -> tuple[int, ...]:
         """Checkpoints whose medians are reported; the budget is the last."""
-        return (*(c for c in _LOOKED_AT if c < self.evaluations), self.evaluations)
+        return looked_at(self.evaluations)
 
 
 _ROBOT: Final[dict[str, dict[str, Any]]] = {
@@ -161,7 +160,7 @@ def tournament_jobs(
     for label, method in methods.items():
         document: dict[str, Any] = {
             "kind": "tournament",
-            "name": f"tournament: {label}",
+            "name": f"{NAME_PREFIX}{label}",
             "method": method,
             "problems": documents,
             "evaluations": size.evaluations,

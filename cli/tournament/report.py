@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from cli.atomic_file import replacing
 from cli.tournament.pictures import draw_problem, draw_profiles, draw_ranks
-from cli.tournament.standings import NEAR, Standings
+from services.optimizer.analysis.standings import NEAR, Standings, profiles_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,7 +71,7 @@ def _lines(
         "<p>Share of runs that have come from the usual first value all but a share tau of the way"
         " to the least value that any run found (Moré and Wild 2009).</p>"
     )
-    yield _picture(draw_profiles(found.results, found.methods))
+    yield _picture(draw_profiles(profiles_of(found.results)))
     for name in found.by_problem:
         yield from _problem(found, name)
     yield from _settings(entries)

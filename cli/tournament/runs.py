@@ -21,6 +21,7 @@ from gaitswarm.jobs.embedded import earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.settings import read_settings
 from gaitswarm.tables import Table
+from services.optimizer.analysis.entrants import by_problem
 from services.optimizer.analysis.tournament import Results, Runs, runs_of
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
@@ -178,11 +179,9 @@ def results_of(entries: Mapping[str, Entry], repetitions: int) -> dict[str, dict
     Returns:
         The runs, problems and methods in order.
     """
-    found: dict[str, dict[str, Runs]] = {}
-    for label, entry in entries.items():
-        for problem, runs in runs_of(entry.spec, entry.columns, repetitions).items():
-            found.setdefault(problem, {})[label] = runs
-    return found
+    return by_problem(
+        {label: runs_of(entry.spec, entry.columns, repetitions) for label, entry in entries.items()}
+    )
 
 
 def write_runs(folder: Path, entries: Mapping[str, Entry], results: Results) -> Path:

@@ -36,6 +36,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
@@ -241,6 +242,21 @@ class AsyncDatabaseJobs(AsyncJobs):
         jobs = await self._jobs()
         asked = partial(jobs.targets, job_ids, leave_out=leave_out)
         return await to_thread.run_sync(asked)
+
+    async def tournaments(self) -> list[TournamentView]:
+        """Read which tournaments there are."""
+        return await to_thread.run_sync((await self._jobs()).tournaments)
+
+    async def standings(
+        self, job_id: str, *, compare_with: str | None = None
+    ) -> TournamentStandingsView:
+        """Judge a tournament from what is stored."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.standings, job_id, compare_with=compare_with))
+
+    async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
+        """Read the runs on a problem."""
+        return await to_thread.run_sync((await self._jobs()).problem_runs, job_id, problem)
 
     async def export(
         self, job_id: str, file_format: TableFormat = "parquet"

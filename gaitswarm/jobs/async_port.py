@@ -36,6 +36,11 @@ if TYPE_CHECKING:
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.surface import SurfaceView
+    from gaitswarm.views.tournament import (
+        ProblemRunsView,
+        TournamentStandingsView,
+        TournamentView,
+    )
     from services.optimizer.analysis.targets import LeaveOut
     from sim.identification.recorded_walk import RecordedWalk
 
@@ -157,6 +162,20 @@ class AsyncJobs(ABC):
         self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None
     ) -> TargetsView:
         """See how near runs of a calibration come to their targets."""
+
+    @abstractmethod
+    async def tournaments(self) -> list[TournamentView]:
+        """List tournaments: jobs that ran search methods on the same problems."""
+
+    @abstractmethod
+    async def standings(
+        self, job_id: str, *, compare_with: str | None = None
+    ) -> TournamentStandingsView:
+        """See what a tournament comes to, of all runs that have ended."""
+
+    @abstractmethod
+    async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
+        """See all runs of a tournament on one problem."""
 
     @abstractmethod
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> AsyncIterator[bytes]:

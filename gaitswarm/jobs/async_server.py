@@ -52,6 +52,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
@@ -209,6 +210,20 @@ class AsyncServerJobs(AsyncJobs):
         """Let the server compare runs with their targets."""
         chosen = arguments.leave_out(leave_out)
         return await self._send(calls.targets(arguments.runs(job_ids), chosen))
+
+    async def tournaments(self) -> list[TournamentView]:
+        """Ask the server which tournaments there are."""
+        return (await self._send(calls.tournaments())).items
+
+    async def standings(
+        self, job_id: str, *, compare_with: str | None = None
+    ) -> TournamentStandingsView:
+        """Let the server judge a tournament."""
+        return await self._send(calls.standings(job_id, compare_with))
+
+    async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
+        """Ask the server for the runs on a problem."""
+        return await self._send(calls.problem_runs(job_id, problem))
 
     async def export(
         self, job_id: str, file_format: TableFormat = "parquet"

@@ -36,6 +36,11 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.tournament import (
+    ProblemRunsView,
+    TournamentStandingsView,
+    TournamentsView,
+)
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.spec import Spec
@@ -252,6 +257,34 @@ def targets(job_ids: Sequence[str], leave_out: LeaveOut | None) -> Call[TargetsV
     return Call("GET", f"{_job(first)}/targets", TargetsView.model_validate_json, asked)
 
 
+def tournaments() -> Call[TournamentsView]:
+    """List tournaments."""
+    return _got("/tournaments", TournamentsView)
+
+
+def standings(job_id: str, compare_with: str | None) -> Call[TournamentStandingsView]:
+    """See what a tournament comes to.
+
+    Args:
+        job_id: Identifier of one of its jobs.
+        compare_with: That of a job of another tournament, or None.
+    """
+    asked = {} if compare_with is None else {"compare_with": compare_with}
+    read = TournamentStandingsView.model_validate_json
+    return Call("GET", f"/tournaments/{_segment(job_id, 'job')}", read, asked)
+
+
+def problem_runs(job_id: str, problem: str) -> Call[ProblemRunsView]:
+    """See all runs of a tournament on a problem.
+
+    Args:
+        job_id: Identifier of one of its jobs.
+        problem: Name of the problem.
+    """
+    path = f"/tournaments/{_segment(job_id, 'job')}/problems/{_segment(problem, 'problem')}"
+    return _got(path, ProblemRunsView)
+
+
 def record(walk: RecordedWalk) -> Call[RecordingView]:
     """Keep a recorded walk.
 
@@ -333,7 +366,7 @@ def _job(job_id: str) -> str:
 
 
 def _segment(name: str, what: str) -> str:
-    """An id as one segment of a path."""
+    """An id or a name as one segment of a path."""
     if not name or name in (".", ".."):
         raise NotFound(f"no {what} has the id {name!r}")
     return quote(name, safe="")

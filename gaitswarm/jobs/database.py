@@ -11,7 +11,9 @@ from typing import Final, Unpack
 
 from gaitswarm.errors import NotFound, simulation_errors
 from gaitswarm.jobs.embedded import Workers, run_here
+from gaitswarm.jobs.news import PAGE, JobNews
 from gaitswarm.jobs.port import JobEvent, Jobs
+from gaitswarm.jobs.tournaments import DatabaseTournaments
 from gaitswarm.requests import arguments
 from gaitswarm.requests.replay import run_replay
 from gaitswarm.requests.surface import run_surface
@@ -36,7 +38,6 @@ from gaitswarm.views import (
     JobSummaryView,
     JobView,
     RankingView,
-    StateView,
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
@@ -55,10 +56,8 @@ from sim.robot import DEFAULT_ROBOT
 POLL_SECONDS: Final = 0.5
 """How often a job that is followed is looked at [s]."""
 
-_PAGE: Final = 100
 
-
-class DatabaseJobs(Jobs):
+class DatabaseJobs(DatabaseTournaments, Jobs):
     """Jobs in a database, which this process can run as well. Owns its store."""
 
     def __init__(
@@ -219,7 +218,7 @@ class DatabaseJobs(Jobs):
     def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
         """Read committed iterations by pages."""
         while True:
-            page = self._service.iterations(job_id, after=after, limit=_PAGE)
+            page = self._service.iterations(job_id, after=after, limit=PAGE)
             yield from map(IterationView.from_iteration, page.items)
             if page.next is None or not page.items:
                 return
@@ -355,7 +354,7 @@ class DatabaseJobs(Jobs):
         after: str | None = None
         while True:
             page = self._service.jobs(
-                state=state, search=search, order=order, after=after, limit=_PAGE
+                state=state, search=search, order=order, after=after, limit=PAGE
             )
             yield from page.items
             if page.next is None:
@@ -365,36 +364,3 @@ class DatabaseJobs(Jobs):
     def _in_full(self, job: Job) -> JobView:
         found = job.progress.best_fitness is not None
         return JobView.from_job_and_best(job, self._service.best(job.id) if found else None)
-
-
-class JobNews:
-    """What has been told of a job, and what is new.
-
-    Attributes:
-        ended: Whether the job has ended, so that nothing more is to come.
-    """
-
-    def __init__(self, service: JobService, job_id: str, after: int | None) -> None:
-        self.ended = False
-        self._service = service
-        self._job_id = job_id
-        self._after = after
-        self._told: JobState | None = None
-
-    def poll(self) -> Iterator[JobEvent]:
-        """Iterations that were committed since the last time, then the state if it is another."""
-        # The job first: whatever it counts as committed is then among the iterations.
-        job = self._service.job(self._job_id)
-        more = True
-        while more:
-            page = self._service.iterations(self._job_id, after=self._after, limit=_PAGE)
-            for iteration in page.items:
-                self._after = iteration.index
-                yield IterationView.from_iteration(iteration)
-            more = page.next is not None
-        if job.state is not self._told:
-            self._told = job.state
-            yield StateView.from_job(job)
-        if job.state.terminal:
-            self._service.store.verify()
-            self.ended = True

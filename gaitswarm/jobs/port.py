@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeAlias, Unpack
 
+from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.jobs.walks import Walks
 from gaitswarm.views import IterationView, StateView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
@@ -31,7 +32,7 @@ JobEvent: TypeAlias = IterationView | StateView
 """What happens to a job: an iteration was committed, or its state is another."""
 
 
-class Jobs(Walks, ABC):
+class Jobs(Tournaments, Walks, ABC):
     """Jobs, in a database (`gaitswarm.open`) or behind a server (`gaitswarm.connect`).
 
     Both answer alike and raise the same errors: every method raises Unavailable if the database or

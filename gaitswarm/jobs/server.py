@@ -51,6 +51,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
@@ -205,6 +206,18 @@ class ServerJobs(Jobs):
         """Let the server compare runs with their targets."""
         chosen = arguments.leave_out(leave_out)
         return self._send(calls.targets(arguments.runs(job_ids), chosen))
+
+    def tournaments(self) -> list[TournamentView]:
+        """Ask the server which tournaments there are."""
+        return self._send(calls.tournaments()).items
+
+    def standings(self, job_id: str, *, compare_with: str | None = None) -> TournamentStandingsView:
+        """Let the server judge a tournament."""
+        return self._send(calls.standings(job_id, compare_with))
+
+    def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
+        """Ask the server for the runs on a problem."""
+        return self._send(calls.problem_runs(job_id, problem))
 
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
         """Download every evaluation as a file, in parts as they come."""

@@ -17,9 +17,9 @@ from services.optimizer.analysis.identifiability import (
     check_comparable,
     identifiability,
 )
-from services.optimizer.analysis.ranking import RankedJob, rank
+from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
 from services.optimizer.analysis.start import started
-from services.optimizer.errors import InvalidRequest, ProvenanceChanged
+from services.optimizer.errors import ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
 from services.optimizer.jobs.iteration import Evaluation, Iteration
@@ -27,7 +27,6 @@ from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState,
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from services.optimizer.run.runner import runner_name
 from services.optimizer.store.base import Page, Store
@@ -169,6 +168,7 @@ class JobService:
         self,
         *,
         state: JobState | None = None,
+        kind: str | None = None,
         search: str = "",
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
@@ -178,6 +178,7 @@ class JobService:
 
         Args:
             state: only jobs in it; None for any.
+            kind: only jobs whose specs say that they are of this kind; None for any.
             search: only jobs whose name or id contains this, whatever its case.
             order: how they are sorted.
             after: `next` of the page before, of the same order.
@@ -189,7 +190,9 @@ class JobService:
         Raises:
             InvalidRequest: `after` is no cursor of that order.
         """
-        return self.store.jobs(state=state, search=search, order=order, after=after, limit=limit)
+        return self.store.jobs(
+            state=state, kind=kind, search=search, order=order, after=after, limit=limit
+        )
 
     def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
         """Pause, resume or cancel a job.
@@ -368,14 +371,8 @@ class JobService:
             InvalidRequest: a job of another kind, which has no preference.
             Conflict: the job is too large to be held in memory.
         """
-        if not isinstance(job.spec, JobSpec):
-            raise InvalidRequest(
-                f"job {job.id} fits parameters to recorded walks; only the designs of a job that"
-                " tunes a drive are judged by a preference",
-                field="preference",
-            )
-        columns = self.columns(job)
-        return RankedJob(job.spec, columns, rank(columns, preference, top=top))
+        spec, columns = tuning_of(job), self.columns(job)
+        return RankedJob(spec, columns, rank(columns, preference, top=top))
 
     def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
         """Say which parameters several runs of one problem agree on.

@@ -10,6 +10,7 @@ from services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFo
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, completed, spec
+from tests.tournament.problems import tournament
 
 
 def test_a_new_job_is_queued_and_reads_back_as_it_was_returned(
@@ -261,3 +262,22 @@ def test_what_is_not_a_cursor_is_refused_by_name(store: SqlStore, after: str) ->
 def test_a_page_of_nothing_is_refused(store: SqlStore) -> None:
     with pytest.raises(InvalidRequest, match="limit"):
         store.jobs(limit=0)
+
+
+def test_jobs_of_one_kind_are_found_among_all_others_in_every_order(
+    store: SqlStore, clock: Clock
+) -> None:
+    wanted: list[str] = []
+    for number in range(3):
+        store.create_job(spec(name=f"tournament {number}"))
+        clock.advance(0.001)
+        wanted.insert(0, store.create_job(tournament(name=str(number)))[0].id)
+        clock.advance(0.001)
+    assert [job.id for job in store.jobs(kind="tournament").items] == wanted
+    named = store.jobs(kind="tournament", order=JobOrder.NAME).items
+    assert [job.id for job in named] == wanted[::-1]
+    assert [job.id for job in store.jobs(kind="tournament", search="1").items] == [wanted[1]]
+    page = store.jobs(kind="tournament", limit=2)
+    assert [job.id for job in page.items] == wanted[:2]
+    (last,) = store.jobs(kind="tournament", limit=2, after=page.next).items
+    assert last.id == wanted[2]

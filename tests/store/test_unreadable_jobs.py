@@ -114,6 +114,7 @@ def test_lists_show_it_among_the_others(store: SqlStore, clock: Clock, damaged: 
         assert {job.id for job in (*first.items, *second.items)} == {sound.id, damaged.id}
     assert [job.id for job in store.jobs(search="sound").items] == [sound.id]
     assert [job.id for job in store.jobs(search=damaged.id).items] == [damaged.id]
+    assert store.jobs(kind="tournament").items == ()
 
 
 def test_its_spec_is_refused_with_the_reason_to_whoever_needs_it(

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.tuning import JobSpec
 
@@ -64,6 +66,27 @@ class RankedJob:
     spec: JobSpec
     columns: EvaluationColumns
     ranking: Ranking
+
+
+def tuning_of(job: Job) -> JobSpec:
+    """The spec of a job whose designs can be ranked.
+
+    Args:
+        job: As it was read.
+
+    Returns:
+        Its spec.
+
+    Raises:
+        InvalidRequest: A job of another kind, which has no preference.
+    """
+    if not isinstance(job.spec, JobSpec):
+        raise InvalidRequest(
+            f"job {job.id} is of kind {job.spec.kind}; only the designs of a job that tunes a"
+            " drive are judged by a preference",
+            field="preference",
+        )
+    return job.spec
 
 
 def rank(columns: EvaluationColumns, preference: Preference, *, top: int) -> Ranking:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -104,13 +105,15 @@ Results = Mapping[str, Mapping[str, Runs]]
 """Runs by problem, then by method."""
 
 
-def runs_of(spec: TournamentSpec, columns: EvaluationColumns, most: int) -> dict[str, Runs]:
+def runs_of(
+    spec: TournamentSpec, columns: EvaluationColumns, most: int | None = None
+) -> dict[str, Runs]:
     """Runs of a job, by problem.
 
     Args:
         spec: Of the job.
         columns: Its evaluations, one for each repetition.
-        most: Repetitions to take, the first ones.
+        most: Repetitions to take, the first ones; None for all.
 
     Returns:
         Runs of its method on each of its problems, in order.
@@ -159,9 +162,7 @@ def expected_running_time(to_target: Floats, budget: int) -> float:
     Returns:
         The expected running time; +inf if no run reached the target.
     """
-    solved = ~np.isnan(to_target)
-    spent = np.where(solved, to_target, budget).sum()
-    return float(spent / solved.sum()) if solved.any() else math.inf
+    return float(_running_times(to_target[None], budget)[0])
 
 
 def running_time_interval(runs: Runs) -> Interval:
@@ -173,10 +174,8 @@ def running_time_interval(runs: Runs) -> Interval:
     Returns:
         The estimate; a bound is +inf where so many resamples have no successful run.
     """
-    return _interval(
-        expected_running_time(runs.to_target, runs.budget),
-        lambda pick: expected_running_time(runs.to_target[pick(len(runs))], runs.budget),
-    )
+    value = expected_running_time(runs.to_target, runs.budget)
+    return _bounded(value, _running_times(runs.to_target[_picks(len(runs))], runs.budget))
 
 
 def data_profile(
@@ -225,7 +224,7 @@ def ranks(by_method: Mapping[str, Runs]) -> Floats:
     Returns:
         (M,) ranks from 1, the best, in the order of the methods.
     """
-    return _ranks([_scores(runs) for runs in by_method.values()])
+    return _Field.of(list(by_method.values())).ranks()
 
 
 def mean_ranks(results: Results, methods: Sequence[str]) -> dict[str, Interval]:
@@ -238,9 +237,9 @@ def mean_ranks(results: Results, methods: Sequence[str]) -> dict[str, Interval]:
     Returns:
         Mean rank of each; 1 is that of a method that is the best on every problem.
     """
-    scores = _all_scores(results, methods)
-    value = _mean_ranks(scores)
-    samples = _resampled(lambda pick: _mean_ranks(_picked(scores, pick)))
+    fields = _fields(results, methods)
+    value = _mean_ranks(fields, _Field.ranks)
+    samples = np.array([_mean_ranks(fields, ranks) for ranks in _resampled_ranks()])
     return {name: _bounded(float(value[k]), samples[:, k]) for k, name in enumerate(methods)}
 
 
@@ -256,13 +255,13 @@ def rank_correlation(one: Results, other: Results, methods: Sequence[str]) -> In
         The correlation, with an interval of resampled runs: it says how sure the ranks are, not
         what other methods would do. NaN where all methods are equal on a set.
     """
-    scores = [_all_scores(results, methods) for results in (one, other)]
+    fields = [_fields(results, methods) for results in (one, other)]
 
-    def correlation(sets: Sequence[list[list[Floats]]]) -> float:
-        return spearman(_mean_ranks(sets[0]), _mean_ranks(sets[1]))
+    def correlation(ranks: Ranks) -> float:
+        return spearman(*(_mean_ranks(problems, ranks) for problems in fields))
 
-    samples = _resampled(lambda pick: [correlation([_picked(s, pick) for s in scores])])
-    return _bounded(correlation(scores), samples[:, 0])
+    samples = np.array([correlation(ranks) for ranks in _resampled_ranks()])
+    return _bounded(correlation(_Field.ranks), samples)
 
 
 def spearman(one: Floats, other: Floats) -> float:
@@ -296,8 +295,44 @@ def average_ranks(values: Floats) -> Floats:
     return 0.5 * (first + last + 1.0)
 
 
-Pick = Callable[[int], NDArray[np.intp]]
-"""How many runs there are -> (n,) indices of resampled ones."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Field:
+    """The runs of all methods on a problem, by how they compare.
+
+    Attributes:
+        place: (n,) place of every run in the order of all, from 0; equal ones share it.
+        first: (M,) index of the first run of each method; its runs follow each other.
+        count: (M,) runs of each method.
+    """
+
+    place: NDArray[np.intp]
+    first: NDArray[np.intp]
+    count: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, runs: Sequence[Runs]) -> _Field:
+        """Those of some methods."""
+        scores = np.concatenate([_scores(of_method) for of_method in runs])
+        _, place = np.unique(scores, axis=0, return_inverse=True)
+        count = np.array([len(of_method) for of_method in runs], dtype=np.intp)
+        return cls(place.reshape(-1), np.cumsum(count) - count, count)
+
+    def ranks(self, chosen: NDArray[np.intp] | None = None) -> Floats:
+        """(M,) ranks of the methods; chosen: (n,) runs that stand for theirs."""
+        place = self.place if chosen is None else self.place[chosen]
+        equal = np.bincount(place)
+        # Half of an integer: sums are exact in any order.
+        shared = np.cumsum(equal) - 0.5 * (equal - 1)
+        return average_ranks(np.add.reduceat(shared[place], self.first) / self.count)
+
+    def resampled(self, numbers: Floats) -> Floats:
+        """(M,) ranks of as many runs of each method, drawn by (n,) uniform numbers."""
+        count, first = (np.repeat(of_method, self.count) for of_method in (self.count, self.first))
+        return self.ranks(first + np.floor(numbers * count).astype(np.intp))
+
+
+Ranks = Callable[[_Field], Floats]
+"""Runs on a problem -> (M,) ranks of the methods."""
 
 
 def _scores(runs: Runs) -> Floats:
@@ -306,41 +341,40 @@ def _scores(runs: Runs) -> Floats:
     return np.stack([~solved, np.where(solved, runs.to_target, runs.final)], axis=1)
 
 
-def _ranks(scores: Sequence[Floats]) -> Floats:
-    joined = np.concatenate(scores)
-    # Equal rows get equal places; places are then ranked with ties.
-    _, place = np.unique(joined, axis=0, return_inverse=True)
-    among_all = average_ranks(place.reshape(-1).astype(np.float64))
-    edges = np.cumsum([len(s) for s in scores])[:-1]
-    return average_ranks(np.array([part.mean() for part in np.split(among_all, edges)]))
+def _fields(results: Results, methods: Sequence[str]) -> list[_Field]:
+    """By problem."""
+    return [_Field.of([by_method[name] for name in methods]) for by_method in results.values()]
 
 
-def _all_scores(results: Results, methods: Sequence[str]) -> list[list[Floats]]:
-    """By problem, then by method."""
-    return [[_scores(by_method[name]) for name in methods] for by_method in results.values()]
+def _mean_ranks(fields: Sequence[_Field], ranks: Ranks) -> Floats:
+    total = sum(map(ranks, fields), np.zeros(len(fields[0].count)))
+    return total / len(fields)
 
 
-def _mean_ranks(scores: Sequence[Sequence[Floats]]) -> Floats:
-    total = sum((_ranks(of_problem) for of_problem in scores), np.zeros(len(scores[0])))
-    return total / len(scores)
-
-
-def _picked(scores: Sequence[Sequence[Floats]], pick: Pick) -> list[list[Floats]]:
-    return [[runs[pick(len(runs))] for runs in of_problem] for of_problem in scores]
-
-
-def _interval(value: float, statistic: Callable[[Pick], float]) -> Interval:
-    return _bounded(value, _resampled(lambda pick: [statistic(pick)])[:, 0])
-
-
-def _resampled(statistic: Callable[[Pick], Sequence[float] | Floats]) -> Floats:
-    """(RESAMPLES, ...) the statistic of runs that are drawn with replacement."""
+def _resampled_ranks() -> Iterator[Ranks]:
+    """Ranks of runs that are drawn with replacement, `RESAMPLES` times."""
     random = RandomNumbers(1, _BOOTSTRAP)
 
-    def pick(count: int) -> NDArray[np.intp]:
-        return np.floor(random.uniform(count) * count).astype(np.intp)
+    def ranks(field: _Field) -> Floats:
+        return field.resampled(random.uniform(len(field.place)))
 
-    return np.array([statistic(pick) for _ in range(RESAMPLES)])
+    for _ in range(RESAMPLES):
+        yield ranks
+
+
+@lru_cache(maxsize=8)
+def _picks(count: int) -> NDArray[np.intp]:
+    """(RESAMPLES, count) indices of runs that are drawn with replacement."""
+    numbers = RandomNumbers(1, _BOOTSTRAP).uniform(RESAMPLES, count)
+    return np.floor(numbers * count).astype(np.intp)
+
+
+def _running_times(to_target: Floats, budget: int) -> Floats:
+    """(s,) expected running time of every row of (s, r) runs."""
+    solved = ~np.isnan(to_target)
+    spent = np.where(solved, to_target, budget).sum(axis=1)
+    count = solved.sum(axis=1)
+    return np.where(count > 0, spent / np.maximum(count, 1), math.inf)
 
 
 def _bounded(value: float, samples: Floats) -> Interval:

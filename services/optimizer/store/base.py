@@ -105,6 +105,7 @@ class Store(Protocol):
         self,
         *,
         state: JobState | None = None,
+        kind: str | None = None,
         search: str = "",
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
@@ -114,6 +115,7 @@ class Store(Protocol):
 
         Args:
             state: Only jobs in this state.
+            kind: Only jobs whose specs say that they are of this kind.
             search: Only jobs whose name or id contains this, whatever its case.
             order: By what they are sorted.
             after: `next` of the page before.

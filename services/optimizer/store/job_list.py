@@ -145,6 +145,7 @@ def sort_jobs(
     connection: Connection,
     *,
     state: JobState | None,
+    kind: str | None,
     search: str,
     order: JobOrder,
     after: str | None,
@@ -154,6 +155,7 @@ def sort_jobs(
     Args:
         connection: An open transaction.
         state: Only jobs in this state.
+        kind: Only jobs whose specs say that they are of this kind.
         search: Only jobs whose name or id contains this, whatever its case.
         order: By what they are sorted.
         after: Only jobs after this cursor.
@@ -167,6 +169,8 @@ def sort_jobs(
     query = _entries(connection)
     if state is not None:
         query = query.where(jobs.c.state == state)
+    if kind is not None:
+        query = query.where(_field(connection, "kind") == kind)
     wanted = search.casefold()
     found = [
         entry
@@ -183,16 +187,20 @@ def sort_jobs(
 
 def _entries(connection: Connection) -> Select[tuple[str, datetime, str, float | None]]:
     """A row of what `_Entry` holds for every job."""
+    return select(jobs.c.id, jobs.c.created_at, _field(connection, "name"), jobs.c.best_fitness)
+
+
+def _field(connection: Connection, name: str) -> ColumnElement[str]:
+    """A text of a job's spec; "" where the spec has none of this name, or is no JSON."""
     document = cast(jobs.c.spec, Text)
     if connection.dialect.name == "sqlite":
         # It keeps any text, and fails at a path into one that is not JSON.
-        has_name: ColumnElement[bool] = func.json_valid(document)
+        is_readable: ColumnElement[bool] = func.json_valid(document)
     else:
         # A zero byte, as JSON spells it, makes PostgreSQL fail at any path into the document.
-        has_name = func.strpos(document, r"\u0000") == 0
-    name = case((has_name, jobs.c.spec["name"].as_string()), else_="")
-    named = func.coalesce(cast(name, Text), "")
-    return select(jobs.c.id, jobs.c.created_at, named, jobs.c.best_fitness)
+        is_readable = func.strpos(document, r"\u0000") == 0
+    found = case((is_readable, jobs.c.spec[name].as_string()), else_="")
+    return func.coalesce(cast(found, Text), "")
 
 
 def job_rows(connection: Connection, ids: Sequence[str]) -> list[Row]:

@@ -150,6 +150,7 @@ class SqlStore(SqlHistory):
         self,
         *,
         state: JobState | None = None,
+        kind: str | None = None,
         search: str = "",
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
@@ -157,10 +158,12 @@ class SqlStore(SqlHistory):
     ) -> Page[Job]:
         """Read a page of jobs."""
         limit = checked_limit(limit)
-        if not search and order is JobOrder.CREATED:
+        if not search and kind is None and order is JobOrder.CREATED:
             return self._newest_jobs(state, after, limit)
         with self._database.transaction(write=False) as connection:
-            found = sort_jobs(connection, state=state, search=search, order=order, after=after)
+            found = sort_jobs(
+                connection, state=state, kind=kind, search=search, order=order, after=after
+            )
             ids, more = found[:limit], len(found) > limit
             rows = job_rows(connection, ids)
         following = cursor_of(rows[-1], order) if more else None

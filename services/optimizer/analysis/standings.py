@@ -1,16 +1,20 @@
-"""What a tournament came to, as numbers: for the report, the terminal and programs."""
+"""What a tournament comes to: medians, times, ranks, profiles."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
+
+import numpy as np
 
 from services.optimizer.analysis.tournament import (
+    Floats,
     Interval,
     Results,
     Runs,
+    data_profile,
     mean_ranks,
     rank_correlation,
     ranks,
@@ -19,6 +23,14 @@ from services.optimizer.analysis.tournament import (
 
 NEAR: Final = 0.01
 """Share of the least value of all runs, within which a run counts that has no target."""
+
+LOOKED_AT: Final = (100, 250, 625, 2500)
+"""Evaluations after which medians are reported, where the budget reaches as far."""
+
+PRECISIONS: Final = (1e-1, 1e-3)
+"""tau of the data profiles that are reported."""
+
+_PROFILE_POINTS: Final = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +56,30 @@ class Standing:
     rank: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """Data profiles of all methods.
+
+    Attributes:
+        precision: tau: what share of the way from the usual first value to the least may be left.
+        budgets: (b,) evaluations over the number of variables plus one, ascending.
+        shares: Of each method (b,) the share of its runs that are solved within a budget.
+    """
+
+    precision: float
+    budgets: Floats
+    shares: Mapping[str, Floats]
+
+
 @dataclass(frozen=True, slots=True)
 class Standings:
-    """All that a report tells.
+    """All that a tournament tells.
 
     Attributes:
         results: Runs by problem, then by method, best first.
         looked_at: Evaluations after which medians are told.
-        targets: By problem: that given, or else 1 % above the least value of all runs.
+        targets: By problem: that given, or else 1 % above the least value of all runs; NaN where
+            all runs failed.
         by_problem: Methods on every problem, best first.
         mean_ranks: Of each method over all problems, best first.
         correlation: Of mean ranks with those of another tournament, and the methods in both; None
@@ -70,32 +98,17 @@ class Standings:
         """Labels of the methods, best first."""
         return tuple(self.mean_ranks)
 
-    def document(self) -> dict[str, Any]:
-        """Everything but the runs, as JSON has it; null for what is not finite."""
-        return {
-            "mean_ranks": {m: _interval(r) for m, r in self.mean_ranks.items()},
-            "problems": {
-                name: {
-                    "target": self.targets[name],
-                    "methods": {s.method: self._standing(s) for s in standings},
-                }
-                for name, standings in self.by_problem.items()
-            },
-            "rank_correlation": None
-            if self.correlation is None
-            else {**_interval(self.correlation[0]), "methods": list(self.correlation[1])},
-        }
 
-    def _standing(self, standing: Standing) -> dict[str, Any]:
-        medians = zip(self.looked_at, standing.medians, strict=True)
-        return {
-            "rank": standing.rank,
-            "runs": standing.runs,
-            "solved": standing.solved,
-            "expected_running_time": _interval(standing.running_time),
-            "median_best": {str(count): _finite(value) for count, value in medians},
-            "least": _finite(standing.least),
-        }
+def looked_at(evaluations: int) -> tuple[int, ...]:
+    """Evaluations after which medians are reported.
+
+    Args:
+        evaluations: Budget of a run.
+
+    Returns:
+        Those of `LOOKED_AT` below the budget, and the budget.
+    """
+    return (*(count for count in LOOKED_AT if count < evaluations), evaluations)
 
 
 def standings_of(
@@ -104,7 +117,7 @@ def standings_of(
     """Judge a tournament.
 
     Args:
-        results: Its runs.
+        results: Its runs, one at least of every method.
         looked_at: Evaluations after which medians are told, the budget last.
         other: Runs of another tournament, whose ranks are compared.
 
@@ -128,6 +141,32 @@ def standings_of(
         },
         mean_ranks=ranked,
         correlation=None if other is None else _compared(results, other, methods),
+    )
+
+
+def profiles_of(results: Results) -> tuple[Profile, ...]:
+    """Data profiles, one for each of `PRECISIONS`.
+
+    Args:
+        results: Of all methods, one run at least of each.
+
+    Returns:
+        The profiles, over budgets from one evaluation a variable to the whole.
+    """
+    methods = list(next(iter(results.values())))
+    most = max(
+        runs.budget / (runs.dimension + 1)
+        for by_method in results.values()
+        for runs in by_method.values()
+    )
+    budgets = np.geomspace(1.0, most, _PROFILE_POINTS)
+    return tuple(
+        Profile(
+            precision,
+            budgets,
+            {m: data_profile(results, m, precision, budgets.tolist()) for m in methods},
+        )
+        for precision in PRECISIONS
     )
 
 
@@ -156,7 +195,7 @@ def _target(by_method: Mapping[str, Runs]) -> float:
     if given is not None:
         return given
     least = min(float(runs.final.min()) for runs in by_method.values())
-    return least + NEAR * abs(least)
+    return least + NEAR * abs(least) if math.isfinite(least) else math.nan
 
 
 def _compared(
@@ -166,15 +205,3 @@ def _compared(
     if len(shared) < 3:
         return Interval(math.nan, math.nan, math.nan), tuple(shared)
     return rank_correlation(results, other, shared), tuple(shared)
-
-
-def _interval(interval: Interval) -> dict[str, float | None]:
-    return {
-        "value": _finite(interval.value),
-        "low": _finite(interval.low),
-        "high": _finite(interval.high),
-    }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

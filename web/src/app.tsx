@@ -11,6 +11,7 @@ import { toggleTheme, useTheme } from './theme'
 
 const NewJobPage = lazyPage('the form', () => import('./submission/page'))
 const JobPage = lazyPage('the job', () => import('./job/page'))
+const TournamentsPage = lazyPage('the tournaments', () => import('./tournaments/page'))
 const WalkPage = lazyPage('the walk', () => import('./walk/page'))
 const ControllerPage = lazyPage('the controller', () => import('./controller/page'))
 
@@ -25,6 +26,7 @@ const TITLES: Readonly<Record<Route['page'], string>> = {
   jobs: 'Jobs',
   'new-job': 'New job',
   job: 'Job',
+  tournaments: 'Tournaments',
   walk: 'Walk',
   controller: 'Controller',
   'not-found': 'No such page',
@@ -33,7 +35,7 @@ const TITLES: Readonly<Record<Route['page'], string>> = {
 export function App() {
   const place = usePlace()
   const route = routeOf(place.path)
-  const identity = route.page === 'job' ? `job ${route.id}` : route.page
+  const identity = 'id' in route ? `${route.page} ${route.id}` : route.page
   return (
     <>
       <a class="skip-link" href="#main">
@@ -88,6 +90,8 @@ function Page({ route }: { route: Route }) {
       return <NewJobPage />
     case 'job':
       return <JobPage id={route.id} tab={route.tab} />
+    case 'tournaments':
+      return <TournamentsPage id={route.id} />
     case 'walk':
       return <WalkPage />
     case 'controller':
@@ -119,5 +123,6 @@ function ThemeToggle() {
 }
 
 function isUnder(route: Route, page: Route['page']): boolean {
-  return route.page === page || (page === 'jobs' && route.page === 'job')
+  const under: readonly Route['page'][] = ['job', 'tournaments']
+  return route.page === page || (page === 'jobs' && under.includes(route.page))
 }

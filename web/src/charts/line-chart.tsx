@@ -14,6 +14,10 @@ export interface Series {
   /** Line width [px]; 0 draws no line, as for the edges of a band. */
   readonly width?: number
   readonly dash?: readonly number[]
+  /** Holds each value until the next. */
+  readonly stepped?: boolean
+  /** Draws points without a line. */
+  readonly dots?: boolean
   /** Left out of the readout under the pointer. */
   readonly silent?: boolean
 }
@@ -38,6 +42,7 @@ export interface LineChartProps {
   readonly series: readonly Series[]
   readonly bands?: readonly Band[]
   readonly logarithmic?: boolean
+  readonly xLogarithmic?: boolean
   /** Whether x is counted: ticks at whole numbers only. */
   readonly counted?: boolean
   /** Room beside the first and the last x, in the unit of x. */
@@ -107,14 +112,16 @@ function shapeOf({
   series,
   bands,
   logarithmic,
+  xLogarithmic,
   fromZero,
   xLabel,
   yLabel,
   xUnit,
   yUnit,
 }: LineChartProps) {
-  const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.silent])
-  return JSON.stringify([lines, bands, logarithmic, fromZero, xLabel, yLabel, xUnit, yUnit])
+  const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.dots, s.stepped, s.silent])
+  const axes = [logarithmic, xLogarithmic, fromZero, xLabel, yLabel, xUnit, yUnit]
+  return JSON.stringify([lines, bands, axes])
 }
 
 function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
@@ -127,7 +134,7 @@ function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
 /** props: kept by reference, as callbacks outlive a rendering. */
 function options(props: { current: LineChartProps }, readout: HTMLElement) {
   const { series, bands = [], logarithmic, fromZero, sync, counted, xMargin = 0 } = props.current
-  const { xLabel, xUnit = '1', yLabel, yUnit = '1' } = props.current
+  const { xLabel, xUnit = '1', xLogarithmic, yLabel, yUnit = '1' } = props.current
   const axis: uPlot.Axis = {
     stroke: themeColour('--text-muted'),
     font: `${remPixels(0.857)}px ${bodyFont()}`,
@@ -137,6 +144,10 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
     gap: 4,
     labelGap: 0,
     labelSize: remPixels(1.5),
+  }
+  const logarithmicAxis: Partial<uPlot.Axis> = {
+    splits: (_: uPlot, __: number, low: number, high: number) => logTicks(low, high),
+    filter: (_: uPlot, splits: number[]) => splits,
   }
   const values = (_: uPlot, splits: number[]) => splits.map((v) => formatExact(v, 5))
   const result: Omit<uPlot.Options, 'width' | 'height'> = {
@@ -148,10 +159,12 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
       sync: sync ? { key: sync } : undefined,
     },
     scales: {
-      x: {
-        time: false,
-        range: (_, low, high) => [low - xMargin, low === high ? high + 1 : high + xMargin],
-      },
+      x: xLogarithmic
+        ? { time: false, distr: 3, range: (_, low, high) => logRange(low, high) }
+        : {
+            time: false,
+            range: (_, low, high) => [low - xMargin, low === high ? high + 1 : high + xMargin],
+          },
       y: logarithmic
         ? { distr: 3, range: (_, low, high) => logRange(low, high) }
         : fromZero
@@ -165,16 +178,14 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
         values,
         size: remPixels(2.2),
         incrs: counted ? WHOLE_STEPS : undefined,
+        ...(xLogarithmic && logarithmicAxis),
       },
       {
         ...axis,
         label: withUnit(yLabel, yUnit),
         values,
         size: (_, texts) => axisWidth(texts),
-        ...(logarithmic && {
-          splits: (_: uPlot, __: number, low: number, high: number) => logTicks(low, high),
-          filter: (_: uPlot, splits: number[]) => splits,
-        }),
+        ...(logarithmic && logarithmicAxis),
       },
     ],
     series: [
@@ -185,7 +196,8 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
           stroke: s.width === 0 ? undefined : themeColour(s.colour),
           width: s.width ?? 1.5,
           dash: s.dash ? [...s.dash] : undefined,
-          points: { show: s.width === 0 ? false : undefined, size: 4 },
+          paths: pathsOf(s),
+          points: pointsOf(s),
         }),
       ),
     ],
@@ -208,6 +220,16 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
     },
   }
   return result
+}
+
+function pathsOf({ dots, stepped }: Series): uPlot.Series.PathBuilder | undefined {
+  if (dots) return () => null
+  return stepped ? uPlot.paths.stepped?.({ align: 1 }) : undefined
+}
+
+function pointsOf({ dots, width, colour }: Series): uPlot.Series.Points {
+  if (dots) return { show: true, size: 6, width: 0, fill: themeColour(colour) }
+  return { show: width === 0 ? false : undefined, size: 4 }
 }
 
 function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {

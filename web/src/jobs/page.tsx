@@ -41,9 +41,14 @@ export function JobsPage() {
     <>
       <header class="page-header">
         <h1>Jobs</h1>
-        <a class="button primary" href="/jobs/new">
-          New job
-        </a>
+        <span class="row">
+          <a class="button" href="/tournaments">
+            Tournaments
+          </a>
+          <a class="button primary" href="/jobs/new">
+            New job
+          </a>
+        </span>
       </header>
       <div class="stack">
         {error !== null && (
@@ -182,7 +187,7 @@ function NoJobs() {
   return (
     <section class="card">
       <Empty title="No jobs yet">
-        <p>A job lets a swarm look for the controller that walks best in all of its scenarios.</p>
+        <p>A job searches for the controller that walks best in all of its scenarios.</p>
         <p>
           <a class="button primary" href="/jobs/new">
             Set up the first job

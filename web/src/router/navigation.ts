@@ -63,7 +63,7 @@ export function followLinks(): void {
 
 /** Other paths of the server, such as /docs and /v1, are left to the browser. */
 function isOwnPath(path: string): boolean {
-  return path === '/' || /^\/(jobs|walk|controller)(\/|$)/.test(path)
+  return path === '/' || /^\/(jobs|tournaments|walk|controller)(\/|$)/.test(path)
 }
 
 function split(href: string): [path: string, query: string] {

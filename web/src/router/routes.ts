@@ -5,6 +5,7 @@ export type Route =
   | { readonly page: 'jobs' }
   | { readonly page: 'new-job' }
   | { readonly page: 'job'; readonly id: string; readonly tab: string }
+  | { readonly page: 'tournaments'; readonly id: string | null }
   | { readonly page: 'walk' }
   | { readonly page: 'controller' }
   | { readonly page: 'not-found' }
@@ -20,6 +21,9 @@ export function routeOf(path: string): Route {
       if (second === undefined) return { page: 'jobs' }
       if (second === 'new' && rest.length === 0) return { page: 'new-job' }
       return { page: 'job', id: second, tab: rest.join('/') }
+    case 'tournaments':
+      if (rest.length > 0) return { page: 'not-found' }
+      return { page: 'tournaments', id: second ?? null }
     case 'walk':
       return second === undefined ? { page: 'walk' } : { page: 'not-found' }
     case 'controller':
@@ -33,6 +37,11 @@ export function routeOf(path: string): Route {
 export function jobPath(id: string, tab = ''): string {
   const base = `/jobs/${encodeURIComponent(id)}`
   return tab === '' ? base : `${base}/${tab}`
+}
+
+/** The path of a tournament; any of its jobs stands for it. */
+export function tournamentPath(job: string): string {
+  return `/tournaments/${encodeURIComponent(job)}`
 }
 
 /** A path with the values that are set as its query. */

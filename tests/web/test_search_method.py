@@ -81,3 +81,36 @@ def test_a_job_of_small_iterations_shows_designs_and_can_be_looked_through(
     expect(page.get_by_text("24 of 24 designs selected")).to_be_visible()
     page.goto("/jobs")
     expect(page.get_by_text("24 of 24 designs").first).to_be_visible()
+
+
+def test_a_search_starts_from_the_best_of_a_job_and_says_so(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="status of 422").go(f"/jobs/{finished_job}")
+    page.get_by_role("link", name="Start from its best").click()
+    jobs = page.get_by_label("From the best of jobs")
+    expect(jobs).to_have_value(finished_job)
+    jobs.fill("nosuchjob")
+    page.get_by_role("button", name="Submit the job").click()
+    expect(jobs).to_be_focused()
+    expect(page.get_by_text(re.compile("nosuchjob")).first).to_be_visible()
+    jobs.fill(finished_job)
+    page.get_by_label("Designs in all").fill("3")
+    page.get_by_role("button", name="Submit the job").click()
+
+    job_id = submitted(page)
+    start = server.job(job_id)["spec"]["start"]
+    assert len(start) == 3
+    server.wait_for(job_id, "succeeded")
+    expect_state(page, "succeeded")
+    expect(page.get_by_text("3 known designs", exact=True)).to_be_visible()
+    # They have walked before, for the job that they are of.
+    saved = server.job(job_id)["evaluations_saved"]
+    assert saved >= 3
+    expect(page.get_by_text(re.compile(rf"^{saved} \("))).to_be_visible()
+    page.get_by_role("link", name="Spec", exact=True).click()
+    rows = page.get_by_role("table", name="Designs that the job began with").locator("tbody tr")
+    expect(rows).to_have_count(3)
+
+    page.get_by_role("link", name="Clone", exact=True).click()
+    expect(page.get_by_text("It begins with the 3 designs")).to_be_visible()

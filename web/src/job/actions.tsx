@@ -58,6 +58,11 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
             Clone
           </a>
         )}
+        {isReadable(job) && job.kind === 'tuning' && job.best_fitness !== null && (
+          <a class="button" href={withQuery('/jobs/new', { clone: job.id, start: job.id })}>
+            Start from its best
+          </a>
+        )}
         {can('cancel') && (
           <button type="button" class="danger" disabled={busy} onClick={() => setAsking('cancel')}>
             Cancel…

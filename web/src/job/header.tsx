@@ -5,11 +5,13 @@ import { useNow } from '../api/resource'
 import type { StoredJob } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
-import { change, formatCount, formatNumber, quantity } from '../format/number'
+import { change, formatCount, formatNumber, percent, quantity } from '../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../format/time'
+import { tournamentPath } from '../router/routes'
 import { JobActions } from './actions'
 import { budgetSpent } from './budget'
 import { fitnessUnit } from './fitness'
+import { startDesigns } from './start'
 import type { LiveJob } from './use-job'
 
 export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
@@ -28,6 +30,11 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
             <StreamNote live={live} />
           </div>
           <p class="muted small">{subtitle(job)}</p>
+          {job.kind === 'tournament' && (
+            <p class="small">
+              <a href={tournamentPath(job.id)}>Its tournament: all methods compared</a>
+            </p>
+          )}
         </div>
         <JobActions job={job} onJob={live.replace} />
       </div>
@@ -59,6 +66,7 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
   const unit = fitnessUnit(job)
   const merit = job.best?.figure_of_merit ?? null
   const search = job.best?.search ?? null
+  const started = isReadable(job) ? startDesigns(job).length : 0
   return (
     <dl class="figures">
       <Figure
@@ -88,6 +96,18 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
         label="Evaluations"
         value={`${formatCount(job.evaluations)} of ${formatCount(job.evaluations_planned)}`}
       />
+      {job.evaluations_saved > 0 && (
+        <Figure
+          label="Known without a walk"
+          value={`${formatCount(job.evaluations_saved)} (${percent(job.evaluations_saved / job.evaluations, 2)})`}
+        />
+      )}
+      {started > 0 && (
+        <Figure
+          label="Began with"
+          value={`${formatCount(started)} known design${started === 1 ? '' : 's'}`}
+        />
+      )}
       <Figure label="Evaluation rate" value={quantity(job.evaluations_per_second, '1/s', 3)} />
       <Figure label="Walk rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
       <Figure
@@ -128,7 +148,7 @@ function subtitle(job: StoredJob): string {
     ? [
         job.controller ?? job.kind,
         job.optimizer,
-        `${formatCount(job.particles)} particles`,
+        `${formatCount(job.particles)} designs an iteration`,
         `seed ${job.spec.seed}`,
         `${job.precision} precision`,
       ]

@@ -6,6 +6,7 @@ import { withQuery } from '../router/routes'
 import { curlCommand, submitCommand } from './commands'
 import { OptimizerCard } from './optimizer-card'
 import { ProvenanceCard } from './provenance-card'
+import { StartCard } from './start-card'
 
 export function ReproducePanel({ job }: { job: Job }) {
   return (
@@ -33,6 +34,7 @@ export function ReproducePanel({ job }: { job: Job }) {
         </div>
       </section>
       <OptimizerCard job={job} />
+      <StartCard job={job} />
       <ProvenanceCard job={job} />
       <section class="card" aria-labelledby="spec">
         <h2 id="spec">The spec as JSON</h2>

@@ -4,6 +4,7 @@ import type { FieldError } from '../api/problem'
 import type { JobSpec, Scenario, Variable } from '../api/types'
 import type { Draft } from './draft'
 import { optimizerSettings } from './optimizer'
+import { startOf } from './start'
 
 /** Problems by the form's fields: `iterations`, `own.0.radius`, `variables.FI1R.low`, ... */
 export type FieldErrors = ReadonlyMap<string, string>
@@ -23,6 +24,7 @@ export function specOf(draft: Draft): JobSpec {
   const fixed = Object.entries(draft.variables)
     .filter(([, { mode }]) => mode === 'fixed')
     .map(([name, { value }]) => [name, number(value)])
+  const start = startOf(draft.start)
   return {
     name: draft.name,
     robot: robotOf(draft),
@@ -35,6 +37,7 @@ export function specOf(draft: Draft): JobSpec {
     iterations: number(draft.iterations),
     seed: number(draft.seed),
     precision: draft.precision,
+    ...(start !== undefined && { start }),
   } as unknown as JobSpec
 }
 

@@ -4,6 +4,7 @@ import type { JobSpec, Scenario, Variable } from '../api/types'
 import { type Catalogue, variablesOf } from './catalogue'
 import { type OptimizerDraft, optimizerDraft } from './optimizer'
 import type { SchemaField } from './schema-fields'
+import { NO_START, type StartDraft, startDraft } from './start'
 
 /** What becomes of a variable; `default` leaves a convention, or the gait to each scenario. */
 export type VariableMode = 'searched' | 'fixed' | 'default'
@@ -50,6 +51,7 @@ export interface Draft {
   readonly preference: PreferenceDraft
   /** Settings of the method that is its `name`. */
   readonly optimizer: OptimizerDraft
+  readonly start: StartDraft
   readonly iterations: string
   readonly seed: string
   readonly precision: string
@@ -77,6 +79,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, preset),
     optimizer: optimizerDraft(catalogue.optimizers, undefined, usualMethod(catalogue)),
+    start: NO_START,
     iterations: text(job.get('iterations')?.default),
     seed: text(job.get('seed')?.default),
     precision: text(job.get('precision')?.default),
@@ -125,6 +128,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
     optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, usualMethod(catalogue)),
+    start: startDraft(spec.start),
     iterations: text(spec.iterations),
     seed: text(spec.seed),
     precision: spec.precision ?? empty.precision,

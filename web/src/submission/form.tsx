@@ -12,6 +12,7 @@ import { OptimizerSection } from './optimizer-section'
 import { PreferenceSection } from './preference-section'
 import { RobotSection } from './robot-section'
 import { ScenariosSection } from './scenarios-section'
+import { StartSection } from './start-section'
 import { SubmitPanel } from './submit-panel'
 import { useSubmission } from './use-submission'
 import { VariablesSection } from './variables-section'
@@ -26,9 +27,10 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
     () => errorsByField(problem instanceof ApiProblem ? problem.errors : [], draft),
     [problem, draft],
   )
+  // Not for what an estimate has against the spec: whoever types keeps the focus.
   useEffect(() => {
-    if (submission.attempts > 0 && problem !== null) showFirstProblem()
-  }, [submission.attempts, problem])
+    if (submission.attempts > 0) showFirstProblem()
+  }, [submission.attempts])
   if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
   const parts = {
     draft,
@@ -52,6 +54,7 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
         <ScenariosSection {...parts} />
         <PreferenceSection {...parts} />
         <OptimizerSection {...parts} />
+        <StartSection {...parts} />
       </div>
       <SubmitPanel spec={spec} submission={submission} onJson={() => setAsJson(true)} />
     </form>

@@ -59,8 +59,8 @@ export default function NewJobPage() {
 }
 
 /**
- * `clone` names a job; `seed` and `preference` replace its own; `iteration`, `particle` name a
- * design to stay near.
+ * `clone` names a job; `seed` and `preference` replace its own; `start` names jobs whose best
+ * designs the search begins with; `iteration`, `particle` name a design to stay near.
  */
 async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Start> {
   const id = query.get('clone')
@@ -70,14 +70,19 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   ])
   const from = cloned && withSeed(cloned, query.get('seed'))
   if (!from || from.kind !== 'tuning') {
-    return { catalogue, draft: emptyDraft(catalogue), from }
+    return { catalogue, draft: startingFrom(emptyDraft(catalogue), query), from }
   }
-  let draft = draftOf(from.spec as JobSpec, catalogue)
+  let draft = startingFrom(draftOf(from.spec as JobSpec, catalogue), query)
   const preference = preferenceOf(preferenceIn(query), catalogue)
   if (preference) draft = { ...draft, preference }
   const design = await designIn(query, from.id, signal)
   if (design) draft = around(draft, design, wholeVariables(catalogue, draft.controller))
   return { catalogue, draft, from }
+}
+
+function startingFrom(draft: Draft, query: URLSearchParams): Draft {
+  const jobs = query.get('start')
+  return jobs === null ? draft : { ...draft, start: { ...draft.start, jobs } }
 }
 
 function withSeed(job: Job, seed: string | null): Job {

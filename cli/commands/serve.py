@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,7 +11,7 @@ import typer
 from cli.options import RunnerOptions, with_groups
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
     from gaitswarm.settings import Settings
@@ -43,37 +45,42 @@ def serve(
     options: RunnerOptions,
 ) -> None:
     """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
-    from dataclasses import asdict
+    from contextlib import ExitStack
 
-    from api.app import create_app
-    from api.page import is_built
-    from api.server import ApiServer
-    from cli.output import log_to_stderr, note
-    from gaitswarm.settings import read_settings
-    from services.optimizer.errors import EvaluatorUnavailable
+    with ExitStack() as starting:
+        starting.enter_context(_without_collection())
+        from dataclasses import asdict
 
-    settings = read_settings(**asdict(options), api_host=host, api_port=port)
-    log_to_stderr(settings.log_level)
-    with _runtime(settings, runs_jobs=not no_runner) as opened:
-        beside = opened.runner
-        runs_jobs = None if beside is None else lambda: beside.running
-        app = create_app(opened.service, settings=settings, runs_jobs=runs_jobs)
-        try:
-            server = ApiServer(
-                app,
-                host=settings.api_host,
-                port=settings.api_port,
-                shutdown_seconds=settings.api_shutdown_seconds,
-            )
-        except OSError as error:
-            raise EvaluatorUnavailable(
-                f"cannot listen: {error.strerror}; choose another --port, or --port 0"
-            ) from error
-        doing = "runs no jobs" if beside is None else "runs queued jobs"
-        if not is_built():
-            note("there is no page, only the API: in a checkout, `make page` builds the page")
-        note(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
-        server.run()
+        from api.app import create_app
+        from api.page import is_built
+        from api.server import ApiServer
+        from cli.output import log_to_stderr, note
+        from gaitswarm.settings import read_settings
+        from services.optimizer.errors import EvaluatorUnavailable
+
+        settings = read_settings(**asdict(options), api_host=host, api_port=port)
+        log_to_stderr(settings.log_level)
+        with _runtime(settings, runs_jobs=not no_runner) as opened:
+            beside = opened.runner
+            runs_jobs = None if beside is None else lambda: beside.running
+            app = create_app(opened.service, settings=settings, runs_jobs=runs_jobs)
+            try:
+                server = ApiServer(
+                    app,
+                    host=settings.api_host,
+                    port=settings.api_port,
+                    shutdown_seconds=settings.api_shutdown_seconds,
+                )
+            except OSError as error:
+                raise EvaluatorUnavailable(
+                    f"cannot listen: {error.strerror}; choose another --port, or --port 0"
+                ) from error
+            doing = "runs no jobs" if beside is None else "runs queued jobs"
+            if not is_built():
+                note("there is no page, only the API: in a checkout, `make page` builds the page")
+            note(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
+            starting.close()
+            server.run()
 
 
 @with_groups
@@ -106,6 +113,17 @@ def runner(options: RunnerOptions) -> None:
         log.info("ready: %d slots, %d jobs at once", slots, settings.concurrent_jobs)
         stop.wait()
         log.info("stopping: jobs under way go back to the queue")
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Objects that a start makes are to stay: looking for garbage among them would delay it."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def _runtime(

@@ -19,7 +19,7 @@ from gaitswarm.views.replay import ReplayHeaderView
 
 DESCRIPTION: Final = """
 Finds robust drive controllers for walking robots: a controller is tried in several walking
-scenarios at once, in a fast simulation, and a particle swarm improves it.
+scenarios at once, in a fast simulation, and a search method improves it.
 
 1. Look at what can be tuned: **GET /v1/controllers**, **/v1/robots**, **/v1/scenarios**,
    **/v1/preferences**.

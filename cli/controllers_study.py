@@ -44,8 +44,8 @@ class Budget:
 
     Attributes:
         seeds: number of runs, whose seeds count from 1.
-        particles: size of the swarm.
-        iterations: of the swarm.
+        particles: designs of an iteration, at most.
+        iterations: of the budget.
         optimizer: name of the search's preset.
         precision: of the searches; their best designs are judged in double.
     """

@@ -40,8 +40,8 @@ def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figu
     best, median, worst = (
         _floats([getattr(i, name) for i in iterations]) for name in ("best", "median", "worst")
     )
-    axes.fill_between(index, best, worst, color=_INK, alpha=0.12, lw=0, label="swarm")
-    axes.plot(index, median, color=_INK, alpha=0.6, lw=1.2, label="median of the swarm")
+    axes.fill_between(index, best, worst, color=_INK, alpha=0.12, lw=0, label="designs")
+    axes.plot(index, median, color=_INK, alpha=0.6, lw=1.2, label="median of the iteration")
     so_far = _floats([i.best_so_far for i in iterations])
     label = f"best so far, {so_far[-1]:.4g} at last"
     axes.step(index, so_far, where="post", color=_ACCENT, lw=2.2, label=label)

@@ -197,7 +197,7 @@ def search_line(best: BestView) -> str | None:
 def ranking_table(ranking: RankingView) -> Table:
     """The best designs by another preference, best first, beside their places before."""
     table = Table(box=None)
-    columns = ["rank", "before", "iteration", "particle", "fitness", "before"]
+    columns = ["rank", "before", "iteration", "design", "fitness", "before"]
     maximized = any(design.figure_of_merit is not None for design in ranking.top)
     for column in columns + (["F (eq. 3.1)"] if maximized else []):
         table.add_column(column, justify="right")

@@ -20,7 +20,7 @@ def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
     console.print(targets_table(reached))
     console.print(
         f"misfit {reached.fitness:.3f} tolerances, root mean square over what is fitted: job"
-        f" {reached.job}, iteration {reached.iteration}, particle {reached.particle}",
+        f" {reached.job}, design {reached.particle} of iteration {reached.iteration}",
         markup=False,
     )
     for job, fitness in zip(parameters.jobs, parameters.fitness, strict=True):

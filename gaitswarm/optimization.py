@@ -30,7 +30,7 @@ class OptimizationResult:
 
     Attributes:
         job: The job: spec, state, rates.
-        iterations: Its committed iterations, in order: fitness over the swarm.
+        iterations: Its committed iterations, in order: fitness of the designs.
         db: The database that it is in, for `gaitswarm.open` and `optimize(resume=...)`.
     """
 

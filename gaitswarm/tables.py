@@ -162,7 +162,7 @@ class EvaluationTable(Table):
 
     @property
     def particle(self) -> NDArray[np.int64]:
-        """(r,) particle of the swarm, from 0."""
+        """(r,) number of the design in its iteration, from 0."""
         return self["particle"]
 
     @property

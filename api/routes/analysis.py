@@ -24,7 +24,7 @@ router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
 @router.get(
     "/distribution",
     operation_id="get_distribution",
-    summary="See how the swarm is spread",
+    summary="See how designs are spread",
     response_model=DistributionView,
     responses=problems(404, 409, 422),
 )
@@ -34,7 +34,7 @@ def get_distribution(
     after: AfterIteration = None,
     limit: Annotated[int, Query(ge=1, le=10_000, description="Most iterations on a page.")] = 1000,
 ) -> Response:
-    """Quantiles of the swarm's fitness and the diversity of its designs, iteration by iteration."""
+    """Quantiles of fitness and the diversity of the designs, iteration by iteration."""
     found, more = service.distribution(job, after=after, limit=limit)
     return _json(DistributionView.from_distribution(found, more=more))
 
@@ -42,7 +42,7 @@ def get_distribution(
 @router.get(
     "/particles",
     operation_id="get_particles",
-    summary="Take every particle as numbers",
+    summary="Take every design as numbers",
     response_class=Response,
     responses=binary(
         "Length of the header (uint32), header (JSON, padded with spaces), then every column's"
@@ -59,7 +59,7 @@ def get_particles(
         Query(
             ge=1,
             le=1_000_000,
-            description="Most particles; more are thinned evenly in iterations, the best is kept.",
+            description="Most designs; more are thinned evenly in iterations, the best is kept.",
         ),
     ] = 100_000,
 ) -> Response:

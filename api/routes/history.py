@@ -36,7 +36,7 @@ def list_iterations(
     after: AfterIteration = None,
     limit: Annotated[int, Query(ge=1, le=1000, description="Most iterations on a page.")] = 100,
 ) -> PageView[IterationView]:
-    """Fitness over the swarm, iteration by iteration, in pages; the data of a convergence plot."""
+    """Fitness of the designs, iteration by iteration, in pages; the data of a convergence plot."""
     page = service.iterations(job_id, after=after, limit=limit)
     return PageView(items=[IterationView.from_iteration(i) for i in page.items], next=page.next)
 
@@ -54,7 +54,7 @@ def list_evaluations(
         int, Path(ge=0, le=LARGEST_INDEX, description="Index of a committed iteration, from 0.")
     ],
 ) -> CatalogueView[EvaluationView]:
-    """Every particle: its design, its fitness, and status, utility and raw objectives by scenario.
+    """Every design: its values, its fitness, and status, utility and raw objectives by scenario.
 
     Raw objectives are as simulated; utilities follow from them and the job's preference.
     """

@@ -180,7 +180,7 @@ def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> 
     on as it would, up to the new budget.
 
     What is committed stays, and the iteration under way is committed as it was asked. Later ones
-    follow the schedule of the new budget, over which the swarm's inertia falls: so a job of 25
+    follow the schedule of the new budget, over which the inertia of `pso` falls: so a job of 25
     iterations that is extended to 50 is another than one of 50 from its beginning, but the same
     every time. 409 if the job was cancelled.
     """

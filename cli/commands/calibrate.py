@@ -62,7 +62,7 @@ def calibrate(
         ),
     ] = 3,
     iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 60,
-    particles: Annotated[int, typer.Option(help="Size of each swarm.")] = 48,
+    particles: Annotated[int, typer.Option(help="Designs of an iteration.")] = 48,
     seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
     precision: Precision = None,
     name: JobName = None,

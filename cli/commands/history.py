@@ -22,7 +22,7 @@ def register(app: typer.Typer) -> None:
 def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show every committed iteration.
 
-    With --json also every particle: its design, fitness, statuses and raw objectives.
+    With --json also every design: its values, fitness, statuses and raw objectives.
     """
     from cli.output import stdout_console
     from cli.tables import iterations_table
@@ -49,8 +49,8 @@ def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = Fa
             return
         job = jobs.job(job_id)
         stdout_console().print(
-            f"job {job_id}: fitness {worth(found, digits=6)} in iteration {found.iteration},"
-            f" particle {found.particle}",
+            f"job {job_id}: fitness {worth(found, digits=6)}, design {found.particle} of iteration"
+            f" {found.iteration}",
             markup=False,
         )
         print_best(found, job)

@@ -99,7 +99,7 @@ def identify(
         ),
     ] = 3,
     iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 120,
-    particles: Annotated[int, typer.Option(help="Size of each swarm.")] = 48,
+    particles: Annotated[int, typer.Option(help="Designs of an iteration.")] = 48,
     seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
     precision: Precision = None,
     name: JobName = None,

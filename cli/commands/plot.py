@@ -23,7 +23,7 @@ def register(app: typer.Typer) -> None:
 
 
 def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
-    """Draw a job's fitness over its iterations: best so far, and the swarm around it."""
+    """Draw a job's fitness over its iterations: best so far, and its designs."""
     from cli.output import note
     from cli.plots import draw_convergence, save
     from gaitswarm.jobs.open import open_jobs

@@ -27,7 +27,8 @@ def reconstruct(
     ] = Path("reconstruction"),
     seeds: Annotated[int, typer.Option(min=1, max=32, help="Calibrations.")] = 3,
     particles: Annotated[
-        int | None, typer.Option(min=2, help="Size of each swarm. Default: 40.")
+        int | None,
+        typer.Option(min=2, help="Designs of an iteration. Default: 40."),
     ] = None,
     iterations: Annotated[
         int | None, typer.Option(min=1, help="Iterations of each calibration. Default: 50.")
@@ -71,10 +72,10 @@ def reconstruct(
 
     defaults = (12, 8, 100) if quick else (40, 50, 1000)
     given = (particles, iterations, samples)
-    swarm, budget, random = (
+    particles_each, budget, random = (
         default if value is None else value for value, default in zip(given, defaults, strict=True)
     )
-    size = Size(seeds, swarm, budget, random, samples_each=max(1, random // 5))
+    size = Size(seeds, particles_each, budget, random, samples_each=max(1, random // 5))
     specs = calibrations(size)
     changed = None if change is None else [name.strip() for name in change.split(",")]
     alternatives(specs[0], changed)

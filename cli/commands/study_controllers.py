@@ -24,7 +24,7 @@ def controllers(
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=100, help="Runs of each controller.")] = 10,
     particles: Annotated[
-        int | None, typer.Option(help="Size of each swarm. Default: 40 in chapter 3, 25 in 4.")
+        int | None, typer.Option(help="Designs of an iteration. Default: 40 in chapter 3, 25 in 4.")
     ] = None,
     iterations: Annotated[
         int | None, typer.Option(help="Iterations of each run. Default: 70 in chapter 3, 25 in 4.")

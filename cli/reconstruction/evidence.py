@@ -142,7 +142,7 @@ class Evidence:
     def remaining(self, parameter: ParameterIdentifiability) -> list[str]:
         """Choices of a categorical convention that the evidence leaves.
 
-        A swarm may leave early what would do as well, so the default and its changes count, too.
+        A search may leave early what would do as well, so the default and its changes count, too.
 
         Args:
             parameter: The convention.

@@ -50,8 +50,8 @@ class Size:
 
     Attributes:
         seeds: calibrations, whose seeds count from 1.
-        particles: of each swarm.
-        iterations: of each swarm.
+        particles: designs of an iteration of each calibration.
+        iterations: of each calibration.
         samples: random designs for the default and for the best choice of each calibration.
         samples_each: random designs for one choice changed at a time.
     """

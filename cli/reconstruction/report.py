@@ -71,10 +71,10 @@ def _head(found: Evidence) -> Iterator[str]:
     yield "# Reconstruction"
     yield ""
     yield (
-        f"{len(found.runs)} calibrations of {size.particles} particles, {evaluated} choices of"
-        f" conventions in all; {size.samples} random designs under the default and under the best"
-        f" of each calibration, {size.samples_each} under every other choice. Written by `gaitswarm"
-        " reconstruct`; how to read it is in docs/reconstruction.md of gaitswarm."
+        f"{len(found.runs)} calibrations of {size.particles} designs an iteration, {evaluated}"
+        f" choices of conventions in all; {size.samples} random designs under the default and under"
+        f" the best of each calibration, {size.samples_each} under every other choice. Written by"
+        " `gaitswarm reconstruct`; how to read it is in docs/reconstruction.md of gaitswarm."
     )
 
 

@@ -202,7 +202,7 @@ class AsyncDatabaseJobs(AsyncJobs):
             yield iteration
 
     async def history(self, job_id: str) -> AsyncIterator[HistoryIterationView]:
-        """Read committed iterations with their particles, by pieces."""
+        """Read committed iterations with their designs, by pieces."""
         jobs = await self._jobs()
         async for iteration in _iterated(partial(jobs.history, job_id)):
             yield iteration

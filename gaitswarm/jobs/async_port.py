@@ -120,7 +120,7 @@ class AsyncJobs(ABC):
 
     @abstractmethod
     def history(self, job_id: str) -> AsyncIterator[HistoryIterationView]:
-        """List the committed iterations of a job with every particle."""
+        """List the committed iterations of a job with every design."""
 
     @abstractmethod
     async def evaluations(self, job_id: str) -> EvaluationTable:

@@ -164,7 +164,7 @@ class AsyncServerJobs(AsyncJobs):
         return self._items(lambda cursor: calls.iterations(job_id, cursor or first))
 
     async def history(self, job_id: str) -> AsyncIterator[HistoryIterationView]:
-        """List committed iterations, and ask for the particles of each."""
+        """List committed iterations, and ask for the designs of each."""
         async for iteration in self.iterations(job_id):
             particles = await self._send(calls.evaluations_of(job_id, iteration.index))
             yield HistoryIterationView(**dict(iteration), evaluations=particles.items)

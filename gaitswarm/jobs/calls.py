@@ -175,7 +175,7 @@ def iterations(job_id: str, after: str | None) -> Call[PageView[IterationView]]:
 
 
 def evaluations_of(job_id: str, iteration: int) -> Call[CatalogueView[EvaluationView]]:
-    """Every particle of one iteration.
+    """Every design of one iteration.
 
     Args:
         job_id: Identifier of the job.

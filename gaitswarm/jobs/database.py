@@ -225,7 +225,7 @@ class DatabaseJobs(DatabaseTournaments, Jobs):
             after = page.items[-1].index
 
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
-        """Read committed iterations with their particles, by pieces."""
+        """Read committed iterations with their designs, by pieces."""
         spec = self._service.job(job_id).spec
         for iteration, evaluations in self._service.history(job_id):
             yield HistoryIterationView.from_iteration_and_evaluations(iteration, evaluations, spec)

@@ -221,12 +221,12 @@ class Jobs(Tournaments, Walks, ABC):
             after: Only iterations with a greater index.
 
         Returns:
-            Fitness over the swarm, iteration by iteration, in order.
+            Fitness of the designs, iteration by iteration, in order.
         """
 
     @abstractmethod
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
-        """List the committed iterations of a job with every particle.
+        """List the committed iterations of a job with every design.
 
         Args:
             job_id: Identifier of the job.

@@ -169,7 +169,7 @@ class ServerJobs(Jobs):
         return self._items(lambda cursor: calls.iterations(job_id, cursor or first))
 
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
-        """List committed iterations, and ask for the particles of each."""
+        """List committed iterations, and ask for the designs of each."""
         for iteration in self.iterations(job_id):
             particles = self._send(calls.evaluations_of(job_id, iteration.index)).items
             yield HistoryIterationView(**dict(iteration), evaluations=particles)

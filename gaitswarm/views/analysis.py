@@ -15,7 +15,7 @@ from services.optimizer.jobs.tuning import JobSpec
 
 
 class DistributionItemView(View):
-    """The swarm in one iteration."""
+    """The designs of one iteration."""
 
     index: int = Field(description="Index of the iteration, from 0.", examples=[24])
     fitness: list[float | None] = Field(
@@ -28,17 +28,17 @@ class DistributionItemView(View):
     )
     diversity: float | None = Field(
         description="Standard deviation of the designs as a share of each searched variable's"
-        " range, mean over these variables [1]: 0 when the swarm has come together; null for an"
+        " range, mean over these variables [1]: 0 when the search has come together; null for an"
         " iteration of a single design.",
         examples=[0.12],
     )
 
 
 class DistributionView(View):
-    """How the swarm is spread, in pages. It is complete when `next` is null."""
+    """How designs are spread, in pages. It is complete when `next` is null."""
 
     quantiles: list[float] = Field(
-        description="Shares of the swarm that `fitness` is given for.", examples=[list(QUANTILES)]
+        description="Shares of the designs that `fitness` is given for.", examples=[list(QUANTILES)]
     )
     items: list[DistributionItemView] = Field(description="Iterations, in order.")
     next: str | None = Field(
@@ -98,7 +98,9 @@ class RankedDesignView(View):
 
     rank: int = Field(description="Place by the preference that was asked for, from 1.")
     iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
-    particle: int = Field(description="Particle of the swarm, from 0.", examples=[7])
+    particle: int = Field(
+        description="Number of the design in its iteration, from 0.", examples=[7]
+    )
     fitness: float = Field(description="By the preference that was asked for [1].", examples=[20.8])
     figure_of_merit: float | None = Field(
         default=None,

@@ -79,7 +79,9 @@ class TargetsView(View):
     jobs: list[str] = Field(description="The runs.", examples=[["k2q7zr5dm9xw"]])
     job: str = Field(description="The run that found the best design.", examples=["k2q7zr5dm9xw"])
     iteration: int = Field(description="Iteration that found it, from 0.", examples=[24])
-    particle: int = Field(description="Particle of the swarm, from 0.", examples=[7])
+    particle: int = Field(
+        description="Number of the design in its iteration, from 0.", examples=[7]
+    )
     fitness: float = Field(
         description="Root mean square of the differences of fitted targets, in tolerances [1].",
         examples=[0.84],

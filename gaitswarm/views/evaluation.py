@@ -97,7 +97,9 @@ class EvaluationView(View):
     """One design, judged in every case of its job."""
 
     iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
-    particle: int = Field(description="Particle of the swarm, from 0.", examples=[7])
+    particle: int = Field(
+        description="Number of the design in its iteration, from 0.", examples=[7]
+    )
     fitness: float | None = Field(
         description="To be minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or"
         " mean error of the fits (eq. 2.21) [A]; null if the design failed in any case.",

@@ -1,4 +1,4 @@
-"""Committed iterations of a job, in short and with every particle."""
+"""Committed iterations of a job, in short and with every design."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from services.optimizer.jobs.spec import Spec
 
 
 class IterationView(View):
-    """One committed iteration of a job: the swarm's fitness at a glance."""
+    """One committed iteration of a job: the fitness of its designs at a glance."""
 
     index: int = Field(description="Index of the iteration, from 0.", examples=[24])
     designs: int = Field(
@@ -49,19 +49,19 @@ class IterationView(View):
 
 
 class HistoryIterationView(IterationView):
-    """One committed iteration with every particle."""
+    """One committed iteration with every design."""
 
-    evaluations: list[EvaluationView] = Field(description="Every particle, in order.")
+    evaluations: list[EvaluationView] = Field(description="Every design, in order.")
 
     @classmethod
     def from_iteration_and_evaluations(
         cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
     ) -> HistoryIterationView:
-        """Make a view of an iteration with its particles.
+        """Make a view of an iteration with its designs.
 
         Args:
             iteration: as the store lists it.
-            evaluations: its particles.
+            evaluations: of its designs.
             spec: of the job.
         """
         particles = evaluation_views(evaluations, spec)

@@ -261,14 +261,14 @@ class JobService:
         return self.store.iterations(job_id, after=after, limit=limit)
 
     def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """Read every particle of a committed iteration.
+        """Read every design of a committed iteration.
 
         Args:
             job_id: id of the job.
             iteration: index, from 0.
 
         Returns:
-            By particle.
+            In order.
 
         Raises:
             NotFound: no job of that id, or no such iteration of it.
@@ -338,7 +338,7 @@ class JobService:
     def distribution(
         self, job: Job, *, after: int | None = None, limit: int
     ) -> tuple[Distribution, bool]:
-        """Say how the swarm is spread, iteration by iteration.
+        """Say how designs are spread, iteration by iteration.
 
         Args:
             job: as it was read.

@@ -79,7 +79,7 @@ def test_the_convergence_is_drawn_with_named_axes(
     drawn = gaitswarm("plot", "convergence", finished.id, "-o", path, "--db", finished.db)
     assert drawn.code == 0, drawn.err
     picture = path.read_text(encoding="utf-8")
-    for label in ("best so far", "median of the swarm", "iteration", "fitness, minimized"):
+    for label in ("best so far", "median of the iteration", "iteration", "fitness, minimized"):
         assert f"<!-- {label}" in picture
 
 

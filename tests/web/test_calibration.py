@@ -102,7 +102,7 @@ def test_choices_have_their_names_wherever_variables_are_shown(
     expect(designs.get_by_role("cell", name="linear zone")).to_have_count(0)
 
     page.goto(f"/jobs/{calibration}/iterations/0")
-    particles = page.get_by_role("table", name="Particles of iteration 0")
+    particles = page.get_by_role("table", name="Designs of iteration 0")
     expect(particles.get_by_role("row").filter(has_text="linear zone")).not_to_have_count(0)
 
 

@@ -121,7 +121,7 @@ def test_a_job_is_submitted_and_followed_by_keyboard_alone(
     expect(page.get_by_role("table", name="Iterations")).to_be_visible()
     press_until_focused(page, "0")
     page.keyboard.press("Enter")
-    expect(page.get_by_role("table", name="Particles of iteration 0")).to_be_visible()
+    expect(page.get_by_role("table", name="Designs of iteration 0")).to_be_visible()
 
 
 FOCUSED = """() => {

@@ -1,4 +1,4 @@
-"""How the swarm is spread, iteration by iteration, and which of its designs a picture shows."""
+"""How designs are spread, iteration by iteration, and which of its designs a picture shows."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distribution:
-    """The swarm in each of I iterations.
+    """The designs of each of I iterations.
 
     Attributes:
         index: (I,) of the iteration, from 0.
-        fitness: (I, 7) `QUANTILES` of the swarm's finite fitness, NaN if there is none.
+        fitness: (I, 7) `QUANTILES` of their finite fitness, NaN if there is none.
         mean: (I,) of the same values.
         failed: (I,) number of the other designs.
-        diversity: (I,) standard deviation of the swarm's designs as a share of each searched
-            variable's range, mean over these variables [1]; 0 for a swarm that has come together,
+        diversity: (I,) standard deviation of the designs as a share of each searched
+            variable's range, mean over these variables [1]; 0 for a search that has come together,
             NaN for a single design.
     """
 
@@ -38,7 +38,7 @@ class Distribution:
 
 
 def distribution(columns: EvaluationColumns, space: DesignSpace) -> Distribution:
-    """Say how the swarm is spread, iteration by iteration.
+    """Say how designs are spread, iteration by iteration.
 
     Args:
         columns: whole iterations, in order, of any number of designs each.

@@ -1,6 +1,6 @@
 """Which fitted parameters can be trusted: their intervals among good designs (thesis fig. 2.14).
 
-A swarm contracts whether or not a parameter matters, so the interval of one run says little. Runs
+A search contracts whether or not a parameter matters, so the interval of one run says little. Runs
 that differ in their seed alone contract to the same value only where the measured walks ask for it:
 the intervals here are over all runs together, each run's good designs by its own best.
 """

@@ -59,7 +59,7 @@ class TargetResults:
     Attributes:
         run: index of the run that found the best design.
         iteration: that found it.
-        particle: that it was.
+        particle: its number in that iteration.
         design: (v,) its values, as stored.
         fitness: its misfit, root mean square over fitted targets in tolerances.
         targets: in the order of the spec.

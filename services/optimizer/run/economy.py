@@ -1,4 +1,4 @@
-"""Walks only what is not known: no design twice in a swarm, none that was walked before."""
+"""Walks only what is not known: no design twice in an iteration, none that was walked before."""
 
 from __future__ import annotations
 

@@ -304,7 +304,7 @@ class Store(Protocol):
         """
 
     def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """Read all particles of a committed iteration.
+        """Read all designs of a committed iteration.
 
         Args:
             job_id: Of the job.
@@ -318,7 +318,7 @@ class Store(Protocol):
         """
 
     def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
-        """Read all particles of a range of committed iterations.
+        """Read all designs of a range of committed iterations.
 
         For reading a long history by pieces, each a transaction of its own; committed iterations
         never change, so the pieces fit together.
@@ -343,7 +343,7 @@ class Store(Protocol):
         """
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
-        """Read all particles of a range of committed iterations as columns, for many at once.
+        """Read all designs of a range of committed iterations as columns, for many at once.
 
         Args:
             job_id: Of the job.

@@ -51,14 +51,14 @@ class SqlHistory:
         return Page(found, str(found[-1].index) if len(rows) > limit else None)
 
     def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """Read the particles of a committed iteration."""
+        """Read the designs of a committed iteration."""
         found = self.evaluations_between(job_id, iteration, iteration + 1)
         if not found:
             raise NotFound(f"job {job_id} has no committed iteration {iteration}")
         return found
 
     def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
-        """Read the particles of a range of committed iterations."""
+        """Read the designs of a range of committed iterations."""
         query = (
             select(evaluations)
             .where(
@@ -74,7 +74,7 @@ class SqlHistory:
         return tuple(to_evaluation(row) for row in rows)
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
-        """Read the particles of a range of committed iterations as columns."""
+        """Read the designs of a range of committed iterations as columns."""
         with self._database.transaction(write=False) as connection:
             job_row(connection, job_id)
             return select_columns(connection, job_id, _bounded(first), _bounded(last))
@@ -96,7 +96,7 @@ class SqlHistory:
 
 
 def _particle(table: Table, job: Row) -> Select[Any]:
-    """The row of a job's best particle in a table of them."""
+    """The row of a job's best design in a table of them."""
     return select(table).where(
         table.c.job_id == job["id"],
         table.c.iteration == job["best_iteration"],

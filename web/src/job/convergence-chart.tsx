@@ -1,4 +1,4 @@
-/** Best, mean and quantiles of the swarm's fitness over the iterations. */
+/** Best, mean and quantiles of fitness over the iterations. */
 
 import { useMemo, useState } from 'preact/hooks'
 import type { Iteration, Job } from '../api/types'
@@ -42,7 +42,7 @@ export function ConvergenceChart({
           <LegendEntry colour="--series-2" label="mean" />
           {drawn.bands.length > 0 && (
             <>
-              <LegendEntry colour="--fan-inner" label="25 % to 75 % of the swarm" area />
+              <LegendEntry colour="--fan-inner" label="25 % to 75 % of the designs" area />
               <LegendEntry colour="--fan-outer" label="5 % to 95 %" area />
             </>
           )}

@@ -1,4 +1,4 @@
-/** The distribution of the swarm's fitness, iteration by iteration (fig. 4.6 of the thesis). */
+/** The distribution of fitness, iteration by iteration (fig. 4.6 of the thesis). */
 
 import { useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
@@ -43,11 +43,11 @@ export function DistributionChart({
   return (
     <ChartFrame
       title="Distribution of fitness"
-      note="Every iteration is a strip; the darker, the more of the swarm has that fitness."
+      note="Every iteration is a strip; the darker, the more of the designs have that fitness."
       legend={
         <>
           <LegendEntry colour="--series-2" label="median" />
-          <LegendEntry colour="--series-1" label="density of the swarm" area />
+          <LegendEntry colour="--series-1" label="density of the designs" area />
           <span>
             {last?.failed ?? 0} of {last?.designs ?? 0} failed in the last iteration
           </span>
@@ -72,7 +72,7 @@ export function DistributionChart({
       )}
     >
       <LineChart
-        label={`Distribution of the swarm's fitness over ${items.length} iterations`}
+        label={`Distribution of fitness over ${items.length} iterations`}
         x={drawn.x}
         xLabel="iteration"
         counted
@@ -87,7 +87,7 @@ export function DistributionChart({
   )
 }
 
-/** Between two quantiles lies a known share of the swarm: the closer they are, the darker. */
+/** Between two quantiles lies a known share of the designs: the closer they are, the darker. */
 function paintStrips(plot: uPlot, quantiles: readonly number[], strips: readonly Strip[]): void {
   const { ctx, bbox } = plot
   const colour = themeColour('--series-1')

@@ -1,4 +1,4 @@
-/** How far the swarm is spread over the design space. */
+/** How far designs are spread over the design space. */
 
 import { useMemo } from 'preact/hooks'
 import { LineChart } from '../charts/line-chart'
@@ -24,10 +24,10 @@ export function DiversityChart({ distribution }: { distribution: Distribution })
   )
   return (
     <ChartFrame
-      title="Diversity of the swarm"
+      title="Diversity of the designs"
       note={
         items.some(({ diversity }) => diversity !== null)
-          ? 'Spread of the designs as a share of each variable’s range: near zero, the swarm has gathered.'
+          ? 'Spread of the designs as a share of each variable’s range: near zero, the search has gathered.'
           : 'The method asks for one design at a time, which has no spread.'
       }
       table={() => (
@@ -47,7 +47,7 @@ export function DiversityChart({ distribution }: { distribution: Distribution })
       )}
     >
       <LineChart
-        label={`Diversity of the swarm, now ${percent(items.at(-1)?.diversity)} of the range`}
+        label={`Diversity of the designs, now ${percent(items.at(-1)?.diversity)} of the range`}
         x={drawn.x}
         xLabel="iteration"
         counted

@@ -1,4 +1,4 @@
-/** The particles of one iteration; each leads to its walks and its controller. */
+/** The designs of one iteration; each leads to its walks and its controller. */
 
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
@@ -19,9 +19,9 @@ export function IterationPanel({ job, index }: { job: Job; index: number }) {
     }).then((answer) => answer.items),
   )
   return (
-    <section class="card" aria-labelledby="particles">
+    <section class="card" aria-labelledby="designs">
       <header class="row spread">
-        <h2 id="particles">Particles of iteration {index}</h2>
+        <h2 id="designs">Designs of iteration {index}</h2>
         <nav class="row" aria-label="Other iterations">
           <a class="button compact" href={jobPath(job.id, 'iterations')}>
             All iterations
@@ -40,15 +40,15 @@ export function IterationPanel({ job, index }: { job: Job; index: number }) {
       </header>
       {evaluations.error && (
         <ErrorNotice
-          what="The particles cannot be shown."
+          what="The designs cannot be shown."
           error={evaluations.error}
           retry={evaluations.reload}
         />
       )}
-      {evaluations.loading && !evaluations.data && <Loading what="particles" />}
+      {evaluations.loading && !evaluations.data && <Loading what="designs" />}
       {evaluations.data && (
         <Table
-          caption={`Particles of iteration ${index}`}
+          caption={`Designs of iteration ${index}`}
           rows={evaluations.data}
           rowKey={(e) => String(e.particle)}
           order={{ column: 'fitness', descending: false }}
@@ -66,7 +66,7 @@ function columns(job: Job): readonly Column<Evaluation>[] {
   return [
     {
       key: 'particle',
-      label: 'Particle',
+      label: 'Design',
       header: true,
       value: (e) => e.particle,
       cell: (e) => (tuning ? <a href={walkOf(job, e)}>{e.particle}</a> : e.particle),

@@ -116,7 +116,7 @@ export function BestCard({ job }: { job: Job }) {
         )}
       </header>
       <p class="muted small">
-        Particle {best.particle} of iteration {best.iteration}
+        Design {best.particle} of iteration {best.iteration}
       </p>
       <dl class="design">
         {Object.entries(best.design).map(([name, value]) => (

@@ -1,4 +1,4 @@
-/** How a job converges: best and swarm over the iterations, spread, and what limits the winner. */
+/** How a job converges: best and spread over the iterations, diversity, and what limits the winner. */
 
 import type { Job } from '../api/types'
 import { Empty, ErrorNotice } from '../components/feedback'
@@ -29,7 +29,7 @@ export function OverviewPanel({ live, job }: { live: LiveJob; job: Job }) {
     <div class="stack">
       {distribution.error !== null && distribution.error !== undefined && (
         <ErrorNotice
-          what="The distribution of the swarm cannot be shown."
+          what="The distribution of fitness cannot be shown."
           error={distribution.error}
         />
       )}

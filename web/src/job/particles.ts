@@ -1,4 +1,4 @@
-/** All particles of a job as columns of numbers, as /v1/jobs/{id}/particles sends them. */
+/** All designs of a job as columns of numbers, as /v1/jobs/{id}/particles sends them. */
 
 export interface ParticleColumn {
   readonly name: string
@@ -9,13 +9,13 @@ export interface ParticleColumn {
   readonly kind: string
   /** Names of what a categorical variable's values are indices of; else none. */
   readonly choices: readonly string[]
-  /** One per particle; NaN where there is none. */
+  /** One per design; NaN where there is none. */
   readonly values: Float32Array
 }
 
 export interface Particles {
   readonly rows: number
-  /** Particles that the job has; more than `rows` if they were thinned. */
+  /** Designs that the job has; more than `rows` if they were thinned. */
   readonly total: number
   readonly columns: readonly ParticleColumn[]
 }

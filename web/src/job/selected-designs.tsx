@@ -52,7 +52,7 @@ export function SelectedDesigns({
   )
 }
 
-/** Iteration and particle, leading to its walk; where nothing walks, to its iteration. */
+/** Iteration and design, leading to its walk; where nothing walks, to its iteration. */
 export function Where({
   job,
   iteration,
@@ -69,7 +69,7 @@ export function Where({
       : jobPath(job.id, `iterations/${iteration}`)
   return (
     <a href={target} class="nowrap">
-      iteration {iteration}, particle {particle}
+      design {particle} of iteration {iteration}
     </a>
   )
 }

@@ -75,7 +75,7 @@ function TargetsTable({ found, predicts }: { found: Targets; predicts: boolean }
   return (
     <>
       <p data-within={within} data-fitted={fitted}>
-        The best design, particle {found.particle} of iteration {found.iteration}, meets{' '}
+        The best design, number {found.particle} of iteration {found.iteration}, meets{' '}
         <strong>
           {within} of {fitted}
         </strong>{' '}

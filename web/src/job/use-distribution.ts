@@ -1,4 +1,4 @@
-/** The distribution of the swarm's fitness by iteration, extended as iterations are committed. */
+/** The distribution of fitness by iteration, extended as iterations are committed. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'

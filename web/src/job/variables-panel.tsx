@@ -17,7 +17,7 @@ import { SelectedDesigns } from './selected-designs'
 const NONE: Brushes = new Map()
 /** Kinds of columns that are variables. */
 const VARIABLES = new Set(['continuous', 'integer', 'categorical'])
-/** How often a running job's particles are asked for again [ms]. */
+/** How often a running job's designs are asked for again [ms]. */
 const RENEW_MS = 8000
 
 export function VariablesPanel({ job }: { job: Job }) {

@@ -2,7 +2,7 @@
 
 import type { Design } from '../format/value'
 
-/** A particle of a job (its best one if none is named), a published design, or values as such. */
+/** A design of a job (its best one if none is named), a published design, or values as such. */
 export type DesignSource =
   | { readonly kind: 'best'; readonly job: string }
   | {
@@ -109,7 +109,7 @@ function jobSource(job: string, iteration: string | null, particle: string | nul
   if (!iteration && !particle) return { kind: 'best', job }
   const numbers = [iteration, particle].map((text) => Number(text || Number.NaN))
   if (numbers.some((n) => !Number.isInteger(n) || n < 0)) {
-    throw new AddressError('a particle is named by iteration and particle, both from 0')
+    throw new AddressError('a design is named by iteration and particle, both from 0')
   }
   return { kind: 'particle', job, iteration: numbers[0], particle: numbers[1] }
 }

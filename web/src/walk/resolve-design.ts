@@ -62,7 +62,7 @@ async function ofJob(
     label:
       source.kind === 'best'
         ? `Best of ${name}`
-        : `${name}, iteration ${evaluation.iteration}, particle ${evaluation.particle}`,
+        : `${name}, design ${evaluation.particle} of iteration ${evaluation.iteration}`,
     robot: spec.robot,
     controller: named(controllers, spec.controller),
     design: evaluation.design,
@@ -91,7 +91,7 @@ async function evaluationOf(
   if (found) return found
   throw new ApiProblem(
     404,
-    `iteration ${source.iteration} has no particle ${source.particle}, but 0 to ${evaluations.length - 1}`,
+    `iteration ${source.iteration} has no design ${source.particle}, but 0 to ${evaluations.length - 1}`,
   )
 }
 

@@ -102,7 +102,7 @@ function OneRun() {
     <div class="notice" data-tone="warn" data-single-run>
       <strong>One run cannot tell.</strong>
       <p>
-        A swarm gathers at some value of every parameter, whether or not the walks depend on it, so
+        A search gathers at some value of every parameter, whether or not the walks depend on it, so
         one run always narrows down. Only runs that differ in their seed and still find the same
         value show that it can be trusted: choose some above, or run this job with another seed.
       </p>

@@ -5,11 +5,12 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from fastapi import FastAPI, Request, Response
 from fastapi.openapi.docs import get_swagger_ui_html
-from pydantic.json_schema import models_json_schema
+from pydantic import BaseModel
+from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from api.middleware import security_policy
 from api.problems import MEDIA_TYPE
@@ -65,6 +66,8 @@ _MEANING: Final = {
 _HEADERS: Final = (ReplayHeaderView, ParticlesHeaderView)
 """What is JSON inside binary answers, which FastAPI does not see."""
 
+_SCHEMAS: Final = "#/components/schemas/"
+
 _INLINE_SCRIPT: Final = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 
 Responses = dict[int | str, dict[str, Any]]
@@ -79,8 +82,10 @@ def problems(*statuses: int) -> Responses:
     Returns:
         The route's `responses`.
     """
+    # By name: as a `model`, each of some 150 answers would have a validator of its own.
+    content = {MEDIA_TYPE: {"schema": {"$ref": f"{_SCHEMAS}{ProblemView.__name__}"}}}
     return {
-        status: {"model": ProblemView, "description": _MEANING[status]}
+        status: {"description": _MEANING[status], "content": content}
         for status in (*statuses, 500, 503)
     }
 
@@ -110,8 +115,9 @@ def add_documentation(app: FastAPI) -> None:
 
     def openapi() -> dict[str, Any]:
         document = derive()
-        _name_problems(document)
-        _add_headers(document)
+        known = document["components"]["schemas"] | _schemas(ProblemView)
+        known = dict(sorted(known.items()))
+        document["components"]["schemas"] = _schemas(*_HEADERS) | known
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]
@@ -131,23 +137,11 @@ def add_documentation(app: FastAPI) -> None:
     app.add_route("/docs", documentation, include_in_schema=False)
 
 
-def _name_problems(document: dict[str, Any]) -> None:
-    """Let problem+json be the media type wherever a problem is answered."""
-    for operations in document["paths"].values():
-        for operation in operations.values():
-            for status, response in operation["responses"].items():
-                if status >= "400":
-                    (body,) = response["content"].values()
-                    response["content"] = {MEDIA_TYPE: body}
-
-
-def _add_headers(document: dict[str, Any]) -> None:
-    _, schemas = models_json_schema(
-        [(header, "serialization") for header in _HEADERS],
-        ref_template="#/components/schemas/{model}",
-    )
-    components = document["components"]
-    components["schemas"] = schemas["$defs"] | components["schemas"]
+def _schemas(*models: type[BaseModel]) -> dict[str, Any]:
+    """Of models that FastAPI does not see, with all that they refer to."""
+    wanted: list[tuple[type[BaseModel], JsonSchemaMode]] = [(m, "serialization") for m in models]
+    _, schemas = models_json_schema(wanted, ref_template=f"{_SCHEMAS}{{model}}")
+    return cast(dict[str, Any], schemas["$defs"])
 
 
 def _policy(page: bytes) -> str:

@@ -253,14 +253,45 @@ SCENARIOS: Final[tuple[Scenario, ...]] = (
 )
 """The six scenarios of table 4.2, in its order: those that a job has unless it names others."""
 
+_BACKWARD: Final = Scenario(
+    name="backward", cycle_time=1.5, radius=0.16, hip_height=0.15, direction="backward"
+)
+
+HELD_OUT: Final[tuple[Scenario, ...]] = (
+    Scenario(name="turn-left-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, turn=-0.5),
+    Scenario(name="half-loaded-fast", cycle_time=1.5, radius=0.145, hip_height=0.20, load=1.0),
+    Scenario(name="overloaded-fast", cycle_time=1.5, radius=0.145, hip_height=0.20, load=3.0),
+    Scenario(name="downhill-fast", cycle_time=1.5, radius=0.20, hip_height=0.14, slope=-10.0),
+    Scenario(
+        name="slope-left-fast",
+        cycle_time=1.5,
+        radius=0.20,
+        hip_height=0.14,
+        slope=10.0,
+        slope_direction=90.0,
+    ),
+    Scenario(
+        name="slope-right-fast",
+        cycle_time=1.5,
+        radius=0.20,
+        hip_height=0.14,
+        slope=10.0,
+        slope_direction=-90.0,
+    ),
+    _BACKWARD,
+)
+"""Walks beside those of table 4.2, for which no design of the thesis was optimized: what a design
+is worth in them shows whether it was made for its scenarios alone."""
+
 PRESETS: Final[tuple[Scenario, ...]] = (
     *SCENARIOS,
     Scenario(name="straight", cycle_time=1.5, radius=0.16, hip_height=0.15),
-    Scenario(name="backward", cycle_time=1.5, radius=0.16, hip_height=0.15, direction="backward"),
+    _BACKWARD,
     Scenario(name="drop", cycle_time=1.5, radius=0.16, hip_height=0.15, drop=0.03),
     Scenario(
         name="stuck-leg", cycle_time=1.5, radius=0.16, hip_height=0.15, stuck_leg="right_middle"
     ),
+    *(scenario for scenario in HELD_OUT if scenario is not _BACKWARD),
 )
 """All scenarios that have a name and, by their order, a number from 1 on.
 

@@ -34,9 +34,6 @@ def feet_below_body(robot: Robot, joints: Floats) -> Floats:
 def resting_height(robot: Robot, joints: Floats, weight: float) -> float:
     """Height of a level body at which the feet's springs carry a weight.
 
-    The springs' force is piecewise linear in height; feet are loaded from the lowest up until the
-    balance leaves the next one in the air.
-
     Args:
         robot: The robot.
         joints: Angles, (J,) [rad].
@@ -47,7 +44,23 @@ def resting_height(robot: Robot, joints: Floats, weight: float) -> float:
     """
     contacts = robot.contacts()
     reach = np.array([c.sole for c in contacts]) - feet_below_body(robot, joints)
-    stiffness = np.array([c.stiffness for c in contacts])
+    return height_on_soles(reach, np.array([c.stiffness for c in contacts]), weight)
+
+
+def height_on_soles(reach: Floats, stiffness: Floats, weight: float) -> float:
+    """Height of a body at which springs under it carry a weight.
+
+    The springs' force is piecewise linear in height; feet are loaded from the lowest up until the
+    balance leaves the next one in the air.
+
+    Args:
+        reach: How far the soles' unloaded ends lie below the body, (L,) [m].
+        stiffness: Of the soles, (L,) [N/m].
+        weight: To be carried [N].
+
+    Returns:
+        [m].
+    """
     order = np.argsort(-reach)
     reach, stiffness = reach[order], stiffness[order]
     # Height at which the n lowest feet balance the weight, for every n.

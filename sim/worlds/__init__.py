@@ -1,0 +1,9 @@
+"""Designs in worlds that differ from the model, and where they walk."""
+
+from __future__ import annotations
+
+from sim.scenario import HELD_OUT
+from sim.worlds.perturbations import PERTURBATIONS, check_worlds, sample_worlds
+from sim.worlds.world_walk import WorldWalk
+
+__all__ = ["HELD_OUT", "PERTURBATIONS", "WorldWalk", "check_worlds", "sample_worlds"]

@@ -41,6 +41,7 @@ typedef dvec wide[HALVES];
 #define SPLAT(x) ((real)(x) - (vec){0})
 #define ISPLAT(x) ((integer)(x) - (ivec){0})
 #define DSPLAT(x) ((double)(x) - (dvec){0})
+#define DWHOLE(x) ((int64_t)(x) - (divec){0})
 
 OPERATION vec vec_select(ivec mask, vec a, vec b)
 {

@@ -20,6 +20,7 @@ typedef struct {
   const double *parameters;     /* NP */
   const int32_t *desired;       /* ticks x NJ, coded angles */
   const double *disturbance;    /* ticks x NJ, torque on the links [N m]; or NULL */
+  SensorErrors sensors;
   Law law;
   int64_t ticks;
   double fall_height;  /* of the body over the ground [m] */
@@ -63,6 +64,7 @@ typedef struct {
   vec v[NV], internal[NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ], landing;
   wide timestep, weight; /* of a physics step [s], and per one of those without a landing */
   Control control;
+  Sensors sensors;
   int filtered, disturbed; /* whether any lane's current or links are */
   vec sensed[NJ], smoothing;
   wide sums[N_INTEGRANDS];
@@ -133,6 +135,7 @@ static void enter(Lanes *s, int k, Call *call, Walker *w)
   s->peak[k] = s->landing[k] = 0;
   s->rounds_left[k] = 0;
   set_control(&s->control, k, &w->law);
+  set_sensors(&s->sensors, k, &w->sensors);
   if (w->smoothing[0] < 1.0) s->filtered = 1;
   if (w->disturbance) s->disturbed = 1;
 }
@@ -167,9 +170,23 @@ static void begin_ticks(Lanes *s, const Coding *c)
   }
 }
 
+/* Where some sensors have errors, what all of them tell. */
+static void read_sensors(Lanes *s, const vec *current)
+{
+  for (int j = 0; j < NJ; j++) {
+    const vec absolute = vec_abs(current[j]);
+    for (int h = 0; h < HALVES; h++) {
+      s->sensors.seen[ANGLE][j][h] = encoder(s, j, h);
+      s->sensors.seen[CURRENT][j][h] = vec_widened(&absolute, h);
+    }
+  }
+  disturb(&s->sensors, s->tick, s->begins);
+}
+
 static void control_tick(Lanes *s, const Coding *c)
 {
   const vec *current = s->filtered ? s->sensed : s->current;
+  const int imperfect = s->sensors.noisy || s->sensors.late;
   divec desired[NJ][HALVES];
   wide counts[NJ];
   Readings readings;
@@ -180,10 +197,13 @@ static void control_tick(Lanes *s, const Coding *c)
     if (s->disturbed && w->disturbance)
       for (int j = 0; j < NJ; j++) s->disturbance[j][k] = (real)w->disturbance[row + j];
   }
+  if (imperfect) read_sensors(s, current);
   for (int j = 0; j < NJ; j++) {
     const vec absolute = vec_abs(current[j]);
     for (int h = 0; h < HALVES; h++)
-      read_joint(&readings, &s->control, c, j, h, encoder(s, j, h), vec_widened(&absolute, h),
+      read_joint(&readings, &s->control, c, j, h,
+                 imperfect ? s->sensors.seen[ANGLE][j][h] : encoder(s, j, h),
+                 imperfect ? s->sensors.seen[CURRENT][j][h] : vec_widened(&absolute, h),
                  dvec_of(desired[j][h]));
   }
   control(&s->control, c, &readings, s->begins, counts);

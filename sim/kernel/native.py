@@ -76,6 +76,14 @@ class _Law(ctypes.Structure):
     ]
 
 
+class _SensorErrors(ctypes.Structure):
+    _fields_ = [
+        ("noise", 2 * ctypes.c_double),
+        ("delay", 2 * ctypes.c_int64),
+        ("seed", ctypes.c_uint64),
+    ]
+
+
 class Walker(ctypes.Structure):
     """A walk as the kernel reads it, with where its results go and what they are."""
 
@@ -85,6 +93,7 @@ class Walker(ctypes.Structure):
         ("parameters", ctypes.c_void_p),
         ("desired", ctypes.c_void_p),
         ("disturbance", ctypes.c_void_p),
+        ("sensors", _SensorErrors),
         ("law", _Law),
         ("ticks", ctypes.c_int64),
         ("fall_height", ctypes.c_double),
@@ -249,6 +258,8 @@ class NativeKernel:
             walker.disturbance = (
                 None if setup.disturbance is None else addresses.of(setup.disturbance, np.float64)
             )
+            errors = setup.sensors
+            walker.sensors = _SensorErrors(errors.scales, errors.delays, errors.seed)
             walker.law = addresses.law(setup.control_law)
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height

@@ -1,7 +1,8 @@
 """The readable driver: the same walk over CasADi's interpreter.
 
-The oracle of control.c and driver.c, and the fallback where there is no C compiler. Function by
-function their twin; the physics agrees to rounding, the integer arithmetic exactly.
+The oracle of control.c and driver.c (of sensors.c: sensors.py), and the fallback where there is no
+C compiler. Function by function their twin; the physics agrees to rounding, the integer arithmetic
+exactly.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from sim.controllers.base import ControlLaw
 from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
 from sim.kernel.physics_step import INTEGRANDS, PhysicsModel, physics_model
+from sim.kernel.sensors import Sensors
 from sim.kernel.walk import (
     CODE_LIMIT,
     Coding,
@@ -66,14 +68,15 @@ class ReferenceKernel:
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> tuple[WalkResult, int]:
         """What became of the walk, and how many rounds of physics steps it took."""
         step = Stepper(self._model, setup)
-        past = _Past.of(setup.desired.shape[1])
+        past, sensors = _Past.of(setup.desired.shape[1]), Sensors(setup.sensors)
         sensed = np.zeros(setup.desired.shape[1])
         sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
         status, rounds = Status.OK, 0
         for tick, desired in enumerate(setup.desired):
             encoder = step.internal_state[: len(desired)] if self._has_backlash else step.q[7:]
-            error, load = _read_sensors(encoder, sensed, desired, coding)
+            readings = sensors.read(encoder, np.abs(sensed))
+            error, load = _coded(*readings, desired, coding)
             output = _control(setup.control_law, coding, error, load, past)
             step.duty[:] = output * coding.duty_per_count
             if setup.disturbance is not None:
@@ -185,13 +188,13 @@ def _low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
     return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
 
 
-def _read_sensors(
+def _coded(
     angles: Floats, current: Floats, desired: NDArray[np.int32], coding: Coding
 ) -> tuple[Ints, Ints]:
     """Coded angle error and absolute current, (J,)."""
     code = _to_code(angles * coding.angle_counts, -4 * CODE_LIMIT, 4 * CODE_LIMIT)
     error = desired.astype(np.int64) - _coarsen(code, coding.angle_step)
-    amperes = _to_code(np.abs(current) * coding.current_counts, 0, CODE_LIMIT)
+    amperes = _to_code(current * coding.current_counts, 0, CODE_LIMIT)
     return np.clip(error, -CODE_LIMIT, CODE_LIMIT), _coarsen(amperes, coding.current_step)
 
 

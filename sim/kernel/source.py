@@ -24,6 +24,7 @@ _NOT_IN_THE_SOURCE: Final = (
     "observation.py",
     "physics_step.py",
     "reference.py",
+    "sensors.py",
     "sharing.py",
     "walk.py",
 )
@@ -84,7 +85,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             pieces,
             *(
                 (resources.files("sim.kernel") / name).read_text(encoding="utf-8")
-                for name in ("control.c", "driver.c")
+                for name in ("sensors.c", "control.c", "driver.c")
             ),
         ]
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sim.controllers.base import ControlLaw, LookupTable
 from sim.errors import SimulationInputError
+from sim.kernel.sensors import NO_ERRORS, SensorErrors
 from sim.outcome import Status
 from sim.robot import Robot
 from sim.robot.description import EnergyConvention
@@ -130,6 +131,7 @@ class WalkSetup:
         drop: height of the start above the stance at which the soles carry the weight [m].
         current_smoothing: share of its distance from the absolute current that the analog
             low-pass of the current goes in a physics step; 1 for no low-pass [1].
+        sensors: what they get wrong.
     """
 
     start: Floats
@@ -144,6 +146,7 @@ class WalkSetup:
     direction: int = 1
     drop: float = 0.0
     current_smoothing: float = 1.0
+    sensors: SensorErrors = NO_ERRORS
 
     def smoothing(self, refinement: int) -> float:
         """The analog low-pass over a shorter step.

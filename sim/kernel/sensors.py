@@ -1,0 +1,133 @@
+"""What sensors get wrong before their readings are coded: white noise, and delays.
+
+The readable twin of sensors.c, number by number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import SimulationInputError
+
+Floats = NDArray[np.float64]
+Words = NDArray[np.uint64]
+
+LARGEST_DELAY: Final = 15
+"""Of a sensor [control ticks]."""
+
+_BYTES: Final = 8
+"""Whose sum is a reading's noise (Irwin and Hall's distribution): exact, and normal but for its
+tails, which end at 4.9 deviations."""
+
+_MEAN: Final = _BYTES * 255 // 2
+_DEVIATION: Final = math.sqrt(_BYTES * (256**2 - 1) / 12.0)
+
+_WORD: Final = np.uint64(0xFFFFFFFF)
+_MULTIPLIERS: Final = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
+_WEYL: Final = 0x9E3779B9, 0xBB67AE85
+
+
+@dataclass(frozen=True, slots=True)
+class SensorErrors:
+    """Of all joints' encoders and current sensors in one walk.
+
+    Attributes:
+        angle_noise: standard deviation of an angle [rad].
+        current_noise: standard deviation of an absolute current [A].
+        angle_delay: how late the controller learns an angle [control ticks].
+        current_delay: how late the controller learns a current [control ticks].
+        seed: of the noise, which depends on it, on tick and joint alone.
+    """
+
+    angle_noise: float = 0.0
+    current_noise: float = 0.0
+    angle_delay: int = 0
+    current_delay: int = 0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("angle_noise", "current_noise"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise SimulationInputError(f"{name}: {getattr(self, name):g} is less than 0")
+        for name in ("angle_delay", "current_delay"):
+            if not 0 <= getattr(self, name) <= LARGEST_DELAY:
+                raise SimulationInputError(
+                    f"{name}: {getattr(self, name)} is not 0 to {LARGEST_DELAY} control ticks"
+                )
+        if not 0 <= self.seed < 2**64:
+            raise SimulationInputError(f"seed: {self.seed} is not 0 to 2^64 - 1")
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """Noise of angle [rad] and current [A] per unit of a sum of bytes."""
+        return self.angle_noise / _DEVIATION, self.current_noise / _DEVIATION
+
+    @property
+    def delays(self) -> tuple[int, int]:
+        """Of angle and current [control ticks]."""
+        return self.angle_delay, self.current_delay
+
+
+NO_ERRORS: Final = SensorErrors()
+"""Of sensors that tell the controller what is."""
+
+
+def philox(counter: Words, key: tuple[int, int]) -> Words:
+    """Philox4x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, 2011).
+
+    Args:
+        counter: (..., 4) words of 32 bits.
+        key: Two words of 32 bits.
+
+    Returns:
+        (..., 4) words of 32 bits.
+    """
+    c = [counter[..., k] for k in range(4)]
+    for number in range(10):
+        keys = [np.uint64((k + number * w) & 0xFFFFFFFF) for k, w in zip(key, _WEYL, strict=True)]
+        a, b = c[0] * _MULTIPLIERS[0], c[2] * _MULTIPLIERS[1]
+        shift = np.uint64(32)
+        c = [(b >> shift) ^ c[1] ^ keys[0], b & _WORD, (a >> shift) ^ c[3] ^ keys[1], a & _WORD]
+    return np.stack(c, axis=-1)
+
+
+class Sensors:
+    """Sensors of one walk, tick by tick.
+
+    Args:
+        errors: Theirs.
+    """
+
+    def __init__(self, errors: SensorErrors) -> None:
+        self._errors = errors
+        self._kept = [deque[Floats](maxlen=delay + 1) for delay in errors.delays]
+        self._tick = 0
+
+    def read(self, angle: Floats, current: Floats) -> tuple[Floats, Floats]:
+        """What the controller learns in the next tick.
+
+        Args:
+            angle: Of all encoders, (J,) [rad].
+            current: Absolute, (J,) [A].
+
+        Returns:
+            Angles and currents, (J,) each. Where a reading of before the walk is asked for, the
+            first one.
+        """
+        counter = np.zeros((len(angle), 4), dtype=np.uint64)
+        counter[:, 0], counter[:, 1] = self._tick, np.arange(len(angle))
+        self._tick += 1
+        seed = self._errors.seed
+        words = philox(counter, (seed & 0xFFFFFFFF, seed >> 32)).astype(np.uint32)
+        sums = words.view(np.uint8).reshape(len(angle), 2, _BYTES).sum(axis=2, dtype=np.int64)
+        seen = []
+        for k, (exact, kept) in enumerate(zip((angle, current), self._kept, strict=True)):
+            kept.append(exact + (sums[:, k] - _MEAN) * self._errors.scales[k])
+            seen.append(kept[0])
+        return seen[0], seen[1]

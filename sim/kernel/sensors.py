@@ -17,6 +17,7 @@ from sim.errors import SimulationInputError
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
+Integers = NDArray[np.int64]
 
 LARGEST_DELAY: Final = 15
 """Of a sensor [control ticks]."""
@@ -26,7 +27,9 @@ _BYTES: Final = 8
 tails, which end at 4.9 deviations."""
 
 _MEAN: Final = _BYTES * 255 // 2
-_DEVIATION: Final = math.sqrt(_BYTES * (256**2 - 1) / 12.0)
+
+DEVIATION: Final = math.sqrt(_BYTES * (256**2 - 1) / 12.0)
+"""Standard deviation of such a sum."""
 
 _WORD: Final = np.uint64(0xFFFFFFFF)
 _MULTIPLIERS: Final = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
@@ -66,7 +69,7 @@ class SensorErrors:
     @property
     def scales(self) -> tuple[float, float]:
         """Noise of angle [rad] and current [A] per unit of a sum of bytes."""
-        return self.angle_noise / _DEVIATION, self.current_noise / _DEVIATION
+        return self.angle_noise / DEVIATION, self.current_noise / DEVIATION
 
     @property
     def delays(self) -> tuple[int, int]:
@@ -78,23 +81,43 @@ NO_ERRORS: Final = SensorErrors()
 """Of sensors that tell the controller what is."""
 
 
-def philox(counter: Words, key: tuple[int, int]) -> Words:
+def philox(counter: Words, key: tuple[Words, Words]) -> Words:
     """Philox4x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, 2011).
 
     Args:
         counter: (..., 4) words of 32 bits.
-        key: Two words of 32 bits.
+        key: Two words of 32 bits, each of the counters' leading shape, or one for all.
 
     Returns:
         (..., 4) words of 32 bits.
     """
     c = [counter[..., k] for k in range(4)]
+    shift = np.uint64(32)
     for number in range(10):
-        keys = [np.uint64((k + number * w) & 0xFFFFFFFF) for k, w in zip(key, _WEYL, strict=True)]
+        keys = [(k + np.uint64(number * w)) & _WORD for k, w in zip(key, _WEYL, strict=True)]
         a, b = c[0] * _MULTIPLIERS[0], c[2] * _MULTIPLIERS[1]
-        shift = np.uint64(32)
         c = [(b >> shift) ^ c[1] ^ keys[0], b & _WORD, (a >> shift) ^ c[3] ^ keys[1], a & _WORD]
     return np.stack(c, axis=-1)
+
+
+def byte_sums(seeds: Words, tick: int, joints: int, stream: int = 0) -> Integers:
+    """Whole numbers that are nearly normal, two for every joint.
+
+    Args:
+        seeds: (n,), of 64 bits.
+        tick: Of the walk.
+        joints: J.
+        stream: Keeps apart what is random for other reasons; that of sensors is 0.
+
+    Returns:
+        (n, J, 2) sums of eight bytes, less their mean; the standard deviation is `DEVIATION`.
+    """
+    counter = np.zeros((len(seeds), joints, 4), dtype=np.uint64)
+    counter[..., 0], counter[..., 1], counter[..., 2] = tick, np.arange(joints), stream
+    column = seeds[:, np.newaxis]
+    words = philox(counter, (column & _WORD, column >> np.uint64(32))).astype(np.uint32)
+    each = words.view(np.uint8).reshape(len(seeds), joints, 2, _BYTES)
+    return np.asarray(each.sum(axis=-1, dtype=np.int64) - _MEAN)
 
 
 class Sensors:
@@ -120,14 +143,11 @@ class Sensors:
             Angles and currents, (J,) each. Where a reading of before the walk is asked for, the
             first one.
         """
-        counter = np.zeros((len(angle), 4), dtype=np.uint64)
-        counter[:, 0], counter[:, 1] = self._tick, np.arange(len(angle))
+        seed = np.array([self._errors.seed], dtype=np.uint64)
+        (sums,) = byte_sums(seed, self._tick, len(angle))
         self._tick += 1
-        seed = self._errors.seed
-        words = philox(counter, (seed & 0xFFFFFFFF, seed >> 32)).astype(np.uint32)
-        sums = words.view(np.uint8).reshape(len(angle), 2, _BYTES).sum(axis=2, dtype=np.int64)
         seen = []
         for k, (exact, kept) in enumerate(zip((angle, current), self._kept, strict=True)):
-            kept.append(exact + (sums[:, k] - _MEAN) * self._errors.scales[k])
+            kept.append(exact + sums[:, k] * self._errors.scales[k])
             seen.append(kept[0])
         return seen[0], seen[1]

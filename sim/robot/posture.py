@@ -12,6 +12,31 @@ from sim.robot.robot import Robot
 Floats = NDArray[np.float64]
 
 
+def feet_in_body(robot: Robot, joints: Floats) -> Floats:
+    """Where every tibia's end is in the body's frame.
+
+    Args:
+        robot: The robot.
+        joints: Angles, (J,) [rad].
+
+    Returns:
+        (L, 3) [m].
+    """
+    feet = []
+    angles = joints.reshape(-1, 3).tolist()
+    for leg, (alpha, theta1, theta2) in zip(robot.legs, angles, strict=True):
+        x, y, z = leg.hip
+        outward = leg.coxa + leg.femur * math.cos(theta1) + leg.tibia * math.cos(theta1 + theta2)
+        feet.append(
+            (
+                x + outward * math.sin(alpha),
+                y + leg.side * outward * math.cos(alpha),
+                z + leg.femur * math.sin(theta1) + leg.tibia * math.sin(theta1 + theta2),
+            )
+        )
+    return np.array(feet)
+
+
 def feet_below_body(robot: Robot, joints: Floats) -> Floats:
     """Height of every tibia's end in the body's frame.
 
@@ -22,13 +47,7 @@ def feet_below_body(robot: Robot, joints: Floats) -> Floats:
     Returns:
         (L,) [m], mostly negative.
     """
-    angles = joints.reshape(-1, 3)
-    return np.array(
-        [
-            leg.hip[2] + leg.femur * math.sin(theta1) + leg.tibia * math.sin(theta1 + theta2)
-            for leg, (_, theta1, theta2) in zip(robot.legs, angles.tolist(), strict=True)
-        ]
-    )
+    return np.asarray(feet_in_body(robot, joints)[:, 2])
 
 
 def resting_height(robot: Robot, joints: Floats, weight: float) -> float:

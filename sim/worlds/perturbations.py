@@ -5,67 +5,206 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import SimulationInputError
+from sim.kernel.sensors import LARGEST_DELAY
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]
 
+_SEEDS: Final = 2.0**31
+"""Number of seeds that worlds are drawn with."""
 
-def _factor(name: str, low: float, high: float, description: str) -> Variable:
-    """A factor of something that the robot's description gives."""
-    return Variable(
-        name=name, low=low, high=high, unit="1", default=1.0, description=f"Factor of {description}"
+_Limits = tuple[float, float]
+
+
+def _perturbation(
+    name: str,
+    bounds: tuple[float, float],
+    unit: str,
+    description: str,
+    *,
+    limits: _Limits,
+    nominal: float = 0.0,
+    kind: Literal["continuous", "integer"] = "continuous",
+) -> tuple[Variable, _Limits]:
+    """A variable that is drawn within its bounds, and can be simulated within its limits."""
+    low, high = bounds
+    variable = Variable(
+        name=name,
+        low=low,
+        high=high,
+        unit=unit,
+        kind=kind,
+        default=nominal,
+        description=description,
     )
+    return variable, limits
 
 
-def _added(name: str, low: float, high: float, unit: str, description: str) -> Variable:
-    """Something that is added to what the robot or the scenario has."""
-    return Variable(name=name, low=low, high=high, unit=unit, default=0.0, description=description)
+def _factor(
+    name: str,
+    bounds: tuple[float, float],
+    description: str,
+    limits: _Limits = (0.0, 100.0),
+) -> tuple[Variable, _Limits]:
+    return _perturbation(name, bounds, "1", f"Factor of {description}", limits=limits, nominal=1.0)
 
 
-PERTURBATIONS: Final[tuple[Variable, ...]] = (
-    _factor("friction_factor", 0.70, 1.51, "the friction of all feet (table 2.7)."),
-    _factor("stiffness_factor", 0.84, 1.18, "the stiffness of all soles (table 2.7)."),
-    _factor("damping_factor", 0.85, 1.18, "the damping of all soles (table 2.7)."),
-    _factor("sole_factor", 0.89, 1.14, "the length of all soles' springs (table 2.7)."),
-    _factor("body_mass_factor", 0.99, 1.15, "the mass and inertia of the body (table 2.7)."),
-    _added("load_added", 0.0, 0.5, "kg", "Load beside the scenario's (assumed)."),
-    _added("load_ahead", -0.05, 0.05, "m", "Of the whole load, before its place (assumed)."),
-    _added("load_left", -0.03, 0.03, "m", "Of the whole load, left of its place (assumed)."),
-    _added("load_raised", 0.0, 0.05, "m", "Of the whole load, over its place (assumed)."),
+_TABLE: Final = (
+    _factor("friction_factor", (0.70, 1.51), "the friction of all feet (table 2.7)."),
     _factor(
-        "battery_voltage_factor", 0.97, 1.02, "the battery's open-circuit voltage (table 2.7)."
+        "stiffness_factor",
+        (0.84, 1.18),
+        "the stiffness of all soles (table 2.7).",
+        (0.01, 100.0),
+    ),
+    _factor("damping_factor", (0.85, 1.18), "the damping of all soles (table 2.7)."),
+    _factor("sole_factor", (0.89, 1.14), "the length of all soles' springs (table 2.7)."),
+    _factor(
+        "body_mass_factor",
+        (0.99, 1.15),
+        "the mass and inertia of the body (table 2.7).",
+        (0.01, 100.0),
+    ),
+    _perturbation(
+        "load_added", (0.0, 0.5), "kg", "Load beside the scenario's (assumed).", limits=(0.0, 50.0)
+    ),
+    _perturbation(
+        "load_ahead",
+        (-0.05, 0.05),
+        "m",
+        "How far the whole load is before its place (assumed).",
+        limits=(-1.0, 1.0),
+    ),
+    _perturbation(
+        "load_left",
+        (-0.03, 0.03),
+        "m",
+        "How far the whole load is left of its place (assumed).",
+        limits=(-1.0, 1.0),
+    ),
+    _perturbation(
+        "load_raised",
+        (0.0, 0.05),
+        "m",
+        "How far the whole load is over its place (assumed).",
+        limits=(-1.0, 1.0),
     ),
     _factor(
-        "battery_resistance_factor", 0.96, 1.09, "the battery's internal resistance (table 2.7)."
+        "battery_voltage_factor",
+        (0.97, 1.02),
+        "the battery's open-circuit voltage (table 2.7).",
+        (0.01, 10.0),
+    ),
+    _factor(
+        "battery_resistance_factor",
+        (0.96, 1.09),
+        "the battery's internal resistance, by which its voltage sags (table 2.7).",
     ),
     _factor(
         "efficiency_factor",
-        0.41,
-        1.22,
+        (0.41, 1.22),
         "the efficiency of all gearheads, which stays 1 at most (table 2.7).",
+        (0.01, 100.0),
     ),
     _factor(
         "viscous_friction_factor",
-        0.8,
-        1.5,
+        (0.8, 1.5),
         "the viscous friction of all motors and gearheads: cold or worn grease (assumed).",
     ),
-    _added("slope_added", 0.0, 3.0, "deg", "Slope beside the scenario's (assumed)."),
-    Variable(
-        name="slope_added_direction",
-        low=-180.0,
-        high=180.0,
-        unit="deg",
-        default=0.0,
-        description="Where that slope rises, from straight ahead towards the left.",
+    _factor(
+        "backlash_factor",
+        (0.8, 1.2),
+        "the play of all gears, of 2 to 3 degrees as measured; nothing on a robot without play.",
+    ),
+    _perturbation(
+        "angle_noise",
+        (0.0, 1e-3),
+        "rad",
+        "Standard deviation of white noise on the encoders: some ten counts (assumed).",
+        limits=(0.0, 1.0),
+    ),
+    _perturbation(
+        "current_noise",
+        (0.0, 0.05),
+        "A",
+        "Standard deviation of white noise on the current sensors: some six steps (assumed).",
+        limits=(0.0, 10.0),
+    ),
+    _perturbation(
+        "angle_delay",
+        (0.0, 2.0),
+        "ticks",
+        "How late the controller learns angles, in control ticks of 2 ms (assumed).",
+        limits=(0.0, LARGEST_DELAY),
+        kind="integer",
+    ),
+    _perturbation(
+        "current_delay",
+        (0.0, 2.0),
+        "ticks",
+        "How late the controller learns currents, in control ticks of 2 ms (assumed).",
+        limits=(0.0, LARGEST_DELAY),
+        kind="integer",
+    ),
+    _perturbation(
+        "slope_added",
+        (0.0, 3.0),
+        "deg",
+        "Slope beside the scenario's (assumed).",
+        limits=(0.0, 45.0),
+    ),
+    _perturbation(
+        "slope_added_direction",
+        (-180.0, 180.0),
+        "deg",
+        "Where that slope rises, from straight ahead towards the left.",
+        limits=(-180.0, 180.0),
+    ),
+    _perturbation(
+        "start_angle",
+        (0.0, 0.03),
+        "rad",
+        "Standard deviation of the joints' angles at the start (assumed).",
+        limits=(0.0, 0.2),
+    ),
+    _perturbation(
+        "start_height",
+        (0.0, 0.01),
+        "m",
+        "Height of the start above the stance at which the soles carry the weight (assumed).",
+        limits=(0.0, 0.5),
+    ),
+    _perturbation(
+        "start_roll",
+        (-3.0, 3.0),
+        "deg",
+        "Tilt of the body at the start, the left side up (assumed).",
+        limits=(-30.0, 30.0),
+    ),
+    _perturbation(
+        "start_pitch",
+        (-3.0, 3.0),
+        "deg",
+        "Tilt of the body at the start, the front down (assumed).",
+        limits=(-30.0, 30.0),
+    ),
+    _perturbation(
+        "world_seed",
+        (0.0, _SEEDS - 1.0),
+        "1",
+        "Of what is random within the world: sensors' noise, angles at the start.",
+        limits=(0.0, 2.0**53),
+        kind="integer",
     ),
 )
+
+PERTURBATIONS: Final[tuple[Variable, ...]] = tuple(variable for variable, _ in _TABLE)
 """What a world may vary: `default` is nominal, what the model has without it.
 
 Bounds are those that worlds are drawn from where nobody gives others. Factors of table 2.7 span the
@@ -76,26 +215,10 @@ NOMINAL: Final[Mapping[str, float]] = MappingProxyType(
 )
 """Value of each in the world that the model knows."""
 
-_LIMITS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
-    {
-        "friction_factor": (0.0, 100.0),
-        "stiffness_factor": (0.01, 100.0),
-        "damping_factor": (0.0, 100.0),
-        "sole_factor": (0.0, 10.0),
-        "body_mass_factor": (0.01, 100.0),
-        "load_added": (0.0, 50.0),
-        "load_ahead": (-1.0, 1.0),
-        "load_left": (-1.0, 1.0),
-        "load_raised": (-1.0, 1.0),
-        "battery_voltage_factor": (0.01, 10.0),
-        "battery_resistance_factor": (0.0, 100.0),
-        "efficiency_factor": (0.01, 100.0),
-        "viscous_friction_factor": (0.0, 100.0),
-        "slope_added": (0.0, 45.0),
-        "slope_added_direction": (-180.0, 180.0),
-    }
+LIMITS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
+    {variable.name: limits for variable, limits in _TABLE}
 )
-"""Least and largest value of each that can be simulated."""
+"""Least and largest value of each that can be simulated: others' bounds must lie within."""
 
 
 def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
@@ -110,14 +233,14 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
             simulated; names it.
     """
     for name in variables:
-        if name not in _LIMITS:
-            raise SimulationInputError(f"{name}: no perturbation; known are {', '.join(_LIMITS)}")
+        if name not in LIMITS:
+            raise SimulationInputError(f"{name}: no perturbation; known are {', '.join(LIMITS)}")
     if worlds.ndim != 2 or worlds.shape[1] != len(variables):
         raise SimulationInputError(
             f"worlds: shape {worlds.shape} does not match {len(variables)} perturbations"
         )
     for name, column in zip(variables, worlds.T, strict=True):
-        low, high = _LIMITS[name]
+        low, high = LIMITS[name]
         outside = ~((column >= low) & (column <= high))
         if outside.any():
             world = int(np.argmax(outside))
@@ -134,7 +257,7 @@ def sample_worlds(count: int, seed: int, choice: Sequence[Variable] = PERTURBATI
 
     Args:
         count: Of the worlds.
-        seed: Of the streams, >= 0.
+        seed: Of the streams, 0 to 2^64 - 1.
         choice: What is varied, with its bounds.
 
     Returns:
@@ -143,9 +266,10 @@ def sample_worlds(count: int, seed: int, choice: Sequence[Variable] = PERTURBATI
     worlds = np.empty((count, len(choice)))
     for column, variable in zip(worlds.T, choice, strict=True):
         name = int.from_bytes(hashlib.sha256(variable.name.encode()).digest()[:8], "little")
-        share = np.random.Generator(np.random.Philox(key=[seed, name])).random(count)
-        if variable.kind == "continuous":
-            column[:] = variable.low + share * (variable.high - variable.low)
-        else:
+        stream = np.random.Philox(key=np.array([seed, name], dtype=np.uint64))
+        share = np.random.Generator(stream).random(count)
+        if variable.kind == "integer":
             column[:] = np.floor(variable.low + share * (variable.high - variable.low + 1.0))
+        else:
+            column[:] = variable.low + share * (variable.high - variable.low)
     return worlds

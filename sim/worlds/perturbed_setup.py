@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.parameters import Layout, gravity_on
+from sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
 from sim.kernel.walk import WalkSetup
 from sim.robot import Robot
-from sim.robot.posture import feet_below_body, height_on_soles
+from sim.robot.posture import feet_in_body, height_on_soles
 from sim.scenario import Scenario
 from sim.worlds.perturbations import NOMINAL
 
@@ -24,10 +25,14 @@ _SCALED: Final[Mapping[str, tuple[str, ...]]] = {
     "stiffness_factor": ("stiffness", "stick_stiffness"),
     "damping_factor": ("damping", "stick_damping"),
     "sole_factor": ("sole",),
+    "backlash_factor": ("backlash",),
     "battery_voltage_factor": ("supply_voltage",),
     "battery_resistance_factor": ("supply_resistance",),
 }
 """Fields of the kernel's parameters that are a factor's, where a robot has them."""
+
+_START: Final = 1
+"""Stream of a world's seed for the angles at the start."""
 
 
 def perturbed_setups(
@@ -54,13 +59,24 @@ def perturbed_setups(
         name: columns.get(name, np.full(len(worlds), default)) for name, default in NOMINAL.items()
     }
     parameters = _parameters(robot, scenario, nominal.parameters, values)
-    heights = _resting_heights(robot, scenario, nominal, parameters, values)
-    setups = []
-    for packed, height in zip(parameters, heights, strict=True):
-        start = nominal.start.copy()
-        start[2] = height + nominal.drop
-        setups.append(replace(nominal, start=start, parameters=packed))
-    return setups
+    starts = _starts(robot, scenario, nominal, parameters, values)
+    internal_states = np.tile(nominal.internal_state, (len(worlds), 1))
+    if robot.has_backlash:
+        internal_states[:, : robot.n_joints] = starts[:, 7:]
+    drops = nominal.drop + values["start_height"]
+    errors = _sensor_errors(values)
+    rows = zip(starts, internal_states, parameters, drops.tolist(), errors, strict=True)
+    return [
+        replace(
+            nominal,
+            start=start,
+            internal_state=internal_state,
+            parameters=packed,
+            drop=drop,
+            sensors=sensors,
+        )
+        for start, internal_state, packed, drop, sensors in rows
+    ]
 
 
 def _parameters(
@@ -124,18 +140,49 @@ def _gravity(scenario: Scenario, slope: float, direction: float) -> Floats:
     return gravity_on(math.hypot(x, y), math.degrees(math.atan2(y, x)))
 
 
-def _resting_heights(
+def _starts(
     robot: Robot,
     scenario: Scenario,
     nominal: WalkSetup,
     parameters: Floats,
     values: Mapping[str, Floats],
-) -> list[float]:
-    """Height of a level body at which the world's soles carry its weight [m]."""
+) -> Floats:
+    """Positions at which the world's soles carry its weight, and above, (n, 7+J)."""
     slices = Layout(robot).slices
+    starts = np.tile(nominal.start, (len(parameters), 1))
+    seeds = values["world_seed"].astype(np.uint64)
+    deviates = byte_sums(seeds, 0, robot.n_joints, _START)[..., 0] / DEVIATION
+    offsets = values["start_angle"][:, np.newaxis] * deviates
+    starts[:, 7:] += offsets
+    # A jammed leg is held where it begins.
+    jammed = parameters[:, slices["jam_stiffness"]] > 0.0
+    parameters[:, slices["jam_angle"]] += jammed * offsets
     further = (values["body_mass_factor"] - 1.0) * robot.body.mass
     mass = robot.mass + further + (scenario.load + values["load_added"])
     weight = mass * -parameters[:, slices["gravity"]][:, 2]
-    reach = parameters[:, slices["sole"]] - feet_below_body(robot, nominal.start[7:])
-    stiffness = parameters[:, slices["stiffness"]]
-    return [height_on_soles(*row) for row in zip(reach, stiffness, weight.tolist(), strict=True)]
+    tilts = np.radians(np.stack([values["start_roll"], values["start_pitch"]], axis=1))
+    for start, packed, carried, tilt in zip(
+        starts, parameters, weight.tolist(), tilts, strict=True
+    ):
+        start[3:7], up = _attitude(*tilt.tolist())
+        reach = packed[slices["sole"]] - feet_in_body(robot, start[7:]) @ up
+        start[2] = height_on_soles(reach, packed[slices["stiffness"]], carried)
+    starts[:, 2] += nominal.drop + values["start_height"]
+    return starts
+
+
+def _attitude(roll: float, pitch: float) -> tuple[Floats, Floats]:
+    """Rolled, then pitched [rad]: quaternion x y z w, and the world's z in the body's frame."""
+    x, a = math.sin(0.5 * roll), math.cos(0.5 * roll)
+    y, b = math.sin(0.5 * pitch), math.cos(0.5 * pitch)
+    up = [-math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)]
+    return np.array([b * x, y * a, 0.0 - y * x, a * b]), np.array(up)
+
+
+def _sensor_errors(values: Mapping[str, Floats]) -> list[SensorErrors]:
+    names = ("angle_noise", "current_noise", "angle_delay", "current_delay", "world_seed")
+    columns = zip(*(values[name].tolist() for name in names), strict=True)
+    return [
+        SensorErrors(angle, current, round(late_angle), round(late_current), round(seed))
+        for angle, current, late_angle, late_current, seed in columns
+    ]

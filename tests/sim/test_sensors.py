@@ -58,7 +58,7 @@ def words(text: str) -> list[int]:
 )
 def test_philox_gives_the_known_answers(counter: str, key: str, answer: str) -> None:
     """Those of Random123, the authors' library."""
-    first, second = words(key)
+    first, second = np.array(words(key), dtype=np.uint64)
     found = philox(np.array(words(counter), dtype=np.uint64), (first, second))
     assert found.tolist() == words(answer)
 

@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from sim.case import run_together
 from sim.controllers import ControllerName
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
+from sim.kernel.parameters import GRAVITY
 from sim.outcome import Outcome, Status
-from sim.robot import SHIPPED, RobotSource, RobotVariant, load_robot
+from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVariant, load_robot
 from sim.robot.identifiable import with_parameters
 from sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
 from sim.worlds import PERTURBATIONS, WorldWalk, sample_worlds
@@ -28,6 +30,8 @@ Floats = NDArray[np.float64]
 
 PI = {"P": 0.45, "I": 0.1}
 NAMES = tuple(variable.name for variable in PERTURBATIONS)
+MAIN: ControllerName = "fuzzy-pi"
+NOMINAL_VALUES = {v.name: v.default for v in PERTURBATIONS if v.default is not None}
 NOMINAL = np.array([[variable.default for variable in PERTURBATIONS]])
 VARIANTS: dict[str, RobotSource] = {
     "reconstructed": "szabadka2-reconstructed",
@@ -69,9 +73,9 @@ def bits(outcome: Outcome) -> tuple[bytes, bytes]:
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_the_nominal_world_is_the_model_to_the_bit(scenario: Scenario) -> None:
-    walked = case(*NAMES, scenario=scenario, design=PUBLISHED_A, controller="fuzzy-pi")
+    walked = case(*NAMES, scenario=scenario, design=PUBLISHED_A, controller=MAIN)
     assert bits(walked.run(NOMINAL)) == bits(walk(scenario).outcome)
-    unnamed = case(scenario=scenario, design=PUBLISHED_A, controller="fuzzy-pi")
+    unnamed = case(scenario=scenario, design=PUBLISHED_A, controller=MAIN)
     assert bits(unnamed.run(np.empty((1, 0)))) == bits(walk(scenario).outcome)
 
 
@@ -201,6 +205,7 @@ def test_a_gait_out_of_reach_is_so_in_every_world() -> None:
         ({"friction_factor": -0.1}, "friction_factor"),
         ({"body_mass_factor": 0.0}, "body_mass_factor"),
         ({"load_added": math.nan}, "load_added"),
+        ({"angle_delay": 16.0}, "angle_delay"),
         ({"moon": 1.0}, "moon"),
     ],
 )
@@ -219,12 +224,15 @@ def test_worlds_are_drawn_by_seed_and_index_and_variable() -> None:
     assert ((many >= low) & (many <= high)).all()
     shares = (many - low) / (high - low)
     np.testing.assert_allclose(shares.mean(axis=0), 0.5, atol=0.08)
-    np.testing.assert_allclose(shares.std(axis=0), 12.0**-0.5, atol=0.04)
+    even = [v.high - v.low > 2.0 or v.kind == "continuous" for v in PERTURBATIONS]
+    np.testing.assert_allclose(shares[:, even].std(axis=0), 12.0**-0.5, atol=0.04)
     some = PERTURBATIONS[3:7][::-1]
     np.testing.assert_array_equal(sample_worlds(20, seed=7, choice=some), few[:, 3:7][:, ::-1])
     assert not np.array_equal(few, sample_worlds(20, seed=8))
     correlated = np.abs(np.corrcoef(many.T) - np.eye(len(PERTURBATIONS)))
     assert correlated.max() < 0.3
+    delays = many[:, NAMES.index("angle_delay")]
+    assert np.unique(delays, return_counts=True)[1].tolist() == pytest.approx([67] * 3, abs=20)
 
 
 def test_bounds_of_table_2_7_span_the_intervals_of_all_legs() -> None:
@@ -247,12 +255,81 @@ def test_bounds_of_table_2_7_span_the_intervals_of_all_legs() -> None:
 
 
 def test_every_perturbation_matters() -> None:
-    loaded = short_walk(load=1.0)
-    nominal = in_world(loaded, {"slope_added": 1.0}, "szabadka2-reconstructed")
-    for variable in PERTURBATIONS:
-        at = {"slope_added": 1.0} | {variable.name: variable.high}
-        found = in_world(loaded, at, "szabadka2-reconstructed")
-        assert not np.allclose(found, nominal, rtol=1e-9), variable.name
+    others = {"slope_added": 1.0, "start_angle": 0.01, "angle_noise": 1e-4}
+    scenario = short_walk(load=1.0, cycle_time=0.5)
+    # Two ticks are short beside the current's low-pass.
+    values = {v.name: v.high for v in PERTURBATIONS} | {"current_delay": 15.0}
+    rows = [others, *(others | {name: values[name]} for name in NAMES)]
+    worlds = np.array([[(NOMINAL_VALUES | row)[name] for name in NAMES] for row in rows])
+    for robot in (DEFAULT_ROBOT, RobotVariant(backlash=(2.5, 1.0, 1.0))):
+        walked = case(*NAMES, scenario=scenario, robot=robot, design=PUBLISHED_A, controller=MAIN)
+        nominal, *found = walked.run(worlds).objectives
+        same = [
+            v.name
+            for v, objectives in zip(PERTURBATIONS, found, strict=True)
+            if np.allclose(objectives, nominal, rtol=1e-9)
+        ]
+        assert same == (["backlash_factor"] if robot == DEFAULT_ROBOT else [])
+
+
+@pytest.mark.parametrize("robot", [DEFAULT_ROBOT, VARIANTS["backlash"]], ids=["rigid", "play"])
+def test_a_robot_begins_on_its_soles_however_it_is_tilted(robot: RobotSource) -> None:
+    scenario = short_walk(load=1.0, cycle_time=0.4)
+    names, row = world(
+        {"start_roll": 4.0, "start_pitch": -3.0, "start_angle": 0.02, "world_seed": 5.0}
+    )
+    (log,) = case(*names, scenario=scenario, robot=robot).simulate(row, log=True).logs
+    assert log is not None
+    weight = (load_robot(robot).mass + 1.0) * GRAVITY
+    assert log.foot_force[0, :, 2].sum() == pytest.approx(weight, rel=1e-9)
+    roll, pitch = np.radians([4.0, -3.0])
+    turned = Rotation.from_quat(log.base_orientation[0]).apply([[0, 1, 0], [1, 0, 0]])
+    assert turned[0, 2] == pytest.approx(math.cos(pitch) * math.sin(roll))
+    assert turned[1, 2] == pytest.approx(-math.sin(pitch))
+    # The play in the gears is all around the motors' angles.
+    np.testing.assert_array_equal(log.motor_angle[0], log.joint_angle[0])
+
+
+def test_angles_at_the_start_are_off_by_the_worlds_seed() -> None:
+    seeds = np.arange(60.0)
+    names = ("world_seed", "start_angle")
+    worlds = np.stack([seeds, np.full(60, 0.02)], axis=1)
+    scenario = short_walk(cycle_time=0.2)
+    logs = case(*names, scenario=scenario).simulate(worlds, log=True).logs
+    begun = np.array([log.joint_angle[0] - log.desired_angle[0] for log in logs if log])
+    assert begun.shape == (60, 18)
+    assert begun.std() == pytest.approx(0.02, rel=0.06)
+    assert abs(begun.mean()) < 0.002
+    assert np.abs(np.corrcoef(begun.T) - np.eye(18)).max() < 0.55
+
+
+def test_a_start_above_the_stance_is_a_drop() -> None:
+    found = in_world(short_walk(), {"start_height": 0.004})
+    dropped = walk(short_walk(drop=0.004), PI, "pi", robot="szabadka2").outcome
+    np.testing.assert_array_equal(found, dropped.objectives[0])
+
+
+def test_a_jammed_leg_is_held_where_the_world_has_it() -> None:
+    names, row = world({"start_angle": 0.05, "world_seed": 3.0})
+    scenario = short_walk(stuck_leg="right_middle")
+    (log,) = case(*names, scenario=scenario).simulate(row, log=True).logs
+    assert log is not None
+    held = log.joint_angle[:, 6:9]
+    assert np.abs(held[0] - log.desired_angle[0, 6:9]).max() > 0.02
+    assert np.abs(held - held[0]).max() < 0.02
+
+
+def test_what_is_late_or_noisy_in_a_world_is_so_by_its_seed() -> None:
+    noisy = [
+        in_world(short_walk(), {"angle_noise": 2e-3, "world_seed": seed})
+        for seed in (1.0, 1.0, 2.0)
+    ]
+    np.testing.assert_array_equal(noisy[0], noisy[1])
+    assert noisy[0][0] != noisy[2][0]
+    # A stiff drive that learns of its errors late swings.
+    stiff = case("angle_delay", robot="szabadka2", design={"P": 2.0, "I": 0.0})
+    prompt, late = stiff.run(np.array([[0.0], [12.0]])).objectives
+    assert late[2] > 1.5 * prompt[2]
 
 
 @pytest.mark.parametrize("scenario", HELD_OUT, ids=lambda s: s.name)

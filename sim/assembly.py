@@ -17,7 +17,12 @@ from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import Trajectory, desired_angles
 from sim.kernel.native import native_kernel
-from sim.kernel.parameters import gravity_on, internal_state_size, pack_parameters
+from sim.kernel.parameters import (
+    SHOVE_DURATION,
+    gravity_on,
+    internal_state_size,
+    pack_parameters,
+)
 from sim.kernel.walk import Coding, Kernel, Precision, WalkResult, WalkSetup, current_smoothing
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
@@ -41,6 +46,8 @@ KARNOPP_PHYSICS_RATE: Final = 5000
 BACKLASH_PHYSICS_RATE: Final = 40_000
 """Rate [Hz] for robots with backlash: without their rotors, tibias answer soles as damped as those
 of table 2.7 too fast for 20 kHz."""
+
+_SHOVE_TICKS: Final = round(SHOVE_DURATION / CONTROL_PERIOD)
 
 SHORTEST_WALK: Final = 1e-3
 """Distance [m] under which a robot counts as not walking: energy per metre has no value."""
@@ -190,6 +197,8 @@ def plan_walk(
     internal_state = np.zeros(internal_state_size(robot))
     if robot.has_backlash:
         internal_state[:n_joints] = joints
+    shove = round(scenario.shove_at * ticks)
+    shove_ticks = (shove, min(shove + _SHOVE_TICKS, ticks)) if scenario.shove else (0, 0)
     displaced = noise is not None and noise.kind == "angle"
     start = np.concatenate([base, joints])
     parameters = pack_parameters(robot, scenario, timestep, start=joints, displaced=displaced)
@@ -206,6 +215,7 @@ def plan_walk(
         direction=-1 if scenario.direction == "backward" else 1,
         drop=scenario.drop,
         current_smoothing=current_smoothing(robot.description.sensors.current_filter, timestep),
+        shove_ticks=shove_ticks,
         disturbance=None if noise is None else noise.samples(ticks, n_joints),
     )
 

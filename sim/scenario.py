@@ -148,6 +148,23 @@ class Scenario(BaseModel):
         description="Height above its stance from which the robot is dropped at the start [m].",
     )
 
+    shove: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=100.0,
+        description="Horizontal impulse on the body in mid-walk, a constant force for 0.1 s [N s].",
+    )
+    shove_direction: float = Field(
+        default=90.0,
+        ge=-180.0,
+        le=180.0,
+        description="Where the shove pushes, from straight ahead at the start towards the left"
+        " [deg].",
+    )
+    shove_at: float = Field(
+        default=0.5, ge=0.0, lt=1.0, description="Share of the walk at which the shove begins [1]."
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _read_former_names(cls, document: Any) -> Any:
@@ -279,6 +296,7 @@ HELD_OUT: Final[tuple[Scenario, ...]] = (
         slope_direction=-90.0,
     ),
     _BACKWARD,
+    Scenario(name="shove-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, shove=6.0),
 )
 """Walks beside those of table 4.2, for which no design of the thesis was optimized: what a design
 is worth in them shows whether it was made for its scenarios alone."""

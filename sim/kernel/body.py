@@ -68,6 +68,23 @@ def body_of(p: Mapping[str, Sequence[Scalar]]) -> RigidBody:
     return RigidBody(p["base_mass"][0], _triple(p["base_moment"]), tensor)
 
 
+def pushed(state: LinkState, push: Sequence[Scalar]) -> Vector:
+    """What a force on the body adds to the force that the bias takes.
+
+    Args:
+        state: Of the body.
+        push: At the body's origin, along the world's axes [N].
+
+    Returns:
+        In the body's frame [N].
+    """
+    force = add(
+        add(scale(push[0], state.ahead), scale(push[1], cross(state.up, state.ahead))),
+        scale(push[2], state.up),
+    )
+    return scale(-1.0, force)
+
+
 def solved(state: LinkState, inertia: Inertia, force: Force) -> tuple[Motion, Motion]:
     """The body's acceleration under all limbs.
 

@@ -21,6 +21,7 @@ typedef struct {
   const int32_t *desired;       /* ticks x NJ, coded angles */
   const double *disturbance;    /* ticks x NJ, torque on the links [N m]; or NULL */
   SensorErrors sensors;
+  int64_t shove[2]; /* ticks from which on, and up to which, the body is pushed */
   Law law;
   int64_t ticks;
   double fall_height;  /* of the body over the ground [m] */
@@ -65,7 +66,7 @@ typedef struct {
   wide timestep, weight; /* of a physics step [s], and per one of those without a landing */
   Control control;
   Sensors sensors;
-  int filtered, disturbed; /* whether any lane's current or links are */
+  int filtered, disturbed, shoved; /* whether any lane's current, links or body are */
   vec sensed[NJ], smoothing;
   wide sums[N_INTEGRANDS];
   vec peak;
@@ -138,6 +139,7 @@ static void enter(Lanes *s, int k, Call *call, Walker *w)
   set_sensors(&s->sensors, k, &w->sensors);
   if (w->smoothing[0] < 1.0) s->filtered = 1;
   if (w->disturbance) s->disturbed = 1;
+  if (w->shove[1]) s->shoved = 1;
 }
 
 static void leave(Lanes *s, int k, int64_t status)
@@ -167,6 +169,8 @@ static void begin_ticks(Lanes *s, const Coding *c)
     OF_LANE(s->timestep, k) = w->parameters[TIMESTEP] / (double)s->rounds_left[k];
     s->p[TIMESTEP][k] = (real)OF_LANE(s->timestep, k);
     s->smoothing[k] = (real)w->smoothing[landing];
+    const int pushed = w->shove[0] <= s->tick[k] && s->tick[k] < w->shove[1];
+    for (int i = PUSH; i < PUSH + 3; i++) s->p[i][k] = pushed ? (real)w->parameters[i] : 0;
   }
 }
 
@@ -302,8 +306,8 @@ static void round_of_steps(Lanes *s, const Coding *c)
     for (int i = 0; i < NQ; i++)
       for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[i][h]);
 #endif
-    kick(q, s->v, s->internal, s->duty, s->disturbance, s->p, c->robot, s->current, integrands,
-         &largest, &s->landing);
+    kick(q, s->v, s->internal, s->duty, s->disturbance, s->p, c->robot, s->shoved,
+         s->current, integrands, &largest, &s->landing);
     for (int h = 0; h < HALVES; h++) drift(s, h, left ? 1.0 : 0.5);
     for (int i = 0; i < N_INTEGRANDS; i++)
       for (int h = 0; h < HALVES; h++)

@@ -94,6 +94,7 @@ class Walker(ctypes.Structure):
         ("desired", ctypes.c_void_p),
         ("disturbance", ctypes.c_void_p),
         ("sensors", _SensorErrors),
+        ("shove", 2 * ctypes.c_int64),
         ("law", _Law),
         ("ticks", ctypes.c_int64),
         ("fall_height", ctypes.c_double),
@@ -260,6 +261,7 @@ class NativeKernel:
             )
             errors = setup.sensors
             walker.sensors = _SensorErrors(errors.scales, errors.delays, errors.seed)
+            walker.shove[:] = setup.shove_ticks
             walker.law = addresses.law(setup.control_law)
             walker.ticks = setup.ticks
             walker.fall_height = setup.fall_height

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.kernel.parameters import Layout
 from sim.kernel.walk import WalkSetup, current_smoothing
 from sim.robot import Robot
 
@@ -92,7 +93,11 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         disturbance = np.zeros_like(angle) if setup.disturbance is None else setup.disturbance
         q = np.concatenate([position, orientation, angle], axis=1)
         inputs = (q, np.concatenate([twist, rate], axis=1), internal_state, duty, disturbance)
-        parts = observe.map(walked)(*(part[:walked].T for part in inputs), setup.parameters)
+        begin, end = setup.shove_ticks
+        parameters = np.tile(setup.parameters, (walked, 1))
+        pushes = Layout(robot).slices["push"]
+        parameters[:begin, pushes] = parameters[end:, pushes] = 0.0
+        parts = observe.map(walked)(*(part[:walked].T for part in inputs), parameters.T)
         for target, part in zip(seen, parts, strict=False):
             target[:walked] = np.array(part).T
     current, voltage, load, force, supply = seen

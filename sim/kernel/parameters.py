@@ -26,6 +26,9 @@ JAM_STIFFNESS: Final = 2000.0
 JAM_DAMPING: Final = 10.0
 """Of the same [N m s/rad]: about half of what damps a coxa's rotor on it critically."""
 
+SHOVE_DURATION: Final = 0.1
+"""For which a shove's force is constant [s]."""
+
 Floats = NDArray[np.float64]
 
 
@@ -85,9 +88,10 @@ class Layout:
     field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
     xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
     supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every
-    joint (J each), backlash (J, if the robot has any) and displaced (1, likewise: whether
-    disturbances are angles), static_friction (J, if the robot has any), and by foot (L each) the
-    parameters of the contact law.
+    joint (J each), push (3: force on the body's origin along the world's axes, during a shove),
+    backlash (J, if the robot has any) and displaced (1, likewise: whether disturbances are angles),
+    static_friction (J, if the robot has any), and by foot (L each) the parameters of the contact
+    law.
 
     Args:
         robot: The robot.
@@ -113,13 +117,14 @@ class Layout:
             "jam_stiffness": n_joints,
             "jam_damping": n_joints,
             "jam_angle": n_joints,
+            "push": 3,
             "backlash": n_joints if robot.has_backlash else 0,
             "displaced": 1 if robot.has_backlash else 0,
             "static_friction": n_joints if robot.has_static_friction else 0,
             **dict.fromkeys(law.parameters, n_feet),
         }
         limb = {n_joints: JOINTS_PER_LEG, n_feet: 1}
-        whole = ("timestep", "gravity", "displaced", *_OF_THE_BODY)
+        whole = ("timestep", "gravity", "push", "displaced", *_OF_THE_BODY)
         self.by_limb: Mapping[str, int] = {
             name: limb.get(length, 0) for name, length in lengths.items() if name not in whole
         }
@@ -148,6 +153,12 @@ class Layout:
         for name, where in self.slices.items():
             packed[where] = values[name]
         return packed
+
+
+def _towards(direction: float) -> Floats:
+    """Unit vector along the ground, counted from x to y [deg]."""
+    towards = math.radians(direction)
+    return np.array([math.cos(towards), math.sin(towards), 0.0])
 
 
 def gravity_on(slope: float, direction: float = 0.0) -> Floats:
@@ -185,7 +196,7 @@ def pack_parameters(
 
     Args:
         robot: The robot.
-        scenario: Its load and slope count.
+        scenario: Its load, slope and shove count.
         timestep: Of the physics [s].
         start: Angles at which the walk begins, where a jammed leg is held, (J,) [rad]; zero if
             left out.
@@ -226,6 +237,7 @@ def pack_parameters(
         jam_stiffness=JAM_STIFFNESS * jammed,
         jam_damping=JAM_DAMPING * jammed,
         jam_angle=angles * jammed,
+        push=scenario.shove / SHOVE_DURATION * _towards(scenario.shove_direction),
         backlash=actuators.backlash if robot.has_backlash else np.empty(0),
         displaced=float(displaced) if robot.has_backlash else np.empty(0),
         static_friction=(actuators.static_friction if robot.has_static_friction else np.empty(0)),

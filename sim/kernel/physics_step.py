@@ -16,11 +16,12 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from sim.kernel.body import body_integrands, body_of, body_state, drifted, solved
+from sim.kernel.body import body_integrands, body_of, body_state, drifted, pushed, solved
 from sim.kernel.electrical import supply_voltage
+from sim.kernel.inertia import Force
 from sim.kernel.limb import After, Before, Environment, LimbState, after, before
 from sim.kernel.parameters import Layout, internal_state_size
-from sim.kernel.spatial import Scalar
+from sim.kernel.spatial import Scalar, add
 from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.inertia import BodyInertia
@@ -212,6 +213,7 @@ def _step(
         for k, limb in enumerate(limbs)
     ]
     inertia, force = own.inertia(), body.force(own)
+    force = Force(add(force.linear, pushed(body, s.p["push"])), force.angular)
     for limb in befores:
         inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
     falling, true = solved(body, inertia, force)

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from sim.kernel.articulated_body import LinkState
-from sim.kernel.body import body_integrands, body_of, body_state, solved
+from sim.kernel.body import body_integrands, body_of, body_state, pushed, solved
 from sim.kernel.electrical import supply_voltage
 from sim.kernel.emit_c import emit_c
 from sim.kernel.inertia import Force, Inertia, Motion
@@ -29,6 +29,9 @@ from sim.robot.limbs import Limb, limbs_of
 
 _PASSED: Final = 27
 """Numbers that a limb passes to the body: an inertia (6 + 9 + 6), and a force (6)."""
+
+_FORCE: Final = 21
+"""Where among them the force begins."""
 
 _N_TALLIES: Final = 7
 
@@ -72,6 +75,7 @@ class _Pieces:
         before_body = self._emit(
             "before_limbs", self._before_limbs(), ["body", "gathered", "&supply"]
         )
+        push = self._emit("push_body", self._push_body(), [f"gathered + {_FORCE}"])
         solve = self._emit("solve_body", self._solve_body(), ["falling", "v", "of_body"])
         limb_calls = self._limb_pieces()
         counts = [len(kind.numbers_of(limb)) for limb, kind in self._by_limb()]
@@ -87,6 +91,7 @@ class _Pieces:
                     starts=", ".join(map(str, starts[:-1])),
                     kinds=", ".join(str(self._distinct.index(kind)) for kind in self._kinds),
                     before_limbs=before_body,
+                    push_body=push,
                     solve_body=solve,
                     body=len(_body_numbers()),
                     passed=_PASSED,
@@ -192,6 +197,11 @@ class _Pieces:
         numbers = [leaf for leaf in leaves(state) if _varies(leaf)]
         gathered = [*_triangles(body.inertia()), *leaves(state.force(body))]
         return self._function(inputs, [numbers, gathered, [supply]], symbols)
+
+    def _push_body(self) -> tuple[Any, list[str]]:
+        inputs = {"body": _Input(len(_body_numbers()), "body"), "push": self._p("push")}
+        symbols, s = _symbols(inputs)
+        return self._function(inputs, [pushed(_body_of(s["body"]), s["push"])], symbols, added=0)
 
     def _solve_body(self) -> tuple[Any, list[str]]:
         inputs = {
@@ -327,15 +337,19 @@ def _passed_of(numbers: Sequence[Scalar]) -> tuple[Inertia, Force]:
 
 _KICK: Final = """\
 /* Changes velocities by a step at fixed positions; currents, integrands and the largest current are
-   those of its middle. landing: 1 if a foot may come down within a control tick. */
+   those of its middle. landing: 1 if a foot may come down within a control tick. shoved: whether
+   any walker's body may be pushed. */
 static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec *disturbance,
-                 const vec *p, const double *robot, vec *current, vec *integrands,
+                 const vec *p, const double *robot, int shoved, vec *current, vec *integrands,
                  vec *largest, vec *landing)
 {{
   static const int start[{limbs}] = {{ {starts} }}, kind[{limbs}] = {{ {kinds} }};
   vec body[{body}], supply, held[{limbs}][{held}], gathered[{passed}];
   vec spun[{joints}], carried[4], falling[6], of_body[3], tallies[{tallies}], total[5];
   {before_limbs}
+  if (shoved) {{
+    {push_body}
+  }}
   for (int l = 0; l < {limbs}; l++) {{
     switch (kind[l]) {{
 {before_calls}

@@ -85,6 +85,7 @@ class ReferenceKernel:
                 rows.append(np.concatenate([step.q, step.v, step.internal_state, step.duty]))
             refinement = coding.refinement if step.landing[0] > 0.0 else 1
             step.refine(refinement)
+            step.push(tick)
             rounds += refinement
             for _ in range(refinement):
                 step.drift(0.5)
@@ -122,6 +123,8 @@ class Stepper:
         self.landing = np.zeros(1)
         self._at = model.layout.slices["timestep"]
         self._timestep = float(setup.parameters[self._at][0])
+        self._push_at, self._shove_ticks = model.layout.slices["push"], setup.shove_ticks
+        self._push = setup.parameters[self._push_at]
         self._time = np.zeros(1)
         kicked = [np.zeros_like(array) for array in (self.v, self.internal_state)]
         drifted = [np.zeros_like(array) for array in (self.q, self.internal_state)]
@@ -134,6 +137,15 @@ class Stepper:
         self._drift = _buffered(model.drift, [*state, self._time], drifted)
         self._kicked = list(zip((self.v, self.internal_state), kicked, strict=True))
         self._drifted = list(zip((self.q, self.internal_state), drifted, strict=True))
+
+    def push(self, tick: int) -> None:
+        """Let the shove's force act, or not.
+
+        Args:
+            tick: Of the walk.
+        """
+        begin, end = self._shove_ticks
+        self.parameters[self._push_at] = self._push * (begin <= tick < end)
 
     def refine(self, refinement: int) -> None:
         """Set the length of the steps that follow.

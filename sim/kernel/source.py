@@ -80,6 +80,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             f"#define NI {internal_state_size(robot)}",
             f"#define BACKLASH {int(robot.has_backlash)}",
             f"#define TIMESTEP {layout.slices['timestep'].start}",
+            f"#define PUSH {layout.slices['push'].start}",
             *(["#define SINGLE"] if precision == "single" else []),
             vector_header(),
             pieces,

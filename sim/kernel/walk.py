@@ -132,6 +132,7 @@ class WalkSetup:
         current_smoothing: share of its distance from the absolute current that the analog
             low-pass of the current goes in a physics step; 1 for no low-pass [1].
         sensors: what they get wrong.
+        shove_ticks: control ticks from which on, and up to which, the parameter `push` acts.
     """
 
     start: Floats
@@ -147,6 +148,7 @@ class WalkSetup:
     drop: float = 0.0
     current_smoothing: float = 1.0
     sensors: SensorErrors = NO_ERRORS
+    shove_ticks: tuple[int, int] = (0, 0)
 
     def smoothing(self, refinement: int) -> float:
         """The analog low-pass over a shorter step.

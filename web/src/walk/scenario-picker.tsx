@@ -47,13 +47,14 @@ export function ScenarioPicker({
 
 /** A scenario's name with what sets it apart. */
 function described(scenario: Scenario | ScenarioPreset): string {
-  const { name, cycle_time, load, slope, turn, direction, drop, stuck_leg } = scenario
+  const { name, cycle_time, load, slope, turn, direction, drop, stuck_leg, shove } = scenario
   const parts = [`cycle ${formatExact(cycle_time)} s`]
   if (load) parts.push(`load ${formatExact(load)} kg`)
   if (slope) parts.push(`slope ${formatExact(slope)}°`)
   if (direction === 'backward') parts.push('backward')
   if (drop) parts.push(`drop ${formatExact(drop * 1e3)} mm`)
   if (stuck_leg) parts.push(`${stuck_leg.replaceAll('_', ' ')} leg stuck`)
+  if (shove) parts.push(`shove ${formatExact(shove)} N s`)
   if (turn) parts.push(`turn ${formatExact(turn)}`)
   return `${name} (${parts.join(', ')})`
 }

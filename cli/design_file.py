@@ -1,18 +1,104 @@
-"""Designs from files, for `simulate` and `plot`."""
+"""Designs as commands are given them: files, published names, ids of jobs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from cli.spec_file import read_json_object
-from services.optimizer.errors import InvalidRequest
-from sim.controllers import CONTROLLERS, Controller
+from services.optimizer.errors import InvalidRequest, NotFound
+from sim.controllers import CONTROLLERS, Controller, ControllerName
 from sim.scenario import GAIT_VARIABLES
 from sim.variables import Variable
 
+if TYPE_CHECKING:
+    from services.optimizer.jobs.tuning import JobSpec
+
 _PUBLISHED: Final = "published:"
+_JOB: Final = "job:"
+_DEFAULT_CONTROLLER: Final = "fuzzy-pi"
+
+
+@dataclass(frozen=True, slots=True)
+class GivenDesign:
+    """A design from a file, from the literature, or a job's best.
+
+    Attributes:
+        label: what people call it.
+        controller: that it is a design of.
+        values: by name, in the variables' units; of a categorical variable the index of a choice.
+        spec: of the job whose best it is, with its robot, scenarios and variables; None for a
+            design from elsewhere.
+    """
+
+    label: str
+    controller: ControllerName
+    values: dict[str, float]
+    spec: JobSpec | None = None
+
+
+def given_design(
+    given: str, controller: str | None, *, server: str | None, db: str | None
+) -> GivenDesign:
+    """The design that an argument DESIGN|ID names.
+
+    Args:
+        given: `published:NAME`, a file, `-` for standard input, or the id of a job that tunes a
+            drive; `job:ID` is always a job, whatever files there are.
+        controller: of the design; None for the job's, or for fuzzy-pi.
+        server: URL of the server to ask for the job, or None.
+        db: database to look for it, or None.
+
+    Returns:
+        The design, its numbers not checked yet.
+
+    Raises:
+        InvalidRequest: it is no design of the controller, or the job tunes no drive; names the
+            field.
+        NotFound: no such job, or none of its designs has walked in every scenario.
+    """
+    if not given.startswith((_PUBLISHED, _JOB)) and _is_file(given):
+        return _from_elsewhere(given, Path(given).stem, controller)
+    if given.startswith(_PUBLISHED):
+        return _from_elsewhere(given, f"published {given.removeprefix(_PUBLISHED)}", controller)
+    return _best_of_job(given.removeprefix(_JOB), controller, server, db)
+
+
+def _is_file(given: str) -> bool:
+    return given == "-" or given.endswith(".json") or Path(given).exists()
+
+
+def _from_elsewhere(given: str, label: str, controller: str | None) -> GivenDesign:
+    chosen = _controller_name(controller or _DEFAULT_CONTROLLER)
+    return GivenDesign(label, chosen, read_design(given, chosen))
+
+
+def _best_of_job(
+    job_id: str, controller: str | None, server: str | None, db: str | None
+) -> GivenDesign:
+    from gaitswarm.jobs.open import open_jobs
+    from services.optimizer.jobs.tuning import JobSpec
+    from sim.catalogue import design_numbers
+
+    with open_jobs(server, db) as jobs:
+        try:
+            spec = jobs.job(job_id).spec
+        except NotFound as error:
+            hint = "a design is the id of a job, a file, or published:NAME"
+            raise NotFound(f"{error}; {hint}") from error
+        if not isinstance(spec, JobSpec):
+            raise InvalidRequest(
+                f"job {job_id} is of kind {spec.kind}, which tunes no drive", field="design"
+            )
+        best = jobs.best(job_id)
+    if controller not in (None, spec.controller):
+        raise InvalidRequest(
+            f"job {job_id} tunes {spec.controller}; leave the option out", field="controller"
+        )
+    values = design_numbers(spec.controller, best.design)
+    return GivenDesign(spec.name or f"job {job_id}", spec.controller, values, spec)
 
 
 def read_design(design: str, controller: str, trajectory: Path | None = None) -> dict[str, Any]:
@@ -57,9 +143,13 @@ def _read_values(design: str, controller: str) -> dict[str, Any]:
 
 
 def _controller(name: str) -> Controller:
-    for known, controller in CONTROLLERS.items():
+    return CONTROLLERS[_controller_name(name)]
+
+
+def _controller_name(name: str) -> ControllerName:
+    for known in CONTROLLERS:
         if known == name:
-            return controller
+            return known
     raise InvalidRequest(
         f"unknown controller {name!r}; known are {', '.join(CONTROLLERS)}", field="controller"
     )

@@ -1,0 +1,73 @@
+"""A design is given as a published name, a file, standard input, or a job's id."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.design_file import GivenDesign, given_design
+from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.store.sql_store import SqlStore
+from tests.calibration.conftest import spec as calibration
+from tests.cli.conftest import Finished, WriteJson
+from tests.examples.walks import PUBLISHED_A
+
+
+def given(text: str, db: Path | None = None, controller: str | None = None) -> GivenDesign:
+    return given_design(text, controller, server=None, db=None if db is None else str(db))
+
+
+def test_published_designs_are_named_with_their_controller() -> None:
+    optimum = given("published:A")
+    assert (optimum.label, optimum.controller) == ("published A", "fuzzy-pi")
+    assert (optimum.values, optimum.spec) == (PUBLISHED_A, None)
+    chapter_3 = given("published:pi-pso-ps", controller="pi")
+    assert (chapter_3.controller, chapter_3.values["P"]) == ("pi", 0.454)
+
+
+def test_a_file_is_read(write_json: WriteJson) -> None:
+    path = write_json({"design": {"P": 0.4, "I": 0.1}}, "stiff.json")
+    found = given(str(path), controller="pi")
+    assert (found.label, found.values) == ("stiff", {"P": 0.4, "I": 0.1})
+
+
+@pytest.mark.slow
+def test_a_job_gives_its_best_with_the_spec_that_found_it(finished: Finished) -> None:
+    found = given(finished.id, finished.db)
+    assert found == given(f"job:{finished.id}", finished.db)
+    assert found.spec is not None
+    assert (found.label, found.controller) == ("small", "fuzzy-pi")
+    assert found.values == finished.job["best"]["design"]
+    assert [scenario.name for scenario in found.spec.resolved_scenarios()] == ["short"]
+
+
+@pytest.mark.slow
+def test_a_file_goes_before_a_job_of_its_name_unless_the_job_is_said(
+    finished: Finished, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(finished.id).write_text(json.dumps(PUBLISHED_A), encoding="utf-8")
+    assert given(finished.id, finished.db).spec is None
+    assert given(f"job:{finished.id}", finished.db).spec is not None
+
+
+@pytest.mark.slow
+def test_a_controller_that_is_not_the_jobs_is_refused(finished: Finished) -> None:
+    with pytest.raises(InvalidRequest, match="tunes fuzzy-pi") as refused:
+        given(finished.id, finished.db, controller="pi")
+    assert refused.value.field == "controller"
+
+
+def test_what_is_neither_job_nor_file_says_what_there_could_be(database: Path) -> None:
+    with pytest.raises(NotFound, match="the id of a job, a file, or published:NAME"):
+        given("nowhere", database)
+    with pytest.raises(InvalidRequest, match="known are A, B, C"):
+        given("published:D")
+
+
+def test_a_job_that_tunes_no_drive_has_no_design(store: SqlStore, database: Path) -> None:
+    job, _ = store.create_job(calibration())
+    with pytest.raises(InvalidRequest, match="kind calibration, which tunes no drive"):
+        given(job.id, database)

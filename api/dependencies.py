@@ -188,3 +188,22 @@ def check_length(settings: Settings, seconds: float, *, logged: bool, field: str
             f"{' with logs' if logged else ''}; choose fewer scenarios or cycles",
             field=field,
         )
+
+
+def check_sampled_length(settings: Settings, seconds: float) -> None:
+    """Refuse a sample of designs whose walks last too long together.
+
+    Args:
+        settings: with the limit.
+        seconds: simulated time of all walks of all designs [s].
+
+    Raises:
+        InvalidRequest: they last longer than the settings allow.
+    """
+    limit = settings.api_max_sampled_seconds
+    if seconds > limit:
+        raise InvalidRequest(
+            f"the walks of all designs last {seconds:g} s together, more than the {limit:g} s"
+            " allowed; choose fewer samples or scenarios",
+            field="samples",
+        )

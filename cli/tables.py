@@ -39,7 +39,7 @@ _STYLES: Final = {
 }
 
 
-_SHORT: Final = {
+SHORT: Final = {
     "torque": "torque",
     "acceleration": "accel.",
     "angular_acceleration": "ang.acc.",
@@ -136,7 +136,7 @@ def results_table(
     table.add_column("status")
     table.add_column("utility", justify="right")
     for objective in objectives:
-        heading = _SHORT.get(objective.name, objective.name.replace("_", " "))
+        heading = SHORT.get(objective.name, objective.name.replace("_", " "))
         table.add_column(f"{heading}\n{objective.unit}", justify="right")
     for scenario in next(iter(designs.values())):
         if len(designs) > 1:

@@ -41,7 +41,8 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.port import JobEvent, Jobs
     from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.optimization import OptimizationResult, optimize, optimizers
-    from gaitswarm.simulation import simulate
+    from gaitswarm.requests.robustness import RobustnessOptions
+    from gaitswarm.simulation import robustness, simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
     from gaitswarm.specs import SpecOptions
     from gaitswarm.tables import EvaluationTable, Table
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.replay import WalkReplay
+    from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
     from gaitswarm.views.tournament import (
         ProblemRunsView,
@@ -160,6 +162,8 @@ __all__ = [
     "RecordedWalk",
     "RobotFiles",
     "RobotVariant",
+    "RobustnessOptions",
+    "RobustnessView",
     "Scenario",
     "ScenarioResult",
     "ServerJobs",
@@ -189,6 +193,7 @@ __all__ = [
     "open_async",
     "optimize",
     "optimizers",
+    "robustness",
     "simulate",
 ]
 
@@ -206,7 +211,8 @@ _MODULES: Final = {
     "gaitswarm.jobs.port": ("JobEvent", "Jobs"),
     "gaitswarm.jobs.server": ("ServerJobs",),
     "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
-    "gaitswarm.simulation": ("simulate",),
+    "gaitswarm.requests.robustness": ("RobustnessOptions",),
+    "gaitswarm.simulation": ("robustness", "simulate"),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
     "gaitswarm.specs": ("SpecOptions",),
     "gaitswarm.tables": ("EvaluationTable", "Table"),
@@ -217,6 +223,7 @@ _MODULES: Final = {
     "gaitswarm.views.calibration": ("TargetsView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.replay": ("WalkReplay",),
+    "gaitswarm.views.robustness": ("RobustnessView",),
     "gaitswarm.views.surface": ("SurfaceView",),
     "gaitswarm.views.tournament": (
         "ProblemRunsView", "TournamentStandingsView", "TournamentView",

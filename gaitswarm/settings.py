@@ -74,6 +74,11 @@ class Settings(BaseSettings):
     api_max_logged_seconds: float = Field(
         default=40.0, gt=0.0, description="The same for a request that asks for logs [s]."
     )
+    api_max_sampled_seconds: float = Field(
+        default=10_000.0,
+        gt=0.0,
+        description="The same for a request that walks a sample of designs [s].",
+    )
     api_shutdown_seconds: int = Field(
         default=5, ge=1, le=600, description="How long open requests may finish on shutdown [s]."
     )

@@ -1,16 +1,17 @@
-"""`gaitswarm.simulate`: designs walking here and now, outside any job."""
+"""`gaitswarm.simulate` and `robustness`: designs walking here and now, outside any job."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
-from typing import Final, Protocol, TypeAlias, get_args
+from typing import Final, Protocol, TypeAlias, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaitswarm.errors import InvalidRequest, simulation_errors
 from gaitswarm.requests import arguments
+from gaitswarm.requests.robustness import Progress, RobustnessOptions, run_robustness
 from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
@@ -18,6 +19,7 @@ from gaitswarm.specs import (
     RobotInput,
     ScenarioInput,
 )
+from gaitswarm.views.robustness import RobustnessView
 from services.optimizer.jobs.preference import judge
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.runtime import open_evaluator
@@ -119,6 +121,39 @@ def simulate(
         raise InvalidRequest("must be at least 1", field="cpus")
     with simulation_errors("designs"):
         return _simulated(request, variables, rows, backend, cpus)
+
+
+def robustness(
+    design: Mapping[str, float | str],
+    *,
+    cpus: int | None = None,
+    progress: Progress | None = None,
+    **options: Unpack[RobustnessOptions],
+) -> RobustnessView:
+    """Estimate how robust a design is against small changes of its variables (thesis 4.4.3).
+
+    The index is the Frobenius norm of the Jacobian of the objectives' logarithms, f1 to f5 of table
+    4.1, by the variables as shares of their bounds: the smaller, the more robust. It comes from a
+    linear regression over designs that are drawn around the given one, as objectives are not
+    smooth.
+
+    Args:
+        design: Value of each of the controller's variables, and of any gait variable, in the
+            variables' units.
+        cpus: Walks to compute at once; default all processors.
+        progress: Called now and then with how many of how many walks are done.
+        **options: Walks and sample, see `RobustnessOptions`.
+
+    Returns:
+        The index with its interval, by scenario, objective and variable.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
+    """
+    request = arguments.robustness(design, options)
+    with simulation_errors("design"):
+        return run_robustness(request, cpus=cpus, progress=progress)
 
 
 def simulate_request(request: SimulationRequest) -> SimulationResult:

@@ -1,4 +1,4 @@
-"""One design walking on request: what it is worth, and how it looks."""
+"""One design walking on request: what it is worth, how robust it is, and how it looks."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import Final
 
 from fastapi import APIRouter, Response
 
-from api.dependencies import ServerSettings, Slots, check_length
+from api.dependencies import ServerSettings, Slots, check_length, check_sampled_length
 from api.documentation import binary, problems
 from gaitswarm.requests.replay import ReplayRequest, run_replay
+from gaitswarm.requests.robustness import RobustnessRequest, run_robustness
 from gaitswarm.requests.walk import SimulationRequest, resolved, run_simulation
 from gaitswarm.views import PREFIX, SimulationView
 from gaitswarm.views.base import MEDIA_TYPE
+from gaitswarm.views.robustness import RobustnessView
 
 router = APIRouter(prefix=PREFIX, tags=["simulations"])
 
@@ -43,6 +45,27 @@ async def simulate_design(
     seconds = request.simulated_seconds(request.resolved_scenarios())
     check_length(settings, seconds, logged=request.log, field="scenarios")
     body = await slots.run(partial(_simulated, request))
+    return Response(body, media_type="application/json")
+
+
+@router.post(
+    "/robustness",
+    operation_id="estimate_robustness",
+    summary="Estimate how robust one design is",
+    response_model=RobustnessView,
+    responses=problems(400, 413, 422),
+)
+async def estimate_robustness(
+    request: RobustnessRequest, settings: ServerSettings, slots: Slots
+) -> Response:
+    """Let a design and others around it walk, and estimate the norm of the Jacobian of the
+    objectives with respect to the variables, both normalised (thesis 4.4.3).
+
+    Nothing is stored. The answer waits for the walks, so the time walked is limited.
+    """
+    seconds = request.simulated_seconds(request.resolved_scenarios())
+    check_sampled_length(settings, seconds * (1 + request.samples))
+    body = await slots.run(lambda: run_robustness(request).model_dump_json())
     return Response(body, media_type="application/json")
 
 

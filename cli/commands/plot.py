@@ -1,13 +1,25 @@
-"""`gaitswarm plot`: pictures of a job's convergence and of a fuzzy controller's surface."""
+"""`gaitswarm plot`: pictures of a job's convergence, of a controller, and of robustness."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, JobId, Server
+from cli.commands.robustness import (
+    DesignController,
+    Radius,
+    Samples,
+    Scenarios,
+    Seed,
+    estimate,
+    robustness_request,
+)
+from cli.options import Db, JobId, Precision, RobotOption, Server
+
+if TYPE_CHECKING:
+    from gaitswarm.requests.robustness import RobustnessRequest
 
 Output = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.png, .svg or .pdf.")
@@ -16,9 +28,12 @@ Output = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the group of commands."""
-    plots = typer.Typer(help="Draw a job's convergence or a controller's surface.")
+    plots = typer.Typer(
+        help="Draw a job's convergence, a controller's surface, or how robust designs are."
+    )
     plots.command()(convergence)
     plots.command()(surface)
+    plots.command()(robustness)
     app.add_typer(plots, name="plot")
 
 
@@ -55,4 +70,49 @@ def surface(
     title = f"Fuzzy-P of design {design.rpartition(':')[2] if ':' in design else Path(design).stem}"
     drawn = surface_of(inference, error_points=129, current_points=65)
     save(draw_surface(drawn, title=title), output)
+    note(f"picture written to {output}")
+
+
+def robustness(
+    designs: Annotated[
+        list[str], typer.Argument(metavar="DESIGN|ID", help="One or several, as for `robustness`.")
+    ],
+    output: Output,
+    samples: Samples = 256,
+    radius: Radius = 0.02,
+    seed: Seed = 1,
+    scenarios: Scenarios = None,
+    controller: DesignController = None,
+    robot: RobotOption = None,
+    precision: Precision = None,
+    title: Annotated[str, typer.Option(help="Of the picture.")] = "Robustness",
+    server: Server = None,
+    db: Db = None,
+) -> None:
+    """Draw designs' robustness indices by scenario side by side, with their intervals."""
+    from cli.design_file import given_design
+    from cli.output import note
+    from cli.plots import save
+    from cli.robustness_tables import draw_robustness
+    from services.optimizer.errors import InvalidRequest
+
+    requests: dict[str, RobustnessRequest] = {}
+    for design in designs:
+        given = given_design(design, controller, server=server, db=db)
+        label = f"{given.label} ({design})" if given.label in requests else given.label
+        requests[label] = robustness_request(
+            given,
+            samples=samples,
+            radius=radius,
+            seed=seed,
+            scenarios=scenarios,
+            robot=robot,
+            precision=precision,
+        )
+    if len({request.resolved_scenarios() for request in requests.values()}) > 1:
+        raise InvalidRequest(
+            "the designs' jobs have different ones; choose some", field="scenarios"
+        )
+    views = {label: estimate(request) for label, request in requests.items()}
+    save(draw_robustness(views, title=title), output)
     note(f"picture written to {output}")

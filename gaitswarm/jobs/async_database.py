@@ -14,6 +14,7 @@ from anyio.lowlevel import checkpoint
 from gaitswarm.jobs.async_port import AsyncJobs
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.port import JobEvent
+from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
     PreferenceInput,
@@ -35,6 +36,7 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
+from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from services.optimizer.analysis.targets import LeaveOut
@@ -300,6 +302,13 @@ class AsyncDatabaseJobs(AsyncJobs):
             log=log,
         )
         return await to_thread.run_sync(call)
+
+    async def robustness(
+        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
+    ) -> RobustnessView:
+        """Let designs around one walk in threads of this process."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.robustness, design, **options))
 
     async def replay(
         self,

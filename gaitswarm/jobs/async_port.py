@@ -14,6 +14,7 @@ from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
+    from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import (
         PreferenceInput,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
     from gaitswarm.views.replay import WalkReplay
+    from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
     from gaitswarm.views.tournament import (
         ProblemRunsView,
@@ -202,6 +204,12 @@ class AsyncJobs(ABC):
         log: bool = False,
     ) -> SimulationResult:
         """Let one design walk where the jobs are."""
+
+    @abstractmethod
+    async def robustness(
+        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
+    ) -> RobustnessView:
+        """Estimate where the jobs are how robust a design is."""
 
     @abstractmethod
     async def replay(

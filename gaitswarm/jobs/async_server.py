@@ -27,6 +27,7 @@ from gaitswarm.jobs.calls import Call
 from gaitswarm.jobs.port import JobEvent
 from gaitswarm.jobs.server import TIMEOUT, request_of, server_url
 from gaitswarm.requests import arguments
+from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
     PreferenceInput,
@@ -51,6 +52,7 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
+from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from services.optimizer.analysis.targets import LeaveOut
@@ -267,6 +269,12 @@ class AsyncServerJobs(AsyncJobs):
             log=log,
         )
         return await self._send(calls.simulate(request))
+
+    async def robustness(
+        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
+    ) -> RobustnessView:
+        """Let designs around one walk on the server, which bounds how many and how long."""
+        return await self._send(calls.robustness(arguments.robustness(design, options)))
 
     async def replay(
         self,

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 
 from gaitswarm.errors import NotFound
 from gaitswarm.requests.replay import ReplayRequest
+from gaitswarm.requests.robustness import RobustnessRequest
 from gaitswarm.requests.surface import SurfaceRequest
 from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.simulation_result import SimulationResult
@@ -35,6 +36,7 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
+from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import (
     ProblemRunsView,
@@ -314,6 +316,15 @@ def simulate(request: SimulationRequest) -> Call[SimulationResult]:
         return SimulationResult.from_view(SimulationView.model_validate_json(content))
 
     return Call("POST", "/simulations", read, body=request.model_dump_json(), reads=True)
+
+
+def robustness(request: RobustnessRequest) -> Call[RobustnessView]:
+    """Estimate how robust a design is.
+
+    Args:
+        request: The design, its walks and the sample.
+    """
+    return _posted("/robustness", RobustnessView, request, reads=True)
 
 
 def replay(request: ReplayRequest) -> Call[WalkReplay]:

@@ -16,6 +16,7 @@ from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.jobs.tournaments import DatabaseTournaments
 from gaitswarm.requests import arguments
 from gaitswarm.requests.replay import run_replay
+from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
 from gaitswarm.requests.surface import run_surface
 from gaitswarm.requests.targets import run_targets
 from gaitswarm.settings import default_database
@@ -42,6 +43,7 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
+from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
@@ -311,6 +313,13 @@ class DatabaseJobs(DatabaseTournaments, Jobs):
                 log=log,
             )
         )
+
+    def robustness(
+        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
+    ) -> RobustnessView:
+        """Let designs around one walk in this process."""
+        with simulation_errors("design"):
+            return run_robustness(arguments.robustness(design, options))
 
     def replay(
         self,

@@ -26,6 +26,7 @@ from gaitswarm.jobs.attempts import (
 from gaitswarm.jobs.calls import Call
 from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.requests import arguments
+from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
     PreferenceInput,
@@ -50,6 +51,7 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
+from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from services.optimizer.analysis.targets import LeaveOut
@@ -258,6 +260,12 @@ class ServerJobs(Jobs):
             log=log,
         )
         return self._send(calls.simulate(request))
+
+    def robustness(
+        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
+    ) -> RobustnessView:
+        """Let designs around one walk on the server, which bounds how many and how long."""
+        return self._send(calls.robustness(arguments.robustness(design, options)))
 
     def replay(
         self,

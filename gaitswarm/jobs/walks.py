@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from sim.controllers import ControllerName
 from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
+    from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
     from gaitswarm.views.replay import WalkReplay
+    from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
 
 
@@ -53,6 +55,23 @@ class Walks(ABC):
         Raises:
             InvalidRequest: An argument makes no sense, the gait leaves the legs' reach, or the
                 walks last longer than the server allows.
+        """
+
+    @abstractmethod
+    def robustness(
+        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
+    ) -> RobustnessView:
+        """Estimate where the jobs are how robust a design is; see `gaitswarm.robustness`.
+
+        Args:
+            design: As for `simulate`.
+            **options: Walks and sample, see `RobustnessOptions`.
+
+        Returns:
+            The robustness index by scenario, objective and variable.
+
+        Raises:
+            InvalidRequest: As `simulate`, or the sample makes no sense.
         """
 
     @abstractmethod

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import InvalidRequest, NotFound, invalid_request
 from gaitswarm.requests.replay import ReplayRequest
+from gaitswarm.requests.robustness import RobustnessOptions, RobustnessRequest
 from gaitswarm.requests.surface import SurfaceRequest
 from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.specs import (
@@ -205,6 +206,27 @@ def simulation(
     if scenarios is not None:
         document["scenarios"] = scenario_entries(scenarios)
     return _valid(SimulationRequest, document)
+
+
+def robustness(design: Mapping[str, float | str], options: RobustnessOptions) -> RobustnessRequest:
+    """One design, its walks, and the sample around it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        options: What is not to have its default.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    document: dict[str, Any] = {**options, "design": _design(design)}
+    if "robot" in options:
+        document["robot"] = robot_source(options["robot"])
+    if "scenarios" in options:
+        document["scenarios"] = scenario_entries(options["scenarios"])
+    return _valid(RobustnessRequest, document)
 
 
 def replay(

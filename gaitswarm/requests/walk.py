@@ -135,7 +135,7 @@ def resolved(entry: str | Scenario) -> Scenario:
     return find_scenario(entry) if isinstance(entry, str) else entry
 
 
-class SimulationRequest(WalkRequest):
+class WalksRequest(WalkRequest):
     """One design and the walks in which to try it."""
 
     scenarios: tuple[ScenarioChoice, ...] = Field(
@@ -145,18 +145,10 @@ class SimulationRequest(WalkRequest):
         description="Walks: names or numbers of presets (see /v1/scenarios), or your own.",
         examples=[["normal-fast", "2"]],
     )
-    preference: PreferenceChoice = Field(
-        default="A",
-        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
-        " your own.",
-    )
     precision: Precision = Field(
         default="double",
         description="Of the physics' numbers: `double`, or `single`, which is about twice as fast"
         " and needs a C compiler.",
-    )
-    log: bool = Field(
-        default=False, description="Whether to return the 500 Hz log of every walk; it is large."
     )
 
     @model_validator(mode="after")
@@ -170,10 +162,6 @@ class SimulationRequest(WalkRequest):
     def resolved_scenarios(self) -> tuple[Scenario, ...]:
         """The scenarios in full, presets looked up."""
         return tuple(map(resolved, self.scenarios))
-
-    def resolved_preference(self) -> Preference:
-        """The preference in full."""
-        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def check_walks(self) -> None:
         """Check every walk before the first is run.
@@ -190,6 +178,23 @@ class SimulationRequest(WalkRequest):
             raise InvalidRequest(text, field="precision") from error
         for index, scenario in enumerate(self.resolved_scenarios()):
             self.check_reach(scenario, field=f"scenarios.{index}")
+
+
+class SimulationRequest(WalksRequest):
+    """One design, the walks in which to try it, and how they are judged."""
+
+    preference: PreferenceChoice = Field(
+        default="A",
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own.",
+    )
+    log: bool = Field(
+        default=False, description="Whether to return the 500 Hz log of every walk; it is large."
+    )
+
+    def resolved_preference(self) -> Preference:
+        """The preference in full."""
+        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
 
 def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> SimulationView:

@@ -55,6 +55,7 @@ def test_the_routes_are_these(document: Document) -> None:
         "get /v1/recordings/{recording_id}",
         "post /v1/simulations",
         "post /v1/replays",
+        "post /v1/robustness",
         "get /v1/robots",
         "get /v1/scenarios",
         "get /v1/preferences",

@@ -13,6 +13,7 @@ VIEWS: Final = {
     "new-job": "/jobs/new",
     "job": "/jobs/{job}",
     "scenarios": "/jobs/{job}/scenarios",
+    "robustness": "/jobs/{job}/robustness",
     "variables": "/jobs/{job}/variables",
     "iterations": "/jobs/{job}/iterations",
     "particles": "/jobs/{job}/iterations/1",

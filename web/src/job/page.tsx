@@ -14,6 +14,7 @@ import { OverviewPanel } from './overview-panel'
 import { ParametersPanel } from './parameters/parameters-panel'
 import { PreferencesPanel } from './preferences-panel'
 import { ReproducePanel } from './reproduce-panel'
+import { RobustnessPanel } from './robustness-panel'
 import { ScenariosPanel } from './scenarios-panel'
 import { TargetsPanel } from './targets-panel'
 import { type LiveJob, useJob } from './use-job'
@@ -24,6 +25,7 @@ const TABS = [
   { tab: 'targets', label: 'Targets' },
   { tab: 'scenarios', label: 'Scenarios' },
   { tab: 'parameters', label: 'Parameters' },
+  { tab: 'robustness', label: 'Robustness' },
   { tab: 'variables', label: 'Variables' },
   { tab: 'iterations', label: 'Iterations' },
   { tab: 'preferences', label: 'What if' },
@@ -34,6 +36,7 @@ const TABS = [
 const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
   targets: ['calibration'],
   parameters: ['identification', 'calibration'],
+  robustness: ['tuning'],
   preferences: ['tuning'],
 }
 
@@ -105,6 +108,8 @@ function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
       return <TargetsPanel job={job} />
     case 'scenarios':
       return <ScenariosPanel job={job} />
+    case 'robustness':
+      return <RobustnessPanel job={job} />
     case 'variables':
       return <VariablesPanel job={job} />
     case 'iterations':

@@ -1,0 +1,174 @@
+"""How robust a design is: what is asked, and the walks around the design. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
+from typing import Final, TypedDict
+
+import numpy as np
+from pydantic import Field
+
+from gaitswarm.requests.walk import WalksRequest
+from gaitswarm.specs import RobotInput, ScenarioInput
+from gaitswarm.views.robustness import RobustnessView
+from services.optimizer.analysis.robustness import LocalSample, local_sample, robustness
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.run.evaluator import EvaluationRequest
+from services.runtime import open_evaluator
+from sim.case import Walk
+from sim.catalogue import design_catalogue
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.kernel.walk import Precision
+from sim.outcome import Outcome, Status
+from sim.provenance import provenance_of
+from sim.variables import Variable, VariableChoice
+
+_BLOCK: Final = 64
+"""Designs between two reports of progress; a multiple of every kernel's lanes."""
+
+Progress = Callable[[int, int], None]
+"""Told how many of how many walks are done."""
+
+
+class RobustnessOptions(TypedDict, total=False):
+    """Fields of a `RobustnessRequest` as keywords; what is left out has its default.
+
+    Attributes:
+        scenarios: One scenario or several: names or numbers of presets, or `Scenario`; default the
+            six of table 4.2.
+        controller: Motor controller that drives the robot; default fuzzy-pi.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        precision: Of the physics' numbers; default double.
+        variables: What varies, and by which bounds it is normalised: names, or `Variable` with
+            bounds of your own; default all of the controller's.
+        samples: Designs that walk beside the given one; default 256.
+        radius: How far they are from it at most, as a share of each variable's bounds; default
+            0.02.
+        seed: Of the sample; default 1.
+    """
+
+    scenarios: ScenarioInput | Iterable[ScenarioInput]
+    controller: ControllerName
+    robot: RobotInput
+    precision: Precision
+    variables: Sequence[str | Variable]
+    samples: int
+    radius: float
+    seed: int
+
+
+class RobustnessRequest(WalksRequest):
+    """One design, the walks in which it is tried, and the sample around it."""
+
+    variables: tuple[VariableChoice, ...] | None = Field(
+        default=None,
+        max_length=64,
+        description="What varies, and by which bounds it is normalised: names of variables, whose"
+        " bounds are then those of /v1/controllers, or variables with bounds of your own. Null:"
+        " all of the controller's.",
+    )
+    samples: int = Field(
+        default=256, ge=8, le=4096, description="Designs that walk beside the given one."
+    )
+    radius: float = Field(
+        default=0.02,
+        gt=0.0,
+        le=0.5,
+        description="How far they are from it at most, as a share of each variable's bounds [1].",
+    )
+    seed: int = Field(default=1, ge=0, lt=2**63, description="Of the sample.")
+
+    def sample(self) -> LocalSample:
+        """The designs that walk.
+
+        Returns:
+            The design and those around it.
+
+        Raises:
+            InvalidRequest: A variable is unknown or not in the design, none can vary, or the
+                samples are too few; names the field.
+        """
+        try:
+            return local_sample(
+                self.numbers,
+                tuple(self._resolved_variables()),
+                radius=self.radius,
+                samples=self.samples,
+                seed=self.seed,
+            )
+        except ValueError as error:
+            field, _, message = str(error).partition(": ")
+            raise InvalidRequest(message, field=field) from error
+
+    def _resolved_variables(self) -> Iterator[Variable]:
+        catalogue = design_catalogue(self.controller)
+        own = CONTROLLERS[self.controller].variables
+        for index, entry in enumerate(own if self.variables is None else self.variables):
+            name = entry if isinstance(entry, str) else entry.name
+            if name not in catalogue:
+                known = ", ".join(catalogue)
+                raise ValueError(f"variables.{index}: unknown variable {name!r}; known are {known}")
+            if name not in self.design:
+                raise ValueError(f"variables.{index}: the design gives no {name}")
+            yield catalogue[name] if isinstance(entry, str) else entry
+
+
+def run_robustness(
+    request: RobustnessRequest, *, cpus: int | None = None, progress: Progress | None = None
+) -> RobustnessView:
+    """Let a design and others around it walk, and estimate how robust it is.
+
+    Args:
+        request: The design, its walks and the sample.
+        cpus: Walks to compute at once; default all processors.
+        progress: Told how many of how many walks are done, from time to time.
+
+    Returns:
+        The index by scenario, objective and variable.
+
+    Raises:
+        InvalidRequest: The design cannot be compiled, a gait leaves the legs' reach, or the sample
+            makes no sense; names the field.
+    """
+    request.check_walks()
+    sample = request.sample()
+    outcomes = _walked(request, sample, cpus, progress)
+    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+    statuses = np.stack([outcome.statuses for outcome in outcomes], axis=1)
+    return RobustnessView.from_robustness(
+        robustness(sample, objectives, statuses != Status.OK),
+        sample,
+        robot=request.robot,
+        controller=request.controller,
+        precision=request.precision,
+        seed=request.seed,
+        scenarios=[scenario.name for scenario in request.resolved_scenarios()],
+    )
+
+
+def _walked(
+    request: RobustnessRequest, sample: LocalSample, cpus: int | None, progress: Progress | None
+) -> list[Outcome]:
+    """One outcome a scenario."""
+    cases = tuple(
+        Walk(request.robot, request.controller, scenario, sample.names, request.precision)
+        for scenario in request.resolved_scenarios()
+    )
+    provenance = provenance_of(request.robot, precision=request.precision)
+    blocks: list[tuple[Outcome, ...]] = []
+    n = len(sample.designs)
+    with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
+        for first in range(0, n, _BLOCK):
+            designs = sample.designs[first : first + _BLOCK]
+            asked = EvaluationRequest("", cases, designs, provenance)
+            blocks.append(evaluator.evaluate(asked, lambda: False))
+            if progress is not None:
+                progress(min(first + _BLOCK, n) * len(cases), n * len(cases))
+    return [
+        Outcome(
+            np.concatenate([part.objectives for part in parts]),
+            np.concatenate([part.statuses for part in parts]),
+        )
+        for parts in zip(*blocks, strict=True)
+    ]

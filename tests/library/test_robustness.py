@@ -1,0 +1,42 @@
+"""`gaitswarm.robustness`, and the same where the jobs are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import gaitswarm
+from tests.examples.walks import short_walk
+from tests.library.conftest import Reach
+
+pytestmark = pytest.mark.slow
+
+PI = {"P": 0.45, "I": 0.1}
+ASKED: gaitswarm.RobustnessOptions = {
+    "controller": "pi",
+    "scenarios": short_walk(),
+    "samples": 100,
+    "radius": 0.05,
+}
+
+
+def test_the_index_is_the_same_wherever_it_is_estimated(reach: Reach, db: Path) -> None:
+    here = gaitswarm.robustness(PI, cpus=1, **ASKED)
+    assert here.index is not None and here.samples == 100
+    assert reach(db).robustness(PI, **ASKED) == here
+
+
+def test_it_tells_how_far_it_is() -> None:
+    told: list[tuple[int, int]] = []
+    gaitswarm.robustness(PI, progress=lambda done, planned: told.append((done, planned)), **ASKED)
+    assert told == [(64, 101), (101, 101)]
+
+
+def test_what_makes_no_sense_is_refused_by_argument() -> None:
+    with pytest.raises(gaitswarm.InvalidRequest) as refused:
+        gaitswarm.robustness(PI, controller="pi", samples=8)
+    assert refused.value.field == "samples"
+    with pytest.raises(gaitswarm.InvalidRequest) as refused:
+        gaitswarm.robustness(PI, controller="pi", robot="spot")
+    assert refused.value.field == "robot"

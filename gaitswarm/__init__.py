@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         StateView,
     )
     from gaitswarm.views.calibration import TargetsView
+    from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
@@ -165,6 +166,7 @@ __all__ = [
     "RobustnessOptions",
     "RobustnessView",
     "Scenario",
+    "ScenarioFamiliesView",
     "ScenarioResult",
     "ServerJobs",
     "SimulationResult",
@@ -221,6 +223,7 @@ _MODULES: Final = {
         "JobView", "RankingView", "StateView",
     ),
     "gaitswarm.views.calibration": ("TargetsView",),
+    "gaitswarm.views.families": ("ScenarioFamiliesView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.robustness": ("RobustnessView",),

@@ -1,4 +1,4 @@
-"""Questions about all evaluations of a job at once: spread, particles, another preference."""
+"""Questions about all evaluations of a job at once: spread, particles, other measures."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from api.dependencies import AfterIteration, ExistingJob, Service
+from api.dependencies import AfterIteration, ExistingJob, JobId, Service
 from api.documentation import binary, problems
+from gaitswarm.requests.families import TOLERANCE, run_scenario_families
 from gaitswarm.views import (
     PREFIX,
     DistributionView,
@@ -17,6 +18,7 @@ from gaitswarm.views import (
     encoded_particles,
 )
 from gaitswarm.views.base import MEDIA_TYPE
+from gaitswarm.views.families import ScenarioFamiliesView
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
 
@@ -86,6 +88,27 @@ def rank_designs(request: RankingRequest, job: ExistingJob, service: Service) ->
     """
     ranked = service.rank(job, request.resolved_preference(), top=request.top)
     return _json(RankingView.from_ranked_job(request, ranked))
+
+
+@router.get(
+    "/scenarios",
+    operation_id="get_scenario_families",
+    summary="See which scenarios matter",
+    response_model=ScenarioFamiliesView,
+    responses=problems(404, 409, 422),
+)
+def get_scenario_families(
+    job_id: JobId,
+    service: Service,
+    tolerance: Annotated[
+        float,
+        Query(ge=0.0, allow_inf_nan=False, description="Largest regret of a smallest family [1]."),
+    ] = TOLERANCE,
+) -> Response:
+    """What a job would have taken for its best with fewer scenarios: each of them left out, and
+    families of every size; from stored objectives, no walk is simulated.
+    """
+    return _json(run_scenario_families(service, job_id, tolerance))
 
 
 def _json(view: View) -> Response:

@@ -34,6 +34,7 @@ from gaitswarm.views import (
     RankingView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
@@ -231,6 +232,11 @@ class AsyncDatabaseJobs(AsyncJobs):
         """Rank a job's designs from what is stored."""
         jobs = await self._jobs()
         return await to_thread.run_sync(partial(jobs.ranking, job_id, preference, top=top))
+
+    async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
+        """Judge a job's designs by fewer scenarios, from what is stored."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.scenarios, job_id, tolerance=tolerance))
 
     async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Compare runs from what is stored."""

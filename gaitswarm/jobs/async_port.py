@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         RankingView,
     )
     from gaitswarm.views.calibration import TargetsView
+    from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
@@ -154,6 +155,10 @@ class AsyncJobs(ABC):
         self, job_id: str, preference: PreferenceInput, *, top: int = 20
     ) -> RankingView:
         """Judge all designs of a job by another preference; no walk is run."""
+
+    @abstractmethod
+    async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
+        """See which scenarios of a job matter, from what is stored."""
 
     @abstractmethod
     async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:

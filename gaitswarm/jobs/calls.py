@@ -34,6 +34,7 @@ from gaitswarm.views import (
     SimulationView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.robustness import RobustnessView
@@ -232,6 +233,17 @@ def ranking(job_id: str, request: RankingRequest) -> Call[RankingView]:
         request: The preference, and how many designs to list.
     """
     return _posted(f"{_job(job_id)}/ranking", RankingView, request, reads=True)
+
+
+def scenarios(job_id: str, tolerance: float) -> Call[ScenarioFamiliesView]:
+    """Find out which scenarios of a job matter.
+
+    Args:
+        job_id: Identifier of the job.
+        tolerance: Largest regret of the smallest family, as a share.
+    """
+    path, read = f"{_job(job_id)}/scenarios", ScenarioFamiliesView.model_validate_json
+    return Call("GET", path, read, {"tolerance": repr(tolerance)})
 
 
 def parameters(job_ids: Sequence[str]) -> Call[IdentifiabilityView]:

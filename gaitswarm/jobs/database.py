@@ -15,6 +15,7 @@ from gaitswarm.jobs.news import PAGE, JobNews
 from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.jobs.tournaments import DatabaseTournaments
 from gaitswarm.requests import arguments
+from gaitswarm.requests.families import run_scenario_families
 from gaitswarm.requests.replay import run_replay
 from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
 from gaitswarm.requests.surface import run_surface
@@ -41,6 +42,7 @@ from gaitswarm.views import (
     RankingView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.robustness import RobustnessView
@@ -264,6 +266,10 @@ class DatabaseJobs(DatabaseTournaments, Jobs):
         job = self._service.job(job_id)
         ranked = self._service.rank(job, request.resolved_preference(), top=request.top)
         return RankingView.from_ranked_job(request, ranked)
+
+    def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
+        """Judge a job's designs by fewer scenarios, from what is stored."""
+        return run_scenario_families(self._service, job_id, tolerance)
 
     def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Compare runs from what is stored."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         RankingView,
     )
     from gaitswarm.views.calibration import TargetsView
+    from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
     from services.optimizer.analysis.targets import LeaveOut
     from sim.identification.recorded_walk import RecordedWalk
@@ -289,6 +290,23 @@ class Jobs(Tournaments, Walks, ABC):
         Raises:
             InvalidRequest: The job has no preference, or an argument makes no sense.
             Conflict: The job is too large to be held in memory.
+        """
+
+    @abstractmethod
+    def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
+        """See which scenarios of a job matter, from what is stored.
+
+        Args:
+            job_id: Identifier of a job that tunes a drive.
+            tolerance: Largest regret of the smallest family of scenarios, as a share.
+
+        Returns:
+            What the job would have taken for its best without each scenario, and with few.
+
+        Raises:
+            InvalidRequest: The job tunes no drive, or the tolerance makes no sense.
+            Conflict: No design of it walks in all scenarios, or it is too large to be held in
+                memory.
         """
 
     @abstractmethod

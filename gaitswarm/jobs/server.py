@@ -49,6 +49,7 @@ from gaitswarm.views import (
     RankingView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
@@ -199,6 +200,10 @@ class ServerJobs(Jobs):
     def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
         """Let the server rank a job's designs."""
         return self._send(calls.ranking(job_id, arguments.ranking(preference, top)))
+
+    def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
+        """Let the server judge a job's designs by fewer scenarios."""
+        return self._send(calls.scenarios(job_id, tolerance))
 
     def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Let the server compare runs."""

@@ -45,6 +45,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/distribution",
         f"get {job}/particles",
         f"post {job}/ranking",
+        f"get {job}/scenarios",
         f"get {job}/parameters",
         f"get {job}/targets",
         "get /v1/tournaments",

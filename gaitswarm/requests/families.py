@@ -1,0 +1,51 @@
+"""Which scenarios of a job matter. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from gaitswarm.requests.targets import Histories
+from gaitswarm.views.families import ScenarioFamiliesView
+from services.optimizer.analysis.scenario_families import scenario_families
+from services.optimizer.analysis.utilities import log_utilities
+from services.optimizer.errors import Conflict, InvalidRequest
+from services.optimizer.jobs.tuning import JobSpec
+
+TOLERANCE: Final = 0.01
+"""Regret of the smallest family, by default [1]."""
+
+
+def run_scenario_families(
+    histories: Histories, job_id: str, tolerance: float
+) -> ScenarioFamiliesView:
+    """Judge a job's designs by fewer scenarios, from what is stored.
+
+    Args:
+        histories: Where the job is.
+        job_id: Identifier of a job that tunes a drive.
+        tolerance: Largest regret of a smallest family, as a share.
+
+    Returns:
+        What the job would have taken for its best with fewer scenarios.
+
+    Raises:
+        InvalidRequest: A job of another kind, or a tolerance below 0.
+        Conflict: No design of the job walks in all scenarios, or the job is too large to be held in
+            memory.
+    """
+    if not 0.0 <= tolerance < np.inf:
+        raise InvalidRequest("must be at least 0", field="tolerance")
+    job = histories.job(job_id)
+    if not isinstance(job.spec, JobSpec):
+        raise InvalidRequest(
+            f"job {job_id} is of kind {job.spec.kind}; only a job that tunes a drive has scenarios",
+            field="job_id",
+        )
+    columns = histories.columns(job)
+    judged = log_utilities(columns, job.spec.resolved_preference())
+    if not np.isfinite(judged).all(axis=1).any():
+        raise Conflict(f"job {job_id} has no design yet that walks in all scenarios")
+    found = scenario_families(judged, tolerance=tolerance)
+    return ScenarioFamiliesView.from_families(found, job.spec.case_names, columns)

@@ -1,0 +1,244 @@
+"""Which scenarios of a job matter: what jobs with fewer of them would have taken for the best.
+
+From stored objectives alone: designs are judged anew by the geometric mean over some scenarios
+(eq. 4.2), and the winner is judged by that over all. A search with fewer scenarios would have gone
+elsewhere, so what is found here is to be checked by a job.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.analysis.ranking import rank_correlation
+from services.optimizer.search.random_stream import RandomNumbers, swarm_uniform
+
+Floats = NDArray[np.float64]
+
+CONFIDENCE: Final = 0.95
+"""Of all intervals."""
+
+_RESAMPLES: Final = 400
+_LEAST_RESAMPLES: Final = 40
+_RESAMPLED_ROWS: Final = 4_000_000
+"""Of all resamples together: a long history gets fewer of them."""
+
+_MOST_FAMILIES: Final = 64
+"""Families of one size that are looked at; of more, so many are drawn."""
+
+_RESAMPLE, _DRAW = 0xFA71, 0xFA72
+"""Purposes of the random numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """By how much a design is worse than another, as a share of the other's worth.
+
+    Attributes:
+        value: +inf for a design that fails.
+        low: lower end of its interval at `CONFIDENCE`.
+        high: upper end.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Some of a job's scenarios, at least one.
+
+    Attributes:
+        scenarios: their indices, ascending.
+        correlation: Spearman's, of the fitness over them and over all, among designs that walk in
+            all; None where it is undefined.
+        winner: row of the design that is best by them.
+        regret: by how much the winner is worse than the job's best in the fitness over all.
+    """
+
+    scenarios: tuple[int, ...]
+    correlation: float | None
+    winner: int
+    regret: Loss
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """All scenarios but one.
+
+    Attributes:
+        scenario: index of the one.
+        family: the others.
+        loss: by how much the family's winner is worse than the job's best in the scenario that was
+            left out; less than 0 if it is better.
+        similar: index of the scenario whose utilities are most like it in rank; None if there is
+            no other, or the correlations are undefined.
+        similarity: Spearman's correlation of the two.
+    """
+
+    scenario: int
+    family: Family
+    loss: Loss
+    similar: int | None
+    similarity: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioFamilies:
+    """What fewer scenarios would have done.
+
+    Attributes:
+        designs: that walk in all scenarios.
+        failed: those that do not.
+        left_out: each scenario in its turn; none of a job with a single one.
+        families: of every size below all, all of them or some drawn at random, smaller ones first.
+        tolerance: largest loss that is allowed.
+        smallest: the family of fewest scenarios whose regret is within the tolerance up to the
+            upper end of its interval, of these the one of least regret; None if there is none.
+    """
+
+    designs: int
+    failed: int
+    left_out: tuple[LeftOut, ...]
+    families: tuple[Family, ...]
+    tolerance: float
+    smallest: Family | None
+
+
+def scenario_families(log_utilities: Floats, *, tolerance: float) -> ScenarioFamilies:
+    """Judge designs by fewer scenarios.
+
+    Args:
+        log_utilities: (r, K) logarithms of utilities, +inf where a walk failed; in at least one row
+            none did.
+        tolerance: largest regret of a smallest family, as a share.
+
+    Returns:
+        Regrets and losses, with intervals of a bootstrap over the designs.
+    """
+    judged = _Judged.of(log_utilities)
+    count = log_utilities.shape[1]
+    families = tuple(judged.family(chosen) for chosen in _families(count))
+    whole = [family for family in families if len(family.scenarios) == count - 1]
+    within = [family for family in families if family.regret.high <= tolerance]
+    return ScenarioFamilies(
+        designs=len(judged.complete),
+        failed=len(log_utilities) - len(judged.complete),
+        left_out=tuple(sorted(map(judged.left_out, whole), key=lambda left: left.scenario)),
+        families=families,
+        tolerance=tolerance,
+        smallest=min(within, key=_order, default=None),
+    )
+
+
+def _order(family: Family) -> tuple[float, ...]:
+    correlation = -math.inf if family.correlation is None else family.correlation
+    return (len(family.scenarios), family.regret.high, family.regret.value, -correlation)
+
+
+def _families(count: int) -> Iterator[tuple[int, ...]]:
+    """Indices of some of so many scenarios; every single one and all but one are always there."""
+    for size in range(1, count):
+        number = math.comb(count, size)
+        if number <= _MOST_FAMILIES or size in (1, count - 1):
+            yield from combinations(range(count), size)
+        else:
+            yield from _drawn(count, size)
+
+
+def _drawn(count: int, size: int) -> Iterable[tuple[int, ...]]:
+    numbers = RandomNumbers(0, _DRAW, iteration=size)
+    drawn: set[tuple[int, ...]] = set()
+    while len(drawn) < _MOST_FAMILIES:
+        drawn.add(tuple(sorted(numbers.permutation(count)[:size].tolist())))
+    return sorted(drawn)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Judged:
+    """log_utilities: (r, K); fitness: (r,) its mean; complete: rows that walk in all scenarios;
+    samples: (1 + B, r) rows, first all, then those of each resample; bests: (1 + B,) best of each
+    by the fitness over all.
+    """
+
+    log_utilities: Floats
+    fitness: Floats
+    complete: NDArray[np.intp]
+    samples: NDArray[np.intp]
+    bests: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, log_utilities: Floats) -> _Judged:
+        rows = len(log_utilities)
+        fitness = log_utilities.mean(axis=1)
+        count = min(_RESAMPLES, max(_LEAST_RESAMPLES, _RESAMPLED_ROWS // rows))
+        drawn = swarm_uniform(0, _RESAMPLE, iteration=0, particles=count, count=rows)
+        # In order, so that of equals the earliest wins.
+        resampled = np.sort((drawn * rows).astype(np.intp), axis=1)
+        samples = np.vstack([np.arange(rows), resampled])
+        return cls(
+            log_utilities,
+            fitness,
+            np.flatnonzero(np.isfinite(fitness)),
+            samples,
+            _winners(fitness, samples),
+        )
+
+    def family(self, chosen: tuple[int, ...]) -> Family:
+        fitness = self.log_utilities[:, chosen].mean(axis=1)
+        winners = _winners(fitness, self.samples)
+        return Family(
+            scenarios=chosen,
+            correlation=rank_correlation(fitness[self.complete], self.fitness[self.complete]),
+            winner=int(winners[0]),
+            regret=_loss(self.fitness[winners], self.fitness[self.bests]),
+        )
+
+    def left_out(self, family: Family) -> LeftOut:
+        count = self.log_utilities.shape[1]
+        (scenario,) = set(range(count)) - set(family.scenarios)
+        utility = self.log_utilities[:, scenario]
+        fitness = self.log_utilities[:, family.scenarios].mean(axis=1)
+        similar = self._similar(scenario, family.scenarios)
+        return LeftOut(
+            scenario=scenario,
+            family=family,
+            loss=_loss(utility[_winners(fitness, self.samples)], utility[self.bests]),
+            similar=similar[0],
+            similarity=similar[1],
+        )
+
+    def _similar(self, own: int, others: Sequence[int]) -> tuple[int | None, float | None]:
+        rows = self.log_utilities[self.complete]
+        found = {other: rank_correlation(rows[:, other], rows[:, own]) for other in others}
+        known = {other: value for other, value in found.items() if value is not None}
+        if not known:
+            return None, None
+        most = max(known, key=lambda other: known[other])
+        return most, known[most]
+
+
+def _winners(fitness: Floats, samples: NDArray[np.intp]) -> NDArray[np.intp]:
+    """(1 + B,) row of the least fitness (r,) among each sample's rows."""
+    picked = fitness[samples].argmin(axis=1)
+    return np.asarray(np.take_along_axis(samples, picked[:, None], axis=1)[:, 0])
+
+
+def _loss(own: Floats, best: Floats) -> Loss:
+    """own, best: (1 + B,) logarithms, of the designs themselves and of each resample."""
+    # A resample may hold no design that walks in all scenarios.
+    known = np.isfinite(best)
+    with np.errstate(over="ignore"):
+        losses = np.expm1(own[known] - best[known])
+    tail = (1.0 - CONFIDENCE) / 2.0
+    # Of ordered values, so that an infinite one is not interpolated.
+    low, high = np.quantile(losses, [tail, 1.0 - tail], method="inverted_cdf").tolist()
+    value = float(losses[0])
+    return Loss(value, min(low, value), max(high, value))

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.port import JobEvent, Jobs
     from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.optimization import OptimizationResult, optimize, optimizers
+    from gaitswarm.preferences import robust_preferences
     from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation import robustness, simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView
+    from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
@@ -163,6 +165,7 @@ __all__ = [
     "RecordedWalk",
     "RobotFiles",
     "RobotVariant",
+    "RobustPreferencesView",
     "RobustnessOptions",
     "RobustnessView",
     "Scenario",
@@ -195,6 +198,7 @@ __all__ = [
     "open_async",
     "optimize",
     "optimizers",
+    "robust_preferences",
     "robustness",
     "simulate",
 ]
@@ -213,6 +217,7 @@ _MODULES: Final = {
     "gaitswarm.jobs.port": ("JobEvent", "Jobs"),
     "gaitswarm.jobs.server": ("ServerJobs",),
     "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
+    "gaitswarm.preferences": ("robust_preferences",),
     "gaitswarm.requests.robustness": ("RobustnessOptions",),
     "gaitswarm.simulation": ("robustness", "simulate"),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
@@ -225,6 +230,7 @@ _MODULES: Final = {
     "gaitswarm.views.calibration": ("TargetsView",),
     "gaitswarm.views.families": ("ScenarioFamiliesView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
+    "gaitswarm.views.preferences": ("RobustPreferencesView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.robustness": ("RobustnessView",),
     "gaitswarm.views.surface": ("SurfaceView",),

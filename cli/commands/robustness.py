@@ -131,12 +131,12 @@ def estimate(request: RobustnessRequest) -> RobustnessView:
     """The estimate; what takes longer than two seconds shows how far it is."""
     from gaitswarm.requests.robustness import run_robustness
 
-    with _shown_progress() as progress:
+    with shown_progress() as progress:
         return run_robustness(request, progress=progress)
 
 
 @contextmanager
-def _shown_progress() -> Iterator[Progress]:
+def shown_progress() -> Iterator[Progress]:
     """A line on stderr every two seconds."""
     import time
 

@@ -1,0 +1,105 @@
+"""Winners of a job's history under many preferences, from which the most robust can be chosen.
+
+The thesis's basis of future research (4.5): a preference chosen so that its optimum is robust.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.analysis.robustness import NORMALISED_OBJECTIVES
+from services.optimizer.analysis.utilities import fitness_of, log_utilities
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.preference import PREFERENCES, Preference
+from services.optimizer.search.random_stream import swarm_uniform
+
+Floats = NDArray[np.float64]
+
+NAMED: Final[Mapping[str, Preference]] = {name: PREFERENCES[name] for name in ("A", "B", "C")}
+"""Those of table 4.5."""
+
+_DRAW: Final = 0xB1A5
+"""Purpose of the random numbers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Winner:
+    """A design that is the best of its job under some preferences.
+
+    Attributes:
+        row: of the job's evaluations.
+        preference: one under which it wins: of table 4.5 if there is one, else the one under which
+            it leads all other winners by the most.
+        named: names of those of table 4.5 under which it wins.
+        share: of the drawn preferences under which it wins [1].
+    """
+
+    row: int
+    preference: Preference
+    named: tuple[str, ...]
+    share: float
+
+
+def drawn_preferences(columns: EvaluationColumns, *, count: int, seed: int) -> list[Preference]:
+    """Draw preferences of five objectives.
+
+    Exponents are uniform in 0 to 1, as in table 4.5; their ratios alone matter to a ranking. Biases
+    are uniform between 0 and the median of their objective among the job's walks: a bias of the
+    size of its objective halves what a relative change of it counts.
+
+    Args:
+        columns: evaluations of the job.
+        count: of preferences.
+        seed: of the draw.
+
+    Returns:
+        The preferences.
+    """
+    size = len(NORMALISED_OBJECTIVES)
+    walked = columns.objectives[columns.statuses == 0][:, :size]
+    scale = np.median(walked[np.isfinite(walked).all(axis=1)], axis=0)
+    numbers = swarm_uniform(seed, _DRAW, iteration=0, particles=count, count=2 * size)
+    return [
+        Preference(
+            bias=tuple((row[:size] * np.abs(scale)).tolist()),
+            exponent=tuple((1.0 - row[size:]).tolist()),
+        )
+        for row in numbers
+    ]
+
+
+def winners(columns: EvaluationColumns, drawn: Sequence[Preference]) -> tuple[Winner, ...]:
+    """Find who wins under any of the preferences.
+
+    Args:
+        columns: evaluations of a job; one at least walks in all scenarios.
+        drawn: preferences beside those of table 4.5.
+
+    Returns:
+        The winners: those of table 4.5 first, then by the share of preferences.
+    """
+    preferences = [*NAMED.values(), *drawn]
+    names = [*NAMED, *("" for _ in drawn)]
+    judged = np.stack([_log_fitness(columns, preference) for preference in preferences])
+    best = judged.argmin(axis=1)
+    rows = sorted(set(best.tolist()))
+    # How far each winner leads the others, under every preference.
+    rivals = np.sort(judged[:, rows], axis=1)
+    lead = rivals[:, 1] - rivals[:, 0] if len(rows) > 1 else np.zeros(len(preferences))
+    found = []
+    for row in rows:
+        won = np.flatnonzero(best == row)
+        named = tuple(names[index] for index in won if names[index])
+        chosen = won[0] if named else won[lead[won].argmax()]
+        share = np.count_nonzero(won >= len(NAMED)) / max(1, len(drawn))
+        found.append(Winner(row, preferences[chosen], named, share))
+    return tuple(sorted(found, key=lambda winner: (not winner.named, -winner.share, winner.row)))
+
+
+def _log_fitness(columns: EvaluationColumns, preference: Preference) -> Floats:
+    return np.asarray(np.log(fitness_of(log_utilities(columns, preference))))

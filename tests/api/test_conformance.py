@@ -44,7 +44,12 @@ schema = schemathesis.openapi.from_dict(_APP.openapi()).exclude(operation_id="st
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A server that lets nobody walk for long."""
     store = open_store(str(tmp_path_factory.mktemp("conformance") / "jobs.db"))
-    server = Server(JobService(store), api_max_simulated_seconds=3.0, api_max_logged_seconds=2.0)
+    server = Server(
+        JobService(store),
+        api_max_simulated_seconds=3.0,
+        api_max_logged_seconds=2.0,
+        api_max_sampled_seconds=30.0,
+    )
     yield server.url
     server.close()
     store.close()

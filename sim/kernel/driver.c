@@ -9,7 +9,7 @@
 #define NQ (7 + NJ)
 #define NV (6 + NJ)
 #define N_INTEGRANDS 8
-#define NLOG (NQ + NV + NI + NJ)
+#define NLOG (NQ + NV + NI + 2 * NJ)
 
 enum { OK = 0, DIVERGED = 1, FELL = 2 };
 
@@ -29,7 +29,7 @@ typedef struct {
   double smoothing[2]; /* of the current's analog low-pass, by a step and by one of a landing; 1 for none */
   double *sums;        /* N_INTEGRANDS, summed over physics steps */
   double *end;         /* NQ, final position */
-  double *log;         /* ticks x NLOG: q, v, internal state, duty; or NULL */
+  double *log;         /* ticks x NLOG: q, v, internal state, sensed current, duty; or NULL */
   double peak_current; /* largest |I| of any motor [A] */
   int64_t status;
 } Walker;
@@ -64,7 +64,8 @@ typedef struct {
   wide motor[NJ]; /* motors' angles, with backlash */
   vec v[NV], internal[NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ], landing;
   wide timestep, weight; /* of a physics step [s], and per one of those without a landing */
-  Control control;
+  Gains gains;
+  Past past;
   Sensors sensors;
   int filtered, disturbed, shoved; /* whether any lane's current, links or body are */
   vec sensed[NJ], smoothing;
@@ -135,7 +136,7 @@ static void enter(Lanes *s, int k, Call *call, Walker *w)
   }
   s->peak[k] = s->landing[k] = 0;
   s->rounds_left[k] = 0;
-  set_control(&s->control, k, &w->law);
+  set_control(&s->gains, &s->past, k, &w->law);
   set_sensors(&s->sensors, k, &w->sensors);
   if (w->smoothing[0] < 1.0) s->filtered = 1;
   if (w->disturbance) s->disturbed = 1;
@@ -205,12 +206,12 @@ static void control_tick(Lanes *s, const Coding *c)
   for (int j = 0; j < NJ; j++) {
     const vec absolute = vec_abs(current[j]);
     for (int h = 0; h < HALVES; h++)
-      read_joint(&readings, &s->control, c, j, h,
+      read_joint(&readings, &s->past, c, j, h,
                  imperfect ? s->sensors.seen[ANGLE][j][h] : encoder(s, j, h),
                  imperfect ? s->sensors.seen[CURRENT][j][h] : vec_widened(&absolute, h),
                  dvec_of(desired[j][h]));
   }
-  control(&s->control, c, &readings, s->begins, counts);
+  control(&s->gains, &s->past, &readings, s->begins, DSPLAT(c->pwm_counts), c->pwm_step, counts);
   for (int j = 0; j < NJ; j++)
     for (int h = 0; h < HALVES; h++) {
       const dvec duty = counts[j][h] * DSPLAT(c->duty_per_count);
@@ -220,12 +221,14 @@ static void control_tick(Lanes *s, const Coding *c)
 
 static void write_log(const Lanes *s)
 {
+  const vec *current = s->filtered ? s->sensed : s->current;
   for (int k = 0; k < LANES; k++) {
     if (!s->walker[k]->log || !s->walking[k] || !OF_LANE(s->begins, k)) continue;
     double *row = s->walker[k]->log + s->tick[k] * NLOG;
     for (int i = 0; i < NQ; i++) *row++ = OF_LANE(s->q[i], k);
     for (int i = 0; i < NV; i++) *row++ = s->v[i][k];
     for (int i = 0; i < NI; i++) *row++ = s->internal[i][k];
+    for (int i = 0; i < NJ; i++) *row++ = current[i][k] < 0 ? -current[i][k] : current[i][k];
     for (int i = 0; i < NJ; i++) *row++ = s->duty[i][k];
   }
 }

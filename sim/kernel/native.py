@@ -186,7 +186,7 @@ class NativeKernel:
         self.internal_state_size = internal_state_size(robot)
         self._joints = robot.n_joints
         self._integrands = int(library.gaitswarm_integrands())
-        self._log_width = 13 + 3 * self._joints + self.internal_state_size
+        self._log_width = 13 + 4 * self._joints + self.internal_state_size
         self._check(robot.description.name)
         library.gaitswarm_walk.restype = library.gaitswarm_left.restype = ctypes.c_int64
         self._pools: dict[Coding, Pool] = {}

@@ -84,8 +84,8 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
     observe = physics_model(robot).observe
     n, feet, ticks = robot.n_joints, len(robot.legs), len(states)
     carried = len(setup.internal_state)
-    position, orientation, angle, twist, rate, internal_state, duty = np.split(
-        states, np.cumsum([3, 4, n, 6, n, carried]), axis=1
+    position, orientation, angle, twist, rate, internal_state, _, duty = np.split(
+        states, np.cumsum([3, 4, n, 6, n, carried, n]), axis=1
     )
     walked = int(np.isfinite(states).all(axis=1).sum())
     seen = [np.full((ticks, observe.numel_out(k)), np.nan) for k in range(5)]

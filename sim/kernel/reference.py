@@ -1,8 +1,8 @@
 """The readable driver: the same walk over CasADi's interpreter.
 
-The oracle of control.c and driver.c (of sensors.c: sensors.py), and the fallback where there is no
-C compiler. Function by function their twin; the physics agrees to rounding, the integer arithmetic
-exactly.
+The oracle of tick.c, control.c and driver.c (of sensors.c: sensors.py), and the fallback where there
+is no C compiler. Function by function their twin; the physics agrees to rounding, the integer
+arithmetic exactly.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from sim.kernel.walk import (
     WalkResults,
     WalkSetup,
     check_gains,
+    coarsen,
 )
 from sim.outcome import Status
 from sim.robot import Robot
@@ -82,7 +83,8 @@ class ReferenceKernel:
             if setup.disturbance is not None:
                 step.disturbance[:] = setup.disturbance[tick]
             if log:
-                rows.append(np.concatenate([step.q, step.v, step.internal_state, step.duty]))
+                seen = np.abs(sensed)
+                rows.append(np.concatenate([step.q, step.v, step.internal_state, seen, step.duty]))
             refinement = coding.refinement if step.landing[0] > 0.0 else 1
             step.refine(refinement)
             step.push(tick)
@@ -204,10 +206,8 @@ def _coded(
     angles: Floats, current: Floats, desired: NDArray[np.int32], coding: Coding
 ) -> tuple[Ints, Ints]:
     """Coded angle error and absolute current, (J,)."""
-    code = _to_code(angles * coding.angle_counts, -4 * CODE_LIMIT, 4 * CODE_LIMIT)
-    error = desired.astype(np.int64) - _coarsen(code, coding.angle_step)
-    amperes = _to_code(current * coding.current_counts, 0, CODE_LIMIT)
-    return np.clip(error, -CODE_LIMIT, CODE_LIMIT), _coarsen(amperes, coding.current_step)
+    error = desired.astype(np.int64) - coding.angle_codes(angles)
+    return np.clip(error, -CODE_LIMIT, CODE_LIMIT), coding.current_codes(current)
 
 
 def _control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: _Past) -> Ints:
@@ -222,7 +222,7 @@ def _control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: _Pa
     full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
     past.error, past.integral = error, np.clip(grown, -full, full)
     output = descale(direct, FRACTION_BITS) + descale(past.integral, INTEGRAL_BITS)
-    coarse = _coarsen(np.clip(output, -limit, limit), coding.pwm_step)
+    coarse = coarsen(np.clip(output, -limit, limit), coding.pwm_step)
     pwm: Ints = np.clip(coarse, -limit, limit)
     return pwm
 
@@ -235,18 +235,6 @@ def _status_of(state: Stepper, setup: WalkSetup) -> Status:
     if q[2] < setup.fall_height or upright < setup.fall_cosine:
         return Status.FELL
     return Status.OK
-
-
-def _to_code(value: Floats, low: int, high: int) -> Ints:
-    with np.errstate(invalid="ignore"):
-        code: Ints = np.clip(np.nan_to_num(np.rint(value)), low, high).astype(np.int64)
-    return code
-
-
-def _coarsen(code: Ints, step: int) -> Ints:
-    """Nearest multiple of step."""
-    coarse: Ints = (code + step // 2) // step * step
-    return coarse
 
 
 def _padded(rows: list[Floats], ticks: int) -> Floats:

@@ -86,7 +86,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             pieces,
             *(
                 (resources.files("sim.kernel") / name).read_text(encoding="utf-8")
-                for name in ("sensors.c", "control.c", "driver.c")
+                for name in ("counts.h", "tick.c", "sensors.c", "control.c", "driver.c")
             ),
         ]
     )
@@ -99,7 +99,7 @@ def _generator() -> bytes:
     files = {
         file.name: file
         for file in resources.files("sim.kernel").iterdir()
-        if file.name.endswith((".py", ".c")) and file.name not in _NOT_IN_THE_SOURCE
+        if file.name.endswith((".py", ".c", ".h")) and file.name not in _NOT_IN_THE_SOURCE
     }
     for name in sorted(files):
         digest.update(files[name].read_bytes())

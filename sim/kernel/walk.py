@@ -18,6 +18,7 @@ from sim.robot import Robot
 from sim.robot.description import EnergyConvention
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 Precision = Literal["single", "double"]
 """Of the compiled physics. Positions, sums and control are computed in double precision in both."""
@@ -97,6 +98,62 @@ class Coding:
             substeps=substeps,
             refinement=refinement,
         )
+
+    def angle_codes(self, angles: Floats) -> Ints:
+        """What encoders say.
+
+        Args:
+            angles: Of the motors [rad].
+
+        Returns:
+            As many codes [counts].
+        """
+        return coarsen(
+            _rounded(angles * self.angle_counts, -4 * CODE_LIMIT, 4 * CODE_LIMIT), self.angle_step
+        )
+
+    def current_codes(self, currents: Floats) -> Ints:
+        """What the converters of the current sensors say.
+
+        Args:
+            currents: Absolute, behind the sensors' low-pass [A].
+
+        Returns:
+            As many codes [counts].
+        """
+        return coarsen(_rounded(currents * self.current_counts, 0, CODE_LIMIT), self.current_step)
+
+    def pwm_codes(self, duty: Floats) -> Ints:
+        """What the controller gave, of what the motors got.
+
+        Args:
+            duty: Motor voltage per supply voltage [1].
+
+        Returns:
+            As many PWM counts [counts].
+        """
+        return np.rint(duty / self.duty_per_count).astype(np.int64)
+
+
+def coarsen(code: Ints, step: int) -> Ints:
+    """Nearest multiple of a resolution, halves up.
+
+    Args:
+        code: Whole numbers.
+        step: The resolution.
+
+    Returns:
+        As many multiples.
+    """
+    coarse: Ints = (code + step // 2) // step * step
+    return coarse
+
+
+def _rounded(value: Floats, low: int, high: int) -> Ints:
+    """Of a NaN, 0."""
+    with np.errstate(invalid="ignore"):
+        code: Ints = np.clip(np.nan_to_num(np.rint(value)), low, high).astype(np.int64)
+    return code
 
 
 def current_smoothing(time_constant: float, timestep: float) -> float:
@@ -232,9 +289,9 @@ class WalkResult:
             (8,).
         end: final q, (7+J,).
         peak_current: largest |I| of any motor at any physics step [A].
-        states: q, v, internal state and duty at every control tick after its control,
-            (T, 7+J + 6+J + I + J), NaN after an early end; None if not asked for.
-            `observation.walk_log` tells the rest.
+        states: q, v, internal state, absolute current before the converters [A] and duty at every
+            control tick after its control, (T, 7+J + 6+J + I + J + J), NaN after an early end;
+            None if not asked for. `observation.walk_log` tells the rest.
     """
 
     status: Status

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         Unavailable,
         Unreadable,
     )
+    from gaitswarm.firmware import write_firmware
     from gaitswarm.jobs.async_database import AsyncDatabaseJobs
     from gaitswarm.jobs.async_port import AsyncJobs
     from gaitswarm.jobs.async_server import AsyncServerJobs
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     )
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.families import ScenarioFamiliesView
+    from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
@@ -130,6 +132,7 @@ __all__ = [
     "EvaluationTable",
     "EvaluationView",
     "EvaluatorUnavailable",
+    "FirmwareView",
     "GaSettings",
     "GaitswarmError",
     "GlobalBfgsSettings",
@@ -201,6 +204,7 @@ __all__ = [
     "robust_preferences",
     "robustness",
     "simulate",
+    "write_firmware",
 ]
 
 _MODULES: Final = {
@@ -209,6 +213,7 @@ _MODULES: Final = {
         "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged",
         "StoreUnavailable", "Unavailable", "Unreadable",
     ),
+    "gaitswarm.firmware": ("write_firmware",),
     "gaitswarm.jobs.async_database": ("AsyncDatabaseJobs",),
     "gaitswarm.jobs.async_port": ("AsyncJobs",),
     "gaitswarm.jobs.async_server": ("AsyncServerJobs",),
@@ -229,6 +234,7 @@ _MODULES: Final = {
     ),
     "gaitswarm.views.calibration": ("TargetsView",),
     "gaitswarm.views.families": ("ScenarioFamiliesView",),
+    "gaitswarm.views.firmware": ("FirmwareView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.preferences": ("RobustPreferencesView",),
     "gaitswarm.views.replay": ("WalkReplay",),

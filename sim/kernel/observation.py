@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.parameters import Layout
+from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.walk import WalkSetup, current_smoothing
 from sim.robot import Robot
 
@@ -67,6 +68,57 @@ class WalkLog:
         return np.asarray(rate + np.cross(angular, linear))
 
 
+class States(NamedTuple):
+    """What a kernel keeps of a walk at every tick, after its control; T ticks, J joints."""
+
+    base_position: NDArray[np.float64]
+    """(T, 3) [m]."""
+    base_orientation: NDArray[np.float64]
+    """(T, 4) quaternion x y z w."""
+    joint_angle: NDArray[np.float64]
+    """Of the links, (T, J) [rad]."""
+    base_velocity: NDArray[np.float64]
+    """In the body's frame, (T, 6) [m/s, rad/s]."""
+    joint_velocity: NDArray[np.float64]
+    """(T, J) [rad/s]."""
+    internal_state: NDArray[np.float64]
+    """(T, I)."""
+    sensed_current: NDArray[np.float64]
+    """Absolute, as the converters of the current sensors have it, (T, J) [A]."""
+    duty: NDArray[np.float64]
+    """(T, J) [1]."""
+
+
+def split_states(robot: Robot, states: NDArray[np.float64]) -> States:
+    """Name what a kernel kept.
+
+    Args:
+        robot: That walked.
+        states: As in `WalkResult`.
+
+    Returns:
+        Its columns, as views.
+    """
+    n = robot.n_joints
+    widths = [3, 4, n, 6, n, internal_state_size(robot), n]
+    return States(*np.split(states, np.cumsum(widths), axis=1))
+
+
+def encoder_angles(robot: Robot, states: States) -> NDArray[np.float64]:
+    """What the encoders see: the motors, which backlash parts from the links.
+
+    Args:
+        robot: That walked.
+        states: Of the walk.
+
+    Returns:
+        (T, J) [rad].
+    """
+    if robot.has_backlash:
+        return states.internal_state[:, : robot.n_joints]
+    return states.joint_angle
+
+
 def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> WalkLog:
     """Currents, torques, forces and supply of every tick, from its state and duty.
 
@@ -82,11 +134,9 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
     from sim.kernel.physics_step import physics_model  # noqa: PLC0415
 
     observe = physics_model(robot).observe
-    n, feet, ticks = robot.n_joints, len(robot.legs), len(states)
-    carried = len(setup.internal_state)
-    position, orientation, angle, twist, rate, internal_state, _, duty = np.split(
-        states, np.cumsum([3, 4, n, 6, n, carried, n]), axis=1
-    )
+    feet, ticks = len(robot.legs), len(states)
+    kept = split_states(robot, states)
+    position, orientation, angle, twist, rate, internal_state, _, duty = kept
     walked = int(np.isfinite(states).all(axis=1).sum())
     seen = [np.full((ticks, observe.numel_out(k)), np.nan) for k in range(5)]
     if walked:
@@ -107,7 +157,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         base_orientation=orientation,
         base_velocity=twist,
         joint_angle=angle,
-        motor_angle=internal_state[:, :n] if robot.has_backlash else angle,
+        motor_angle=encoder_angles(robot, kept),
         joint_velocity=rate,
         desired_angle=setup.desired / robot.description.sensors.angle_counts,
         current=current,

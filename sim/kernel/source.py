@@ -84,12 +84,26 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             *(["#define SINGLE"] if precision == "single" else []),
             vector_header(),
             pieces,
-            *(
-                (resources.files("sim.kernel") / name).read_text(encoding="utf-8")
-                for name in ("counts.h", "tick.c", "sensors.c", "control.c", "driver.c")
-            ),
+            _own_file("counts.h"),
+            control_tick(),
+            _own_file("sensors.c"),
+            _own_file("control.c"),
+            _own_file("driver.c"),
         ]
     )
+
+
+def control_tick() -> str:
+    """The control tick in C, which says nothing of the arithmetic that it is computed in.
+
+    Returns:
+        Text of tick.c.
+    """
+    return _own_file("tick.c")
+
+
+def _own_file(name: str) -> str:
+    return (resources.files("sim.kernel") / name).read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)

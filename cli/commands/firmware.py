@@ -1,0 +1,95 @@
+"""`gaitswarm firmware`: a design as C for the robot's microcontrollers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Db, Json, RobotOption, Server
+
+if TYPE_CHECKING:
+    from gaitswarm.views.firmware import FirmwareView
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(firmware)
+
+
+def firmware(
+    design: Annotated[
+        str,
+        typer.Argument(
+            metavar="DESIGN|ID",
+            help="published:NAME, a file as for `simulate`, `-`, or the id of a job: its best.",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="FOLDER", help="Where to write; made anew."),
+    ],
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas, or all [default: the job's, of"
+            " other designs all]."
+        ),
+    ] = None,
+    controller: Annotated[
+        str | None,
+        typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid [default: the job's, or fuzzy-pi]."),
+    ] = None,
+    robot: RobotOption = None,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """Write a design as C for the robot's microcontrollers, with a test that repeats its walks."""
+    from cli.design_file import given_design
+    from cli.output import print_json
+    from cli.robots import chosen_robot, chosen_scenarios
+    from gaitswarm.firmware import write_firmware
+    from sim.scenario import SCENARIOS
+
+    given = given_design(design, controller, server=server, db=db)
+    walks = SCENARIOS if given.spec is None else given.spec.resolved_scenarios()
+    chosen = None if given.spec is None else given.spec.robot
+    view = write_firmware(
+        given.values,
+        output,
+        scenarios=walks if scenarios is None else chosen_scenarios(scenarios),
+        controller=given.controller,
+        robot=chosen_robot(robot) if robot is not None or chosen is None else chosen,
+        label=given.label,
+    )
+    if as_json:
+        print_json(view)
+    else:
+        _show(view)
+
+
+def _show(view: FirmwareView) -> None:
+    from rich.table import Table
+
+    from cli.output import note, stdout_console
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    table.add_column("scenario", no_wrap=True)
+    for heading in ("walk", "samples", "rows at 500 Hz", "columns", "B", "B of a leg"):
+        table.add_column(heading, justify="right")
+    for walk, gait in zip(view.walks, view.trajectories, strict=True):
+        numbers = (walk.samples, gait.rows, gait.columns, gait.bytes, gait.bytes_of_a_leg)
+        table.add_row(walk.scenario, walk.status, *map(str, numbers))
+    console, memory = stdout_console(), view.memory
+    console.print(table)
+    console.print(
+        f"tables: {memory.tables} B of the {memory.flash} B of flash of an {memory.processor};"
+        f" remembered from tick to tick: {memory.remembered} B of {memory.ram} B of RAM",
+        markup=False,
+    )
+    for remark in memory.remarks:
+        console.print(f"does not fit: {remark}", markup=False)
+    note(f"{len(view.files)} files written, {view.samples} samples to compare:")
+    note(f"  make -C {view.folder} test")

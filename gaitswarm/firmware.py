@@ -1,0 +1,142 @@
+"""`gaitswarm.write_firmware`: a design as C for a microcontroller, in a folder of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from gaitswarm.errors import InvalidRequest, simulation_errors
+from gaitswarm.requests import arguments
+from gaitswarm.simulation import ALL_SCENARIOS
+from gaitswarm.specs import RobotInput, ScenarioInput
+from gaitswarm.views.firmware import FirmwareView
+from sim.controllers import ControllerName
+from sim.firmware import FORMAT, MANIFEST, firmware_of
+from sim.robot import DEFAULT_ROBOT
+
+_BUILT: Final = "build"
+"""Where the folder's Makefile puts what it makes."""
+
+
+def write_firmware(
+    design: Mapping[str, float | str],
+    output: str | os.PathLike[str],
+    *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput] = ALL_SCENARIOS,
+    controller: ControllerName = "fuzzy-pi",
+    robot: RobotInput = DEFAULT_ROBOT,
+    label: str = "design",
+) -> FirmwareView:
+    """Write a design as C99 for a leg's microcontroller (thesis chapter 5), with a test of it.
+
+    The design walks in every scenario; the folder's `make test` gives its controller the readings
+    of these walks, and compares what it answers with what drove them, sample by sample.
+
+    Args:
+        design: Value of each of the controller's variables, and of any gait variable, in their
+            units.
+        output: Folder to write; one that holds firmware is replaced, as a whole or not at all.
+        scenarios: Names or numbers of presets, or `Scenario`: whose trajectories are written and
+            whose walks are repeated.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        label: What people call the design.
+
+    Returns:
+        Files, their sizes, and what they take of the thesis's microcontroller.
+
+    Raises:
+        InvalidRequest: An argument makes no sense, a gait leaves the legs' reach, or the folder
+            holds anything but firmware or cannot be written; names the argument.
+        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
+    """
+    request = arguments.simulation(
+        design,
+        scenarios=scenarios,
+        controller=controller,
+        robot=robot,
+        preference="A",
+        precision="double",
+        log=False,
+    )
+    request.check_walks()
+    target = Path(output)
+    _check_replaceable(target)
+    with simulation_errors("scenarios"):
+        firmware = firmware_of(
+            request.robot,
+            request.controller,
+            request.numbers,
+            request.resolved_scenarios(),
+            label=label,
+        )
+    with _replacing(target) as new:
+        for name, content in firmware.files.items():
+            path = new / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+    return FirmwareView.from_firmware(
+        firmware,
+        folder=str(output),
+        label=label,
+        controller=request.controller,
+        design=request.numbers,
+    )
+
+
+def _check_replaceable(folder: Path) -> None:
+    """Raises InvalidRequest unless all in the folder was written here, or built of it."""
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InvalidRequest(f"{folder} is a file; name a folder", field="output")
+    found = {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if not path.is_dir() and path.relative_to(folder).parts[0] != _BUILT
+    }
+    foreign = sorted(found - _written_files(folder))
+    if foreign:
+        raise InvalidRequest(
+            f"{folder} holds files that are no firmware, such as {foreign[0]}; name another folder",
+            field="output",
+        )
+
+
+def _written_files(folder: Path) -> set[str]:
+    try:
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        if manifest["format"] == FORMAT:
+            return set(manifest["files"])
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    return set()
+
+
+@contextmanager
+def _replacing(folder: Path) -> Iterator[Path]:
+    """A folder that takes the other one's place when the block ends without an exception."""
+    try:
+        target = folder.resolve()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(
+            dir=target.parent, prefix=f".{target.name}.", ignore_cleanup_errors=True
+        ) as scratch:
+            new, old = Path(scratch) / "new", Path(scratch) / "old"
+            new.mkdir()
+            yield new
+            if target.exists():
+                target.rename(old)
+            try:
+                new.rename(target)
+            except OSError:
+                if old.exists():
+                    old.rename(target)
+                raise
+    except OSError as error:
+        raise InvalidRequest(f"cannot write {folder}: {error.strerror}", field="output") from error

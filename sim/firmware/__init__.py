@@ -1,0 +1,8 @@
+"""A design as C for a microcontroller, with the walks that it must repeat to the bit."""
+
+from __future__ import annotations
+
+from sim.firmware.folder import FORMAT, MANIFEST, Firmware, firmware_of
+from sim.firmware.memory import BUDGET, Memory
+
+__all__ = ["BUDGET", "FORMAT", "MANIFEST", "Firmware", "Memory", "firmware_of"]

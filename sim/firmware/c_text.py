@@ -1,0 +1,247 @@
+"""C text of firmware: numbers of a control law, tables, trajectories, what is expected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
+from string import Template
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.base import LookupTable
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.firmware.control_log import ControlLog
+from sim.firmware.integers import LawIntegers
+from sim.firmware.trajectory_table import TrajectoryTable
+from sim.robot import Robot
+
+_WIDTH: Final = 24
+"""Numbers on a line."""
+
+
+def own_file(path: str) -> str:
+    """A file that every folder of firmware has.
+
+    Args:
+        path: Below `sim/firmware/code`.
+
+    Returns:
+        Its text.
+    """
+    return (resources.files("sim.firmware") / "code" / path).read_text(encoding="utf-8")
+
+
+def filled(path: str, **values: object) -> str:
+    """A file of which some words are filled in.
+
+    Args:
+        path: Below `sim/firmware/code`.
+        **values: By the words' names.
+
+    Returns:
+        Its text.
+    """
+    return Template(own_file(path)).substitute(values)
+
+
+def law_header(law: LawIntegers) -> str:
+    """`law.h`: the control law's numbers.
+
+    Args:
+        law: The law.
+
+    Returns:
+        C text that refuses to compile where an integer would be too narrow.
+    """
+    numbers: dict[str, int] = {
+        "FINE_BITS": law.fine_bits,
+        "PROPORTIONAL_GAIN": law.law.proportional_gain,
+        "DERIVATIVE_GAIN": law.law.derivative_gain,
+        "INTEGRAL_GAIN": law.law.integral_gain,
+        **_table_numbers("DIRECT", law.direct),
+        **_table_numbers("INTEGRATED", law.integrated),
+    }
+    return filled(
+        "law.h",
+        ranges="\n".join(
+            f"   {own.name:8} {own.largest:>20} {own.bits:>3}  {own.meaning}" for own in law.ranges
+        ),
+        numbers="\n".join(f"#define {name} {value}" for name, value in numbers.items()),
+    )
+
+
+def _table_numbers(part: str, table: LookupTable | None) -> dict[str, int]:
+    if table is None:
+        shape: tuple[int, ...] = (1, 1, 1)
+        gains, largest = (0, 0, 0, 0), 0
+    else:
+        shape = table.values.shape
+        gains = (table.output_gain, table.error_gain, table.current_gain, table.velocity_gain)
+        largest = int(np.abs(table.values.astype(np.int64)).max())
+    sizes = zip(("ERRORS", "CURRENTS", "VELOCITIES"), shape, strict=True)
+    scales = zip(("GAIN", "ERROR_GAIN", "CURRENT_GAIN", "VELOCITY_GAIN"), gains, strict=True)
+    return {
+        f"{part}_USED": int(table is not None),
+        **{f"{part}_{name}": size for name, size in sizes},
+        # A product in the preprocessor's terms may not fit an int of 16 bits.
+        f"{part}_CELLS": int(np.prod(shape)),
+        f"{part}_LARGEST": largest,
+        **{f"{part}_{name}": gain for name, gain in scales},
+    }
+
+
+def controller_header(robot: Robot, controller: str, label: str) -> str:
+    """`controller.h`: what a leg's firmware calls, with units and scales.
+
+    Args:
+        robot: Whose sensors and bridges the codes are of.
+        controller: Name of the controller.
+        label: What people call the design.
+
+    Returns:
+        C text.
+    """
+    sensors, pwm = robot.description.sensors, robot.description.pwm
+    return filled(
+        "controller.h",
+        label=_remark(label),
+        controller=controller,
+        robot=_remark(robot.description.name),
+        rate=round(1.0 / CONTROL_PERIOD),
+        angle_counts=f"{sensors.angle_counts:g}",
+        angle_step=sensors.angle_step,
+        current_counts=f"{sensors.current_counts:g}",
+        current_step=sensors.current_step,
+        current_filter=f"{sensors.current_filter * 1000:g}",
+        pwm_counts=pwm.counts,
+        pwm_step=pwm.step,
+        full_scale=f"{pwm.full_scale:g}",
+        nominal_voltage=f"{robot.description.supply.nominal_voltage:g}",
+    )
+
+
+def tables_source(law: LawIntegers) -> str:
+    """`tables.c`: the fuzzy tables.
+
+    Args:
+        law: With the tables.
+
+    Returns:
+        C text.
+    """
+    lines = ['#include "tables.h"', ""]
+    for name, table in _tables(law).items():
+        head = f"const int8_t {name}_table[{name.upper()}_CELLS] = {{"
+        lines += [head, *_rows(table.values), "};", ""]
+    return "\n".join(lines)
+
+
+def trajectories_source(tables: Sequence[TrajectoryTable]) -> str:
+    """`trajectories.c`: desired angles.
+
+    Args:
+        tables: By scenario.
+
+    Returns:
+        C text.
+    """
+    lines = ['#include "trajectory.h"', ""]
+    entries = []
+    for number, table in enumerate(tables):
+        size, width = table.rows.shape
+        lines += [
+            f"/* {table.name}: {size} rows of {width} angles, {table.bytes} B (eq. 5.1). */",
+            f"static const int16_t rows_{number}[{table.rows.size}] = {{",
+            *_rows(table.rows),
+            "};",
+            f"static const uint8_t columns_{number}[{len(table.columns)}] = {{",
+            *_rows(table.columns),
+            "};",
+            "",
+        ]
+        entries.append(
+            f'    {{"{table.name}", rows_{number}, {size}, {table.repeats_from}, {width},'
+            f" columns_{number}}},"
+        )
+    lines += ["const Trajectory trajectories[] = {", *entries, "};", ""]
+    return "\n".join(lines)
+
+
+def expected_header(law: LawIntegers, logs: Sequence[ControlLog], legs: int) -> str:
+    """`test/expected.h`: how many walks and tables are compared.
+
+    Args:
+        law: With the tables.
+        logs: Of the walks.
+        legs: Of the robot.
+
+    Returns:
+        C text.
+    """
+    return filled("test/expected.h", legs=legs, walks=len(logs), tables=len(_tables(law)))
+
+
+def expected_source(law: LawIntegers, walks: Mapping[str, int]) -> str:
+    """`test/expected.c`: files of walks, and hashes of tables.
+
+    Args:
+        law: With the tables.
+        walks: Ticks by file.
+
+    Returns:
+        C text.
+    """
+    tables = [
+        f'    {{"{name} table", {name}_table, {table.values.size}u, {fnv(table.values)}u}},'
+        for name, table in _tables(law).items()
+    ]
+    return "\n".join(
+        [
+            '#include "expected.h"',
+            "",
+            '#include "tables.h"',
+            "",
+            "const Expected_walk expected_walks[] = {",
+            *(f'    {{"{file}", {ticks}u}},' for file, ticks in walks.items()),
+            "};",
+            "",
+            "const Expected_table expected_tables[] = {",
+            *tables,
+            "    {0, 0, 0, 0}, /* the end: there may be none */",
+            "};",
+            "",
+        ]
+    )
+
+
+def fnv(values: NDArray[np.int8]) -> int:
+    """FNV-1a hash of 32 bits.
+
+    Args:
+        values: Of a table, in the order in which it is written.
+
+    Returns:
+        The hash.
+    """
+    hashed = 2166136261
+    for byte in values.tobytes():
+        hashed = (hashed ^ byte) * 16777619 & 0xFFFFFFFF
+    return hashed
+
+
+def _tables(law: LawIntegers) -> dict[str, LookupTable]:
+    parts = {"direct": law.direct, "integrated": law.integrated}
+    return {name: table for name, table in parts.items() if table is not None}
+
+
+def _rows(values: NDArray[np.integer]) -> Iterable[str]:
+    flat = values.ravel().tolist()
+    for start in range(0, len(flat), _WIDTH):
+        yield "    " + ", ".join(map(str, flat[start : start + _WIDTH])) + ","
+
+
+def _remark(text: str) -> str:
+    """What cannot end a remark."""
+    return text.replace("*/", "* /").replace("\n", " ")

@@ -1,0 +1,105 @@
+"""What a walk's controllers read and gave, in codes: what firmware is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.assembly import control_steps, kernel_of, plan_walk
+from sim.controllers import ControlLaw
+from sim.firmware.integers import in_16_bits
+from sim.gait.trajectory import require_reachable
+from sim.kernel.observation import encoder_angles, split_states
+from sim.kernel.walk import Coding, WalkResult, WalkSetup
+from sim.outcome import Status
+from sim.robot import Robot
+from sim.scenario import Scenario, with_gait
+
+Codes = NDArray[np.int16]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlLog:
+    """Every sample of a walk's controllers; T ticks, J joints.
+
+    Attributes:
+        scenario: that was walked, in the gait of the design.
+        status: how the walk ended.
+        desired: (T, J) [counts of angle].
+        angle: of the motors, (T, J) [counts of angle].
+        current: absolute, (T, J) [counts of current].
+        pwm: that the controllers gave, (T, J) [PWM counts].
+    """
+
+    scenario: Scenario
+    status: Status
+    desired: Codes
+    angle: Codes
+    current: NDArray[np.uint16]
+    pwm: Codes
+
+    @property
+    def ticks(self) -> int:
+        """T."""
+        return len(self.pwm)
+
+
+def control_logs(
+    robot: Robot,
+    scenarios: Sequence[Scenario],
+    law: ControlLaw,
+    gait: Mapping[str, float],
+) -> tuple[ControlLog, ...]:
+    """Let a control law walk, and keep what it read and gave.
+
+    Args:
+        robot: The robot that walks.
+        scenarios: The walks.
+        law: That drives every joint.
+        gait: Gait parameters of the design, which replace the scenarios'.
+
+    Returns:
+        A log of each scenario, up to where the walk ended.
+
+    Raises:
+        UnreachablePose: A foot's target lies outside its leg's reach.
+        SimulationInputError: A code does not fit 16 bits; names scenario and joint.
+    """
+    kernel = kernel_of(robot)
+    coding, timestep = control_steps(robot)
+    walked = [with_gait(scenario, gait) for scenario in scenarios]
+    setups = []
+    for scenario in walked:
+        require_reachable(robot, scenario)
+        plan = plan_walk(robot, scenario, timestep)
+        if plan is None:
+            raise AssertionError("a gait within reach is planned")
+        setups.append(plan(law))
+    results = kernel.walk(setups, coding, log=True)
+    return tuple(
+        _control_log(robot, scenario, coding, setup, result)
+        for scenario, setup, result in zip(walked, setups, results, strict=True)
+    )
+
+
+def _control_log(
+    robot: Robot, scenario: Scenario, coding: Coding, setup: WalkSetup, result: WalkResult
+) -> ControlLog:
+    if result.states is None:
+        raise AssertionError("states are kept of a walk whose log is asked for")
+    walked = int(np.isfinite(result.states).all(axis=1).sum())
+    states = split_states(robot, result.states[:walked])
+    desired = setup.desired[:walked].astype(np.int64)
+    angle = coding.angle_codes(encoder_angles(robot, states))
+    joints = robot.joint_names
+    return ControlLog(
+        scenario=scenario,
+        status=Status(result.status),
+        desired=in_16_bits(desired, f"{scenario.name}: the desired angle", joints),
+        angle=in_16_bits(angle, f"{scenario.name}: the angle", joints),
+        current=coding.current_codes(states.sensed_current).astype(np.uint16),
+        pwm=coding.pwm_codes(states.duty).astype(np.int16),
+    )

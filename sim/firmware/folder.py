@@ -1,0 +1,184 @@
+"""Firmware as a folder of files."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sim.assembly import control_steps
+from sim.controllers import ControllerName, control_law
+from sim.firmware.c_text import (
+    controller_header,
+    expected_header,
+    expected_source,
+    law_header,
+    own_file,
+    tables_source,
+    trajectories_source,
+)
+from sim.firmware.control_log import ControlLog, control_logs
+from sim.firmware.integers import LawIntegers, law_integers
+from sim.firmware.memory import Memory
+from sim.firmware.readme import readme
+from sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
+from sim.kernel.source import control_tick
+from sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
+from sim.robot.description import JOINTS_PER_LEG
+from sim.scenario import GAIT_VARIABLE_NAMES, PRESETS, Scenario
+
+MANIFEST: Final = "firmware.json"
+"""File that says what the others are, by which a folder is known as firmware."""
+
+FORMAT: Final = "gaitswarm firmware 1"
+
+_CODE: Final = (
+    "Makefile",
+    "controller.c",
+    "counts.h",
+    "tables.h",
+    "trajectory.h",
+    "test/host.c",
+    "test/machine.h",
+    "test/replay.c",
+    "target/board.c",
+    "target/board.ld",
+    "target/cycles.awk",
+)
+"""Files that are the same in every folder, as they are in this package."""
+
+_MAGIC: Final = b"GSWALK1\0"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Firmware:
+    """A design for a microcontroller.
+
+    Attributes:
+        files: content by path, of which the manifest is the last.
+        law: the control law in integers.
+        trajectories: desired angles, by scenario.
+        logs: of the simulated walks that a test of the files repeats.
+        memory: that it takes.
+    """
+
+    files: Mapping[str, bytes]
+    law: LawIntegers
+    trajectories: tuple[TrajectoryTable, ...]
+    logs: tuple[ControlLog, ...]
+    memory: Memory
+
+    @property
+    def samples(self) -> int:
+        """Outputs that a test of the files compares."""
+        return sum(log.pwm.size for log in self.logs)
+
+
+def firmware_of(
+    robot: RobotChoice,
+    controller: ControllerName,
+    design: Mapping[str, float],
+    scenarios: Sequence[Scenario],
+    *,
+    label: str,
+) -> Firmware:
+    """Write a design as C, and let it walk for the test of it.
+
+    Args:
+        robot: That is to walk.
+        controller: Name of the motor controller.
+        design: Values of its variables, and of any conventions and gait parameters.
+        scenarios: Whose trajectories are written, and whose walks are logged.
+        label: What people call the design.
+
+    Returns:
+        The files.
+
+    Raises:
+        UnreachablePose: A gait is out of the legs' reach.
+        SimulationInputError: The design cannot be simulated, or needs integers that the robot does
+            not have; names the variable, or scenario and joint.
+    """
+    gait = {name: value for name, value in design.items() if name in GAIT_VARIABLE_NAMES}
+    gains = {name: value for name, value in design.items() if name not in gait}
+    machine = load_robot(robot)
+    law = control_law(controller, tuple(gains.items()))
+    coding, _ = control_steps(machine)
+    integers = law_integers(law, coding)
+    logs = control_logs(machine, scenarios, law, gait)
+    trajectories = tuple(trajectory_table(machine, log.scenario) for log in logs)
+    memory = Memory.of(integers, trajectories)
+    walks = {f"test/walks/{log.scenario.name}.walk": log for log in logs}
+    legs = machine.n_joints // JOINTS_PER_LEG
+    names, own_scenarios = _scenario_files(scenarios)
+    robot_option, own_robot = _robot_files(robot)
+    texts = {
+        **{name: own_file(name) for name in _CODE},
+        "tick.c": control_tick(),
+        "controller.h": controller_header(machine, controller, label),
+        "law.h": law_header(integers),
+        "tables.c": tables_source(integers),
+        "trajectories.c": trajectories_source(trajectories),
+        "test/expected.h": expected_header(integers, logs, legs),
+        "test/expected.c": expected_source(integers, {f: log.ticks for f, log in walks.items()}),
+        "README.md": readme(label, controller, memory, trajectories, names, robot_option),
+        **own_scenarios,
+        **own_robot,
+    }
+    files = {name: text.encode() for name, text in sorted(texts.items())}
+    files |= {name: _walk_file(log) for name, log in walks.items()}
+    manifest = {
+        "format": FORMAT,
+        "label": label,
+        "robot": machine.description.name,
+        "controller": controller,
+        "design": dict(design),
+        "scenarios": [log.scenario.model_dump(mode="json") for log in logs],
+        "files": [*files, MANIFEST],
+    }
+    files[MANIFEST] = (json.dumps(manifest, indent=2) + "\n").encode()
+    return Firmware(files, integers, trajectories, logs, memory)
+
+
+def _scenario_files(scenarios: Sequence[Scenario]) -> tuple[list[str], dict[str, str]]:
+    """What the command line calls the scenarios, and files for those that are no presets."""
+    names, files = [], {}
+    for scenario in scenarios:
+        name = scenario.name
+        if scenario not in PRESETS:
+            name = f"scenarios/{scenario.name}.json"
+            files[name] = scenario.model_dump_json(indent=2) + "\n"
+        names.append(name)
+    return names, files
+
+
+def _robot_files(robot: RobotChoice) -> tuple[str, dict[str, str]]:
+    """What the command line calls the robot, nothing for the default, and files of one's own."""
+    if isinstance(robot, str):
+        return ("" if robot == DEFAULT_ROBOT else robot), {}
+    if isinstance(robot, RobotVariant):
+        return shlex.quote(robot.model_dump_json(exclude_defaults=True)), {}
+    if isinstance(robot, RobotFiles):
+        return "robot", {"robot/robot.toml": robot.toml, "robot/robot.urdf": robot.urdf}
+    return "FOLDER", {}
+
+
+def _walk_file(log: ControlLog) -> bytes:
+    """Little-endian; leg by leg, tick by tick: desired angles, angles, currents, PWM counts."""
+    ticks, joints = log.pwm.shape
+    legs = joints // JOINTS_PER_LEG
+    columns = np.stack(
+        [
+            log.desired.view(np.uint16),
+            log.angle.view(np.uint16),
+            log.current,
+            log.pwm.view(np.uint16),
+        ]
+    )
+    by_leg = columns.reshape(4, ticks, legs, JOINTS_PER_LEG).transpose(2, 1, 0, 3)
+    return _MAGIC + struct.pack("<II", legs, ticks) + by_leg.astype("<u2").tobytes()

@@ -1,0 +1,174 @@
+"""How wide a control law's integers must be on a microcontroller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.base import ControlLaw, LookupTable, Response
+from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS
+from sim.errors import SimulationInputError
+from sim.kernel.walk import CODE_LIMIT, Coding, check_gains
+
+_INT32: Final = (1 << 31) - 1
+
+_NARROW: Final = 32
+_WIDE: Final = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """How large a number of the control tick can become.
+
+    Attributes:
+        name: in tick.c.
+        meaning: with its unit.
+        largest: absolute.
+        bits: of the integer that holds it, its sign included.
+    """
+
+    name: str
+    meaning: str
+    largest: int
+    bits: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LawIntegers:
+    """A control law as a microcontroller computes it.
+
+    Attributes:
+        law: the control law; tables only.
+        full_scale: of the PWM [counts].
+        pwm_step: resolution of the PWM [counts].
+        fine_bits: of numbers with 16 fraction bits, 32 or 64: the narrower one that holds all.
+        ranges: of the numbers of the control tick.
+    """
+
+    law: ControlLaw
+    full_scale: int
+    pwm_step: int
+    fine_bits: int
+    ranges: tuple[Range, ...]
+
+    @property
+    def direct(self) -> LookupTable | None:
+        """The table of the direct part, if there is one."""
+        return as_table(self.law.direct)
+
+    @property
+    def integrated(self) -> LookupTable | None:
+        """The table of what is integrated, if there is one."""
+        return as_table(self.law.integrated)
+
+
+def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
+    """Bound every number of the control tick, for readings of any size.
+
+    Args:
+        law: The control law.
+        coding: Of sensors and PWM.
+
+    Returns:
+        The law with the widths of its integers.
+
+    Raises:
+        SimulationInputError: It asks for an inference, which no table stands for, or a gain is
+            beyond the controllers' integers.
+    """
+    check_gains(law)
+    direct, integrated = as_table(law.direct), as_table(law.integrated)
+    half = 1 << (FRACTION_BITS - 1)
+    change = 2 * CODE_LIMIT
+    products = max((_largest_product(t) for t in (direct, integrated) if t), default=0) + half
+    now = (
+        CODE_LIMIT * abs(law.proportional_gain)
+        + change * abs(law.derivative_gain)
+        + _largest_output(direct)
+        + half
+    )
+    grown = (
+        (coding.pwm_counts << INTEGRAL_BITS)
+        + CODE_LIMIT * abs(law.integral_gain)
+        + _largest_output(integrated)
+        + (1 << (INTEGRAL_BITS - 1))
+    )
+    # The middle of an axis is added to its index; tables have fewer rows than 2^16.
+    fine = _NARROW if max(products, now) <= _INT32 - (1 << 16) else _WIDE
+    return LawIntegers(
+        law=law,
+        full_scale=coding.pwm_counts,
+        pwm_step=coding.pwm_step,
+        fine_bits=fine,
+        ranges=(
+            Range("error", "angle error [counts]", CODE_LIMIT, _NARROW),
+            Range("change", "of the error over a tick [counts]", change, _NARROW),
+            Range("current", "absolute current [counts]", CODE_LIMIT, _NARROW),
+            Range("index", "of a table, 16 fraction bits", products, fine),
+            Range("now", "direct part [PWM counts], 16 fraction bits", now, fine),
+            Range("grown", "integral part [PWM counts], 32 fraction bits", grown, _WIDE),
+            Range("pwm", "output [PWM counts]", coding.pwm_counts, 16),
+        ),
+    )
+
+
+def as_table(response: Response | None) -> LookupTable | None:
+    """A part of a control law as a table.
+
+    Args:
+        response: The part, or None.
+
+    Returns:
+        The table, or None if the law has no such part.
+
+    Raises:
+        SimulationInputError: It is an inference.
+    """
+    if response is None or isinstance(response, LookupTable):
+        return response
+    raise SimulationInputError("firmware looks up tables; an inference has none")
+
+
+def in_16_bits(codes: NDArray[np.int64], what: str, joints: Sequence[str]) -> NDArray[np.int16]:
+    """Codes of angles as the robot has them: half a turn in either direction.
+
+    Args:
+        codes: (T, J) [counts].
+        what: They are, for messages.
+        joints: J names.
+
+    Returns:
+        The same numbers.
+
+    Raises:
+        SimulationInputError: One does not fit; names the joint.
+    """
+    limits = np.iinfo(np.int16)
+    beyond = (codes < limits.min) | (codes > limits.max)
+    if beyond.any():
+        tick, joint = (int(index) for index in np.argwhere(beyond)[0])
+        raise SimulationInputError(
+            f"{what} of {joints[joint]} is {int(codes[tick, joint])} counts after {tick} ticks,"
+            " which the 16 bits of firmware do not hold; leave this scenario out"
+        )
+    return codes.astype(np.int16)
+
+
+def _largest_product(table: LookupTable) -> int:
+    """Of a reading and its index gain."""
+    return max(
+        CODE_LIMIT * abs(table.error_gain),
+        CODE_LIMIT * abs(table.current_gain),
+        2 * CODE_LIMIT * abs(table.velocity_gain),
+    )
+
+
+def _largest_output(table: LookupTable | None) -> int:
+    if table is None:
+        return 0
+    values = max(int(table.values.max()), -int(table.values.min()))
+    return values * abs(table.output_gain)

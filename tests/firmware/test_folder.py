@@ -1,0 +1,88 @@
+"""The folder is written whole or not at all, over firmware only."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from gaitswarm.errors import InvalidRequest
+from gaitswarm.firmware import write_firmware
+from tests.examples.walks import short_walk
+
+PI = {"P": 0.25, "I": 0.0}
+BRIEF = short_walk(cycle_time=0.5, stride=0.04)
+
+
+def write(folder: Path, **changes: float) -> None:
+    write_firmware(PI | changes, folder, controller="pi", scenarios=BRIEF)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_the_same_design_gives_the_same_bytes(tmp_path: Path) -> None:
+    write(tmp_path / "a")
+    write(tmp_path / "b")
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+
+
+def test_firmware_is_replaced_with_all_that_was_built_of_it(tmp_path: Path) -> None:
+    folder = tmp_path / "firmware"
+    write(folder, P=0.5)
+    (folder / "build").mkdir()
+    (folder / "build" / "replay").touch()
+    write(folder)
+    write(tmp_path / "fresh")
+    assert contents(folder) == contents(tmp_path / "fresh")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["firmware", "fresh"]
+
+
+def test_an_empty_folder_is_written(tmp_path: Path) -> None:
+    (tmp_path / "firmware").mkdir()
+    write(tmp_path / "firmware")
+    assert (tmp_path / "firmware" / "controller.c").is_file()
+
+
+def test_other_peoples_files_are_left_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "firmware"
+    write(folder)
+    (folder / "test" / "mine.txt").write_text("keep", encoding="utf-8")
+    before = contents(folder)
+    with pytest.raises(InvalidRequest, match=r"test/mine\.txt") as refused:
+        write(folder, P=0.5)
+    assert refused.value.field == "output"
+    assert contents(folder) == before
+    with pytest.raises(InvalidRequest, match="is a file"):
+        write(folder / "controller.c")
+
+
+@pytest.mark.parametrize("fails", [Path.write_bytes, Path.rename], ids=["a file", "the folder"])
+def test_what_was_there_stays_where_writing_fails(
+    fails: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "firmware"
+    write(folder)
+    before, calls = contents(folder), []
+
+    def failing(path: Path, *arguments: object) -> object:
+        calls.append(path)
+        if len(calls) == 2:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return fails(path, *arguments)  # type: ignore[operator]
+
+    monkeypatch.setattr(Path, getattr(fails, "__name__", ""), failing)
+    with pytest.raises(InvalidRequest, match="No space left"):
+        write(folder, P=0.5)
+    assert len(calls) >= 2
+    assert contents(folder) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["firmware"]
+
+
+def test_a_gait_out_of_reach_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(InvalidRequest, match="misses its foot trajectory"):
+        write(tmp_path / "firmware", stride=0.6)
+    assert not (tmp_path / "firmware").exists()

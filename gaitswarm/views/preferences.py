@@ -13,7 +13,9 @@ class PreferenceWinnerView(View):
     """A design that is the best of its job under some preferences."""
 
     iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
-    particle: int = Field(description="Particle of the swarm, from 0.", examples=[7])
+    particle: int = Field(
+        description="Number of the design in its iteration, from 0.", examples=[7]
+    )
     design: dict[str, float | str] = Field(
         description="Value of every variable, by name.", examples=[{"I": 0.171, "FI1R": 5837.0}]
     )

@@ -66,11 +66,11 @@ typedef struct {
   wide timestep, weight; /* of a physics step [s], and per one of those without a landing */
   Gains gains;
   Past past;
-  Sensors sensors;
   int filtered, disturbed, shoved; /* whether any lane's current, links or body are */
   vec sensed[NJ], smoothing;
   wide sums[N_INTEGRANDS];
   vec peak;
+  Sensors sensors; /* the largest, and mostly not used: last */
 } Lanes;
 
 /* Rounds of physics steps that were walked for a walker, and all that were computed. */
@@ -170,6 +170,7 @@ static void begin_ticks(Lanes *s, const Coding *c)
     OF_LANE(s->timestep, k) = w->parameters[TIMESTEP] / (double)s->rounds_left[k];
     s->p[TIMESTEP][k] = (real)OF_LANE(s->timestep, k);
     s->smoothing[k] = (real)w->smoothing[landing];
+    if (!s->shoved) continue;
     const int pushed = w->shove[0] <= s->tick[k] && s->tick[k] < w->shove[1];
     for (int i = PUSH; i < PUSH + 3; i++) s->p[i][k] = pushed ? (real)w->parameters[i] : 0;
   }

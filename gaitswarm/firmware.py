@@ -16,7 +16,7 @@ from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views.firmware import FirmwareView
 from sim.controllers import ControllerName
-from sim.firmware import FORMAT, MANIFEST, firmware_of
+from sim.firmware import FORMAT, MANIFEST, check_table_bits, firmware_of
 from sim.robot import DEFAULT_ROBOT
 
 _BUILT: Final = "build"
@@ -31,6 +31,7 @@ def write_firmware(
     controller: ControllerName = "fuzzy-pi",
     robot: RobotInput = DEFAULT_ROBOT,
     label: str = "design",
+    table_bits: tuple[int, int] | None = None,
 ) -> FirmwareView:
     """Write a design as C99 for a leg's microcontroller (thesis chapter 5), with a test of it.
 
@@ -46,6 +47,9 @@ def write_firmware(
         controller: Motor controller that drives the robot.
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
         label: What people call the design.
+        table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
+            place of 10 and 6, where there is less flash; the walks are by this table, and their
+            difference from those by the usual one is told.
 
     Returns:
         Files, their sizes, and what they take of the thesis's microcontroller.
@@ -67,6 +71,9 @@ def write_firmware(
     request.check_walks()
     target = Path(output)
     _check_replaceable(target)
+    if table_bits is not None:
+        with simulation_errors("table_bits"):
+            check_table_bits(request.controller, table_bits)
     with simulation_errors("scenarios"):
         firmware = firmware_of(
             request.robot,
@@ -74,6 +81,7 @@ def write_firmware(
             request.numbers,
             request.resolved_scenarios(),
             label=label,
+            table_bits=table_bits,
         )
     with _replacing(target) as new:
         for name, content in firmware.files.items():

@@ -42,6 +42,13 @@ def firmware(
         typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid [default: the job's, or fuzzy-pi]."),
     ] = None,
     robot: RobotOption = None,
+    table_bits: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ERRORxCURRENT",
+            help="Bits of a fuzzy table's indices [default: 10x6]; the walks are by this table.",
+        ),
+    ] = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
@@ -63,11 +70,22 @@ def firmware(
         controller=given.controller,
         robot=chosen_robot(robot) if robot is not None or chosen is None else chosen,
         label=given.label,
+        table_bits=None if table_bits is None else _bits(table_bits),
     )
     if as_json:
         print_json(view)
     else:
         _show(view)
+
+
+def _bits(text: str) -> tuple[int, int]:
+    """Raises InvalidRequest."""
+    from services.optimizer.errors import InvalidRequest
+
+    error, _, current = text.partition("x")
+    if not (error.isascii() and error.isdigit() and current.isascii() and current.isdigit()):
+        raise InvalidRequest(f"{text!r} is not like 8x6", field="table_bits")
+    return int(error), int(current)
 
 
 def _show(view: FirmwareView) -> None:
@@ -89,6 +107,12 @@ def _show(view: FirmwareView) -> None:
         f" remembered from tick to tick: {memory.remembered} B of {memory.ram} B of RAM",
         markup=False,
     )
+    if view.table_difference is not None:
+        differences = ", ".join(
+            f"{name.replace('_', ' ')} {'unknown' if share is None else f'{share:.2%}'}"
+            for name, share in view.table_difference.items()
+        )
+        console.print(f"from walks by 10 x 6 bits at most: {differences}", markup=False)
     for remark in memory.remarks:
         console.print(f"does not fit: {remark}", markup=False)
     note(f"{len(view.files)} files written, {view.samples} samples to compare:")

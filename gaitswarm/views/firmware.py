@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gaitswarm.views.base import View
+from gaitswarm.views.base import View, finite
 from sim.controllers import ControllerName
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.firmware import BUDGET, Firmware
@@ -83,6 +83,11 @@ class FirmwareView(View):
         description="Width of the numbers with 16 fraction bits, 32 or 64 [bit].", examples=[32]
     )
     tables: list[FirmwareTableView] = Field(description="Fuzzy tables; none for P, PI, PID.")
+    table_difference: dict[str, float | None] | None = Field(
+        description="By objective, how far the walks are from those by the table of 10 x 6 bits, at"
+        " most over the scenarios [1]; null with that table.",
+        examples=[None],
+    )
     trajectories: list[FirmwareTrajectoryView] = Field(description="By scenario.")
     walks: list[FirmwareWalkView] = Field(description="By scenario.")
     samples: int = Field(description="Of all walks [1].", examples=[280800])
@@ -123,6 +128,11 @@ class FirmwareView(View):
                 for name, table in parts.items()
                 if table is not None
             ],
+            table_difference=(
+                None
+                if firmware.table_difference is None
+                else {name: finite(value) for name, value in firmware.table_difference.items()}
+            ),
             trajectories=[
                 FirmwareTrajectoryView(
                     scenario=table.name,

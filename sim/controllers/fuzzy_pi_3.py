@@ -156,10 +156,16 @@ def integral_system(
 
 @lru_cache(maxsize=192)
 def _voltage_table(
-    w1: float, w34: float, w56: float, shape: Shape, sets: MembershipSets
+    w1: float,
+    w34: float,
+    w56: float,
+    shape: Shape,
+    sets: MembershipSets,
+    error: Axis,
+    current: Axis,
 ) -> Quantised:
     system = voltage_system(w1, w34, w56, shape, sets)
-    return quantised(system, {"error": ERROR, "current": CURRENT})
+    return quantised(system, {"error": error, "current": current})
 
 
 @lru_cache(maxsize=192)
@@ -263,46 +269,71 @@ class FuzzyPi3:
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """A table of the voltage, and one of the integrated voltage's rate."""
-        voltage, rate = self.inferences(design)
+        return self.compile_with(design, ERROR, CURRENT)
+
+    def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
+        """The same controller with a table of the voltage of other resolution.
+
+        Args:
+            design: Value of every variable by name.
+            error: Axis of the angle error.
+            current: Axis of the current.
+
+        Returns:
+            Its control law.
+
+        Raises:
+            SimulationInputError: A value is missing or cannot be represented; names the variable.
+        """
+        voltage, rate = _inferences(design, error, current)
         return ControlLaw(direct=voltage.table, integrated=rate.table)
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
         """The inferences of the voltage, and of the integrated voltage's rate."""
-        error_range = required(design, "A_ERR", low=64.0, high=65535.0)
-        current_range = required(design, "I_MA", low=0.1, high=30.0)
-        velocity_range = required(design, "V_ERR", low=100.0, high=1e7)
-        weights = [
-            required(design, w, low=0.0, high=1.0) for w in ("W1", "W2", "W34", "W56", "W78")
-        ]
-        error = Universe("error", "counts", error_range)
-        current = Universe("current", "A", current_range, counts=CURRENT_COUNTS)
-        # The kernel's change of error is over one tick.
-        velocity = Universe("velocity", "counts/s", velocity_range, counts=CONTROL_PERIOD)
-        return (
-            _voltage(design, weights, error, current),
-            _integral(design, weights, error, current, velocity),
-        )
+        return _inferences(design, ERROR, CURRENT)
+
+
+def _inferences(
+    design: Mapping[str, float], error_axis: Axis, current_axis: Axis
+) -> tuple[Inference, Inference]:
+    """Of the voltage, whose table has these axes, and of the integrated voltage's rate."""
+    error_range = required(design, "A_ERR", low=64.0, high=65535.0)
+    current_range = required(design, "I_MA", low=0.1, high=30.0)
+    velocity_range = required(design, "V_ERR", low=100.0, high=1e7)
+    weights = [required(design, w, low=0.0, high=1.0) for w in ("W1", "W2", "W34", "W56", "W78")]
+    error = Universe("error", "counts", error_range)
+    current = Universe("current", "A", current_range, counts=CURRENT_COUNTS)
+    # The kernel's change of error is over one tick.
+    velocity = Universe("velocity", "counts/s", velocity_range, counts=CONTROL_PERIOD)
+    return (
+        _voltage(design, weights, error, current, {"error": error_axis, "current": current_axis}),
+        _integral(design, weights, error, current, velocity),
+    )
 
 
 def _voltage(
-    design: Mapping[str, float], weights: Sequence[float], error: Universe, current: Universe
+    design: Mapping[str, float],
+    weights: Sequence[float],
+    error: Universe,
+    current: Universe,
+    axes: Mapping[str, Axis],
 ) -> Inference:
     """FzzP. weights: W1, W2, W34, W56, W78."""
     w1, _, w34, w56, _ = weights
     full_range = required(design, "FzzP", low=1.0, high=32767.0)
     shape = Shape(required_integer(design, "FzzP_MF", low=1, high=3))
     sets = MembershipSets.of(design, _CONVENTIONS)
-    table = _voltage_table(w1, w34, w56, shape, sets)
+    table = _voltage_table(w1, w34, w56, shape, sets, axes["error"], axes["current"])
     return Inference(
         output=Universe("FzzP", "PWM counts", full_range, counts=1 << FRACTION_BITS),
         inputs={"error": error, "current": current},
         system=voltage_system(w1, w34, w56, shape, sets),
-        axes={"error": ERROR, "current": CURRENT},
+        axes=axes,
         table=LookupTable(
             values=table.values[:, :, np.newaxis],
             output_gain=to_fixed(full_range * table.step, FRACTION_BITS),
-            error_gain=ERROR.gain(error.full_range),
-            current_gain=CURRENT.gain(current.full_range * current.counts),
+            error_gain=axes["error"].gain(error.full_range),
+            current_gain=axes["current"].gain(current.full_range * current.counts),
         ),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.firmware.folder import FORMAT, MANIFEST, Firmware, firmware_of
+from sim.firmware.folder import FORMAT, MANIFEST, Firmware, check_table_bits, firmware_of
 from sim.firmware.memory import BUDGET, Memory
 
-__all__ = ["BUDGET", "FORMAT", "MANIFEST", "Firmware", "Memory", "firmware_of"]
+__all__ = ["BUDGET", "FORMAT", "MANIFEST", "Firmware", "Memory", "check_table_bits", "firmware_of"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, kernel_of, plan_walk
+from sim.assembly import control_steps, judge, kernel_of, plan_walk
 from sim.controllers import ControlLaw
 from sim.firmware.integers import in_16_bits
 from sim.gait.trajectory import require_reachable
@@ -32,6 +32,7 @@ class ControlLog:
         angle: of the motors, (T, J) [counts of angle].
         current: absolute, (T, J) [counts of current].
         pwm: that the controllers gave, (T, J) [PWM counts].
+        objectives: what the walk is worth, f1 to f6, (6,), NaN where there is none.
     """
 
     scenario: Scenario
@@ -40,6 +41,7 @@ class ControlLog:
     angle: Codes
     current: NDArray[np.uint16]
     pwm: Codes
+    objectives: NDArray[np.float64]
 
     @property
     def ticks(self) -> int:
@@ -80,13 +82,18 @@ def control_logs(
         setups.append(plan(law))
     results = kernel.walk(setups, coding, log=True)
     return tuple(
-        _control_log(robot, scenario, coding, setup, result)
+        _control_log(robot, scenario, coding, timestep, setup, result)
         for scenario, setup, result in zip(walked, setups, results, strict=True)
     )
 
 
 def _control_log(
-    robot: Robot, scenario: Scenario, coding: Coding, setup: WalkSetup, result: WalkResult
+    robot: Robot,
+    scenario: Scenario,
+    coding: Coding,
+    timestep: float,
+    setup: WalkSetup,
+    result: WalkResult,
 ) -> ControlLog:
     if result.states is None:
         raise AssertionError("states are kept of a walk whose log is asked for")
@@ -95,11 +102,13 @@ def _control_log(
     desired = setup.desired[:walked].astype(np.int64)
     angle = coding.angle_codes(encoder_angles(robot, states))
     joints = robot.joint_names
+    status, objectives = judge(setup, result, coding.substeps, timestep)
     return ControlLog(
         scenario=scenario,
-        status=Status(result.status),
+        status=status,
         desired=in_16_bits(desired, f"{scenario.name}: the desired angle", joints),
         angle=in_16_bits(angle, f"{scenario.name}: the angle", joints),
         current=coding.current_codes(states.sensed_current).astype(np.uint16),
         pwm=coding.pwm_codes(states.duty).astype(np.int16),
+        objectives=objectives,
     )

@@ -7,12 +7,14 @@ import shlex
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
 from sim.assembly import control_steps
-from sim.controllers import ControllerName, control_law
+from sim.controllers import CONTROLLERS, ControlLaw, ControllerName, control_law
+from sim.controllers.quantisation import Axis
+from sim.errors import SimulationInputError
 from sim.firmware.c_text import (
     controller_header,
     expected_header,
@@ -28,6 +30,7 @@ from sim.firmware.memory import Memory
 from sim.firmware.readme import readme
 from sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
 from sim.kernel.source import control_tick
+from sim.outcome import OBJECTIVE_NAMES
 from sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
 from sim.robot.description import JOINTS_PER_LEG
 from sim.scenario import GAIT_VARIABLE_NAMES, PRESETS, Scenario
@@ -36,6 +39,9 @@ MANIFEST: Final = "firmware.json"
 """File that says what the others are, by which a folder is known as firmware."""
 
 FORMAT: Final = "gaitswarm firmware 1"
+
+MOST_BITS: Final = (12, 8)
+"""Of the indices of a table that is not the usual one: angle error and current."""
 
 _CODE: Final = (
     "Makefile",
@@ -65,6 +71,8 @@ class Firmware:
         trajectories: desired angles, by scenario.
         logs: of the simulated walks that a test of the files repeats.
         memory: that it takes.
+        table_difference: by objective, how far its walks are from those by the usual table, at most
+            [1]; None with the usual table.
     """
 
     files: Mapping[str, bytes]
@@ -72,6 +80,7 @@ class Firmware:
     trajectories: tuple[TrajectoryTable, ...]
     logs: tuple[ControlLog, ...]
     memory: Memory
+    table_difference: Mapping[str, float] | None = None
 
     @property
     def samples(self) -> int:
@@ -86,6 +95,7 @@ def firmware_of(
     scenarios: Sequence[Scenario],
     *,
     label: str,
+    table_bits: tuple[int, int] | None = None,
 ) -> Firmware:
     """Write a design as C, and let it walk for the test of it.
 
@@ -95,6 +105,8 @@ def firmware_of(
         design: Values of its variables, and of any conventions and gait parameters.
         scenarios: Whose trajectories are written, and whose walks are logged.
         label: What people call the design.
+        table_bits: Of the direct table's indices, error and current, in place of the usual 10 and
+            6; the walks are by this table. `check_table_bits` has passed them.
 
     Returns:
         The files.
@@ -107,12 +119,20 @@ def firmware_of(
     gait = {name: value for name, value in design.items() if name in GAIT_VARIABLE_NAMES}
     gains = {name: value for name, value in design.items() if name not in gait}
     machine = load_robot(robot)
-    law = control_law(controller, tuple(gains.items()))
+    usual = control_law(controller, tuple(gains.items()))
+    law = usual
+    if table_bits is not None:
+        error, current = table_bits
+        axes = Axis(error, centred=True), Axis(current, centred=False)
+        law = _tabulated(controller).compile_with(gains, *axes)
     coding, _ = control_steps(machine)
     integers = law_integers(law, coding)
     logs = control_logs(machine, scenarios, law, gait)
     trajectories = tuple(trajectory_table(machine, log.scenario) for log in logs)
     memory = Memory.of(integers, trajectories)
+    difference = None
+    if table_bits is not None:
+        difference = _difference(logs, control_logs(machine, scenarios, usual, gait))
     walks = {f"test/walks/{log.scenario.name}.walk": log for log in logs}
     legs = machine.n_joints // JOINTS_PER_LEG
     names, own_scenarios = _scenario_files(scenarios)
@@ -138,11 +158,50 @@ def firmware_of(
         "robot": machine.description.name,
         "controller": controller,
         "design": dict(design),
+        "table_bits": table_bits,
         "scenarios": [log.scenario.model_dump(mode="json") for log in logs],
         "files": [*files, MANIFEST],
     }
     files[MANIFEST] = (json.dumps(manifest, indent=2) + "\n").encode()
-    return Firmware(files, integers, trajectories, logs, memory)
+    return Firmware(files, integers, trajectories, logs, memory, difference)
+
+
+def check_table_bits(controller: ControllerName, bits: tuple[int, int]) -> None:
+    """Check that a controller can have a table of other resolution.
+
+    Args:
+        controller: Its name.
+        bits: Of the indices of angle error and current.
+
+    Raises:
+        SimulationInputError: It has no table, or such a one makes no sense.
+    """
+    _tabulated(controller)
+    for name, own, most in zip(("angle error", "current"), bits, MOST_BITS, strict=True):
+        if not 2 <= own <= most:
+            raise SimulationInputError(f"{own} bits of {name} are not 2 to {most}")
+
+
+@runtime_checkable
+class _Tabulated(Protocol):
+    """A controller whose direct part is a table."""
+
+    def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
+        """With a table of these axes."""
+
+
+def _tabulated(controller: ControllerName) -> _Tabulated:
+    family = CONTROLLERS[controller]
+    if isinstance(family, _Tabulated):
+        return family
+    raise SimulationInputError(f"{controller} has no table")
+
+
+def _difference(logs: Sequence[ControlLog], usual: Sequence[ControlLog]) -> dict[str, float]:
+    """Largest over scenarios, by objective but the height loss, which is near zero."""
+    ours, theirs = (np.array([log.objectives for log in walked]) for walked in (logs, usual))
+    largest = np.abs(ours / theirs - 1.0).max(axis=0)
+    return dict(zip(OBJECTIVE_NAMES[:-1], largest[:-1].tolist(), strict=True))
 
 
 def _scenario_files(scenarios: Sequence[Scenario]) -> tuple[list[str], dict[str, str]]:

@@ -97,8 +97,8 @@ class Memory:
             remarks.append(
                 f"tables of {self.tables} B and some {CODE_BYTES} B of code are"
                 f" {self.flash - BUDGET.flash} B more than the flash of an {BUDGET.name}"
-                f" ({BUDGET.flash} B); tune fuzzy-pi, whose one table has 65536 B, or take a"
-                " microcontroller with more"
+                f" ({BUDGET.flash} B); take a table of fewer bits (8x6 are 16384 B in place of"
+                " 65536 B), or a microcontroller with more"
             )
         if not self.trajectories_fit:
             rest = max(0, BUDGET.flash - self.flash)

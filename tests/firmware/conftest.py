@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -58,9 +58,6 @@ def make(folder: Path, target: str, *variables: str, path: str | None = None) ->
 def published(controller: ControllerName, name: str) -> Mapping[str, float]:
     """A design of the literature."""
     return CONTROLLERS[controller].published[name]
-
-
-Write = Callable[..., Path]
 
 
 @pytest.fixture(scope="session")

@@ -66,7 +66,8 @@ def test_what_was_there_stays_where_writing_fails(
 ) -> None:
     folder = tmp_path / "firmware"
     write(folder)
-    before, calls = contents(folder), []
+    before = contents(folder)
+    calls: list[Path] = []
 
     def failing(path: Path, *arguments: object) -> object:
         calls.append(path)

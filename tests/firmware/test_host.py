@@ -61,7 +61,9 @@ def test_every_sample_of_the_six_walks_is_the_simulators(
     ],
     ids=["encoders before the backlash", "four legs"],
 )
-def test_every_sample_is_the_simulators_on_other_robots(robot: object, tmp_path: Path) -> None:
+def test_every_sample_is_the_simulators_on_other_robots(
+    robot: RobotVariant | Path, tmp_path: Path
+) -> None:
     gait = short_walk(cycle_time=0.5, stride=0.04, height=0.02)
     if robot is QUADRUPED:
         gait = short_walk(cycle_time=0.5, stride=0.02, height=0.01, radius=0.12, hip_height=0.12)
@@ -71,11 +73,31 @@ def test_every_sample_is_the_simulators_on_other_robots(robot: object, tmp_path:
         tmp_path / "firmware",
         controller="pi",
         robot=robot,
-        scenarios=gait,  # type: ignore[arg-type]
+        scenarios=gait,
     )
     tested = make(tmp_path / "firmware", "test")
     assert tested.code == 0, tested.out + tested.err
     assert tested.compared[-1][2] == 0
+
+
+@pytest.mark.parametrize(
+    ("controller", "name"), [("fuzzy-pi", "A"), ("fuzzy-pi-3", "fuzzy-pso-ps")]
+)
+def test_walks_by_a_coarser_table_are_repeated_too(
+    controller: ControllerName, name: str, tmp_path: Path
+) -> None:
+    folder, design = tmp_path / "firmware", published(controller, name)
+    view = write_firmware(
+        design, folder, controller=controller, scenarios=["1", "6"], table_bits=(8, 6)
+    )
+    tested = make(folder, "test")
+    assert tested.code == 0, tested.out + tested.err
+    assert tested.compared[-1][1:] == (view.samples, 0)
+    assert view.tables[0].shape == [256, 64, 1]
+    # It is the way out for a controller that else does not fit.
+    assert view.memory.fits
+    assert view.table_difference is not None
+    assert all(share is not None and 0.0 < share < 0.5 for share in view.table_difference.values())
 
 
 def test_a_changed_cell_that_walks_come_to_is_seen_in_their_samples(copy_of_a: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.firmware import write_firmware
+from sim.controllers import ControllerName
 from sim.firmware import BUDGET
 from sim.firmware.memory import CODE_BYTES
 from sim.scenario import GAIT_VARIABLE_NAMES
@@ -72,14 +73,11 @@ def test_a_table_of_64_bits_of_fraction_answers_as_the_simulator(tmp_path: Path)
     ("controller", "name"),
     [("fuzzy-pi", "A"), ("fuzzy-pi-3", "fuzzy-pso-ps"), ("pi", "validation")],
 )
-def test_nothing_computes_with_floating_point(controller: str, name: str, tmp_path: Path) -> None:
+def test_nothing_computes_with_floating_point(
+    controller: ControllerName, name: str, tmp_path: Path
+) -> None:
     folder = tmp_path / "firmware"
-    write_firmware(
-        published(controller, name),
-        folder,
-        controller=controller,
-        scenarios="1",  # type: ignore[arg-type]
-    )
+    write_firmware(published(controller, name), folder, controller=controller, scenarios="1")
     assert make(folder, "sizes").code == 0
     nm = shutil.which("arm-none-eabi-nm", path=f"{os.environ['PATH']}{os.pathsep}{TOOLS}")
     assert nm is not None

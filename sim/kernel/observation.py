@@ -84,7 +84,7 @@ class States(NamedTuple):
     internal_state: NDArray[np.float64]
     """(T, I)."""
     sensed_current: NDArray[np.float64]
-    """Absolute, as the converters of the current sensors have it, (T, J) [A]."""
+    """Absolute, before the current sensors' converters and their errors, (T, J) [A]."""
     duty: NDArray[np.float64]
     """(T, J) [1]."""
 

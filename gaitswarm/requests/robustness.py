@@ -15,7 +15,6 @@ from gaitswarm.views.robustness import RobustnessView
 from services.optimizer.analysis.robustness import LocalSample, local_sample, robustness
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.run.evaluator import EvaluationRequest
-from services.runtime import open_evaluator
 from sim.case import Walk
 from sim.catalogue import design_catalogue
 from sim.controllers import CONTROLLERS, ControllerName
@@ -151,6 +150,8 @@ def _walked(
     request: RobustnessRequest, sample: LocalSample, cpus: int | None, progress: Progress | None
 ) -> list[Outcome]:
     """One outcome a scenario."""
+    from services.runtime import open_evaluator
+
     cases = tuple(
         Walk(request.robot, request.controller, scenario, sample.names, request.precision)
         for scenario in request.resolved_scenarios()

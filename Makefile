@@ -18,9 +18,10 @@ endif
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 
-demo: setup page-if-possible ## Optimize the chapter-4 job (25 x 25, six scenarios) and compare it with the thesis.
+demo: setup page-if-possible ## Optimize the chapter-4 job (625 designs, six scenarios); compare with the thesis's optimum and swarm.
 	@$(BIN)/gaitswarm optimize --name "chapter 4, preference A" --particles 25 --iterations 25 \
-	    --preference A --seed 1 --compare-published $(DB_OPTION) $(ARGS)
+	    --preference A --seed 1 --compare-published --compare-optimizer pso-thesis \
+	    $(DB_OPTION) $(ARGS)
 
 serve: setup page-if-possible ## Serve page and REST API on http://127.0.0.1:8000, with a runner.
 	@$(BIN)/gaitswarm serve $(DB_OPTION) $(ARGS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -194,9 +194,18 @@ def run_seeds(
 
 
 def finish(
-    jobs: DatabaseJobs, job_id: str, interrupted: bool, *, as_json: bool, compare: bool
+    jobs: DatabaseJobs,
+    job_id: str,
+    interrupted: bool,
+    *,
+    as_json: bool,
+    compare: bool,
+    beside: Mapping[str, JobView],
 ) -> None:
-    """Print the result. Raises KeyboardInterrupt if interrupted, JobEnded unless it succeeded."""
+    """Print the result, and what other jobs found of the same problem, by the name to show.
+
+    Raises KeyboardInterrupt if interrupted, JobEnded unless it succeeded.
+    """
     job = jobs.job(job_id)
     if interrupted and not job.state.terminal:
         _explain_interruption(job, jobs.place)
@@ -204,7 +213,7 @@ def finish(
     if as_json:
         print_json(job)
     else:
-        _report(job, jobs.place, compare=compare)
+        _report(job, jobs.place, compare=compare, beside=beside)
     if job.state is not JobState.SUCCEEDED:
         raise ended(job, jobs.place)
 
@@ -235,7 +244,7 @@ def _how_to_go_on(job_id: str, place: str) -> str:
     return f"go on with\n  gaitswarm optimize --resume {job_id}{place}"
 
 
-def _report(job: JobView, place: str, *, compare: bool) -> None:
+def _report(job: JobView, place: str, *, compare: bool, beside: Mapping[str, JobView]) -> None:
     from cli.comparison import published_beside
     from cli.tables import design_table, results_table, search_line, worth
 
@@ -243,7 +252,9 @@ def _report(job: JobView, place: str, *, compare: bool) -> None:
     if job.best is None:
         console.print("no design walks in every scenario", markup=False)
     else:
-        evaluations = {"best": job.best} | (published_beside(job.spec) if compare else {})
+        others = {name: other.best for name, other in beside.items() if other.best is not None}
+        published = published_beside(job.spec) if compare else {}
+        evaluations = {"best": job.best} | others | published
         console.print(design_table(job.spec, {k: e.design for k, e in evaluations.items()}))
         results = {k: e.scenarios for k, e in evaluations.items()}
         console.print(results_table(results, job.objectives))

@@ -83,15 +83,14 @@ class SpecOptions:
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Search method: pso, pso-thesis, auto, ...; `gaitswarm optimizers` lists all.",
+            help="Search method: cma-es, pso-thesis, auto, ...; `gaitswarm optimizers` lists all.",
         ),
     ] = None
     optimizer_settings: Annotated[
         str | None,
         typer.Option(
             metavar="JSON|FILE",
-            help="Settings of the method that are not its defaults, such as"
-            " '{\"inertia_end\": 0.5}'.",
+            help="Settings of the method that are not its defaults, such as '{\"sigma\": 0.4}'.",
         ),
     ] = None
     seed: Annotated[int | None, typer.Option(help="Source of all randomness.")] = None

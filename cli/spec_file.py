@@ -46,6 +46,31 @@ def read_json_object(path: Path, what: str) -> dict[str, Any]:
     return value
 
 
+def by_other_optimizer(spec: AnySpec, name: str) -> AnySpec:
+    """The same job of another search method, with the same budget.
+
+    name: of a method or preset, whose settings are the defaults but for `particles`.
+
+    Raises InvalidRequest if the method cannot do the job.
+    """
+    from services.optimizer.jobs.optimizer_choice import with_settings
+
+    document = spec.model_dump(mode="json")
+    document["optimizer"] = with_settings(name, {"particles": spec.optimizer.particles})
+    document["name"] = f"{spec.name or 'the same'}, by {name}"[:200]
+    return parse_spec(document)
+
+
+def check_optimizer_name(name: str, option: str) -> None:
+    """Raises InvalidRequest, with the option as its field, if no search method has the name."""
+    from services.optimizer.jobs.optimizer_choice import optimizer_settings
+
+    try:
+        optimizer_settings(name)
+    except ValueError as error:
+        raise InvalidRequest(str(error), field=option) from error
+
+
 def build_spec(options: SpecOptions) -> AnySpec:
     """The spec in a file (without one: the defaults) with options laid over it.
 

@@ -84,7 +84,12 @@ def calibrate(
         **_robots(robot),
         "fixed": dict(_pair(entry, "fixed") for entry in _entries(fixed)),
         # Wide at first and narrow at last, as for identification.
-        "optimizer": {"particles": particles, "inertia_start": 0.9, "inertia_end": 0.4},
+        "optimizer": {
+            "name": "pso",
+            "particles": particles,
+            "inertia_start": 0.9,
+            "inertia_end": 0.4,
+        },
         "iterations": iterations,
         "precision": precision or "double",
     }

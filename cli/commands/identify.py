@@ -122,7 +122,12 @@ def identify(
         "variables": None if variables is None else variables.split(","),
         "links": [int(link) if link.isdecimal() else link for link in links.split(",")],
         # Wide at first and narrow at last: there are many parameters, and one valley.
-        "optimizer": {"particles": particles, "inertia_start": 0.9, "inertia_end": 0.4},
+        "optimizer": {
+            "name": "pso",
+            "particles": particles,
+            "inertia_start": 0.9,
+            "inertia_end": 0.4,
+        },
         "iterations": iterations,
         "precision": precision or "double",
     }

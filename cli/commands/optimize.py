@@ -33,6 +33,13 @@ def optimize(
             "--compare-published", help="Show the best design beside the one of the literature."
         ),
     ] = False,
+    compare_optimizer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Run the same job with another search method, too, and show what that found.",
+        ),
+    ] = None,
     workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
@@ -40,9 +47,9 @@ def optimize(
     from contextlib import closing
     from dataclasses import asdict
 
-    from cli.embedded import Embedded, finish, resumed_job
+    from cli.embedded import Embedded, finish, job_run, resumed_job
     from cli.output import note
-    from cli.spec_file import build_spec
+    from cli.spec_file import build_spec, by_other_optimizer, check_optimizer_name
     from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
@@ -50,12 +57,18 @@ def optimize(
     from services.optimizer.service import JobService
     from services.runtime import open_store
 
-    if as_json and compare_published:
-        raise InvalidRequest("is for people; leave it out with --json", field="compare-published")
+    for option, given in {
+        "compare-published": compare_published,
+        "compare-optimizer": compare_optimizer,
+    }.items():
+        if as_json and given:
+            raise InvalidRequest("is for people; leave it out with --json", field=option)
     if accept_changes and resume is None:
         raise InvalidRequest("a new job has nothing to go on from", field="accept-changes")
     settings = read_settings(**asdict(workers))
     asked = build_spec(options) if resume is None or options.given else None
+    if compare_optimizer is not None:
+        check_optimizer_name(compare_optimizer, "compare-optimizer")
     url = database_to_write(settings)
     with (
         closing(open_store(url)) as store,
@@ -71,7 +84,11 @@ def optimize(
             job = resumed_job(service, resume or "", asked, accept_changes=accept_changes)
         note(f"job {job.id} in database {url}")
         interrupted = embedded.run(jobs, store, job, claim)
-        finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published)
+        beside = {}
+        if compare_optimizer is not None and not interrupted:
+            other = job_run(by_other_optimizer(job.spec, compare_optimizer), store, jobs, embedded)
+            beside[compare_optimizer] = jobs.job(other.id)
+        finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, beside=beside)
 
 
 def optimizers(as_json: Json = False) -> None:

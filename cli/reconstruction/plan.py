@@ -80,7 +80,12 @@ def calibrations(size: Size) -> tuple[CalibrationSpec, ...]:
         "robots": ROBOTS,
         **read_targets(TARGETS),
         "variables": [v if isinstance(v, str) else dict(v) for v in VARIABLES],
-        "optimizer": {"particles": size.particles, "inertia_start": 0.9, "inertia_end": 0.4},
+        "optimizer": {
+            "name": "pso",
+            "particles": size.particles,
+            "inertia_start": 0.9,
+            "inertia_end": 0.4,
+        },
         "iterations": size.iterations,
     }
     specs = []

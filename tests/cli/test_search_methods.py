@@ -36,7 +36,7 @@ def test_all_methods_are_listed_with_the_schema_of_their_settings(gaitswarm: Gai
 def test_settings_are_laid_over_those_of_the_method(
     gaitswarm: Gaitswarm, db: Path, write_json: WriteJson
 ) -> None:
-    changed = {"inertia_end": 0.5}
+    changed = {"sigma": 0.5}
     thesis = submitted(
         *(gaitswarm, db, "--optimizer", "pso-thesis"),
         *("--optimizer-settings", '{"social": 1.0}'),
@@ -45,15 +45,15 @@ def test_settings_are_laid_over_those_of_the_method(
     file = write_json(changed, "settings.json")
     for given in (json.dumps(changed), file, f"@{file}"):
         own = submitted(gaitswarm, db, "--optimizer-settings", given, "--particles", 7)
-        assert (own["name"], own["inertia_end"], own["particles"]) == ("pso", 0.5, 7)
+        assert (own["name"], own["sigma"], own["particles"]) == ("cma-es", 0.5, 7)
 
 
 def test_settings_are_laid_over_those_of_a_spec(
     gaitswarm: Gaitswarm, db: Path, write_json: WriteJson
 ) -> None:
-    spec = write_json({"optimizer": {"social": 1.1, "particles": 4}}, "spec.json")
-    own = submitted(gaitswarm, db, "--spec", spec, "--optimizer-settings", '{"cognitive": 0.2}')
-    assert (own["social"], own["cognitive"], own["particles"]) == (1.1, 0.2, 4)
+    spec = write_json({"optimizer": {"sigma": 0.1, "particles": 4}}, "spec.json")
+    own = submitted(gaitswarm, db, "--spec", spec, "--optimizer-settings", '{"growth": 1}')
+    assert (own["sigma"], own["growth"], own["particles"]) == (0.1, 1.0, 4)
     other = submitted(gaitswarm, db, "--spec", spec, "--optimizer-settings", '{"name": "random"}')
     assert other == {"name": "random", "particles": 25}
 
@@ -63,12 +63,12 @@ def test_settings_are_laid_over_those_of_a_spec(
     [
         (["--optimizer", "swarm"], "optimizer: unknown optimizer 'swarm'; known are auto,"),
         (
-            ["--optimizer-settings", '{"inertai_end": 1}'],
-            "optimizer.inertai_end: no setting of pso; it has particles,",
+            ["--optimizer-settings", '{"sigam": 1}'],
+            "optimizer.sigam: no setting of cma-es; it has particles,",
         ),
         (
-            ["--optimizer-settings", '{"inertia_end": 3}'],
-            "optimizer.inertia_end: Input should be less than or equal to 2",
+            ["--optimizer-settings", '{"sigma": 3}'],
+            "optimizer.sigma: Input should be less than or equal to 1",
         ),
         (["--optimizer-settings", '{"a": '], "optimizer-settings: is not valid JSON"),
         (["--optimizer-settings", "@none.json"], "optimizer-settings: cannot read none.json"),

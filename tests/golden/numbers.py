@@ -16,7 +16,6 @@ import numpy as np
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.spec import judge_outcomes
 from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.search.swarm.pso import PsoSettings
 from services.runtime import open_evaluator, open_store, run_embedded
 from sim.assembly import Backend
 from sim.outcome import OBJECTIVE_NAMES, Status
@@ -25,21 +24,21 @@ from tests.examples.walks import walk
 
 FILE: Final = Path(__file__).with_name("numbers.json")
 
-ITERATIONS: Final = 2
+ITERATIONS: Final = 5
 """Of the demo's job, that are kept and run again: all of them would take half a minute."""
 
-DEMO: Final = JobSpec(preference="A", optimizer=PsoSettings(particles=25), iterations=25, seed=1)
-"""The job of `make demo`: its swarm's inertia falls over 25 iterations, however many are run."""
+DEMO: Final = JobSpec(preference="A", iterations=25, seed=1)
+"""The job of `make demo`, by the default search method: 625 designs."""
 
 Optimum = dict[str, dict[str, float]]
 """By scenario, by objective."""
 
 
 @dataclass(frozen=True, slots=True)
-class Swarm:
+class DemoIteration:
     """One iteration of the demo's job.
 
-    designs: digest of all designs' bits. fitness: of every particle; coarse beside them, because
+    designs: digest of all designs' bits. fitness: of every design; coarse beside them, because
     a drive's tables are quantised.
     """
 
@@ -49,7 +48,7 @@ class Swarm:
 
 @dataclass(frozen=True, slots=True)
 class Best:
-    """The best design of the demo's job, and the particle that found it."""
+    """The best design of the demo's job, and where it was found."""
 
     iteration: int
     particle: int
@@ -59,10 +58,10 @@ class Best:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """optimum: objectives of design A. swarms: the demo's first iterations. best: its last word."""
+    """optimum: objectives of design A. iterations: the first of the demo. best: its last word."""
 
     optimum: Optimum
-    swarms: list[Swarm]
+    iterations: list[DemoIteration]
     best: Best
 
 
@@ -80,8 +79,8 @@ def objectives_of_the_optimum(
     return found
 
 
-def run_demo(iterations: int) -> tuple[list[Swarm], Evaluation]:
-    """The first iterations of the demo's job, and the best design in them."""
+def run_demo(most: int | None) -> tuple[list[DemoIteration], Evaluation]:
+    """The first iterations of the demo's job, None for all, and the best design in them."""
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(str(Path(folder) / "jobs.db"))
         evaluator = open_evaluator("in-process")
@@ -89,21 +88,22 @@ def run_demo(iterations: int) -> tuple[list[Swarm], Evaluation]:
         job, _ = store.create_job(DEMO)
 
         def stop_after(done: object, state: object) -> None:
-            if store.job(job.id).progress.iterations == iterations:
+            if store.job(job.id).progress.iterations == most:
                 enough.set()
 
         run_embedded(store, evaluator, job.id, on_commit=stop_after, stop=enough)
-        swarms = [_swarm(store.evaluations(job.id, index)) for index in range(iterations)]
+        done = store.job(job.id).progress.iterations
+        iterations = [_iteration(store.evaluations(job.id, index)) for index in range(done)]
         best = store.best(job.id)
         evaluator.close()
         store.close()
     assert best is not None
-    return swarms, best
+    return iterations, best
 
 
-def _swarm(evaluations: Sequence[Evaluation]) -> Swarm:
+def _iteration(evaluations: Sequence[Evaluation]) -> DemoIteration:
     designs = hashlib.sha256(b"".join(e.design.tobytes() for e in evaluations))
-    return Swarm(designs.hexdigest(), [e.fitness for e in evaluations])
+    return DemoIteration(designs.hexdigest(), [e.fitness for e in evaluations])
 
 
 def fitness_of(design: dict[str, float]) -> float:
@@ -115,11 +115,11 @@ def fitness_of(design: dict[str, float]) -> float:
 
 def measure() -> Numbers:
     """All numbers as this version has them; the whole demo takes half a minute."""
-    swarms, best = run_demo(DEMO.iterations)
+    iterations, best = run_demo(None)
     design = dict(zip(DEMO.design_space().names, best.design.tolist(), strict=True))
     return Numbers(
         objectives_of_the_optimum(),
-        swarms[:ITERATIONS],
+        iterations[:ITERATIONS],
         Best(best.iteration, best.particle, best.fitness, design),
     )
 
@@ -130,8 +130,8 @@ def write(numbers: Numbers) -> None:
         "optimum": _hex(numbers.optimum),
         "demo": {
             "iterations": [
-                {"designs": swarm.designs, "fitness": _hex(swarm.fitness)}
-                for swarm in numbers.swarms
+                {"designs": iteration.designs, "fitness": _hex(iteration.fitness)}
+                for iteration in numbers.iterations
             ],
             "best": {
                 "iteration": numbers.best.iteration,
@@ -151,8 +151,8 @@ def read() -> Numbers:
     return Numbers(
         _from_hex(document["optimum"]),
         [
-            Swarm(swarm["designs"], _from_hex(swarm["fitness"]))
-            for swarm in document["demo"]["iterations"]
+            DemoIteration(iteration["designs"], _from_hex(iteration["fitness"]))
+            for iteration in document["demo"]["iterations"]
         ],
         Best(
             best["iteration"],

@@ -287,7 +287,8 @@ METHODS: Final[dict[MethodName, Method]] = {
     ),
 }
 
-DEFAULT_METHOD: Final[MethodName] = "pso"
+DEFAULT_METHOD: Final[MethodName] = "cma-es"
+"""The best on the robot of all that were raced (docs/optimizers.md)."""
 
 _PRESETS: Final[dict[str, OptimizerSettings]] = {
     "pso-constriction": PsoSettings(

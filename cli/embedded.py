@@ -78,6 +78,7 @@ class Embedded:
             show_progress(
                 particles=job.spec.optimizer.particles,
                 iterations_planned=job.spec.iterations,
+                evaluations_planned=job.spec.budget,
                 iterations=job.progress.iterations,
                 evaluations=job.progress.evaluations,
             ) as progress,
@@ -136,15 +137,25 @@ class Embedded:
         return self._evaluator
 
 
-def job_run(spec: Spec, store: Store, jobs: DatabaseJobs, embedded: Embedded) -> Job:
+def job_run(
+    spec: Spec,
+    store: Store,
+    jobs: DatabaseJobs,
+    embedded: Embedded,
+    *,
+    any_budget: bool = False,
+) -> Job:
     """The job that was submitted before to do the same, or a new one, run to its end.
 
-    spec: its name should be its alone. jobs: of the store.
+    spec: its name should be its alone. jobs: of the store. any_budget: whether a job of another
+    budget is the same; it is extended if that is less.
 
     Raises JobEnded if it does not succeed, and KeyboardInterrupt if a signal comes.
     """
     service, claim = JobService(store), None
-    job = earlier_job(service, spec)
+    job = earlier_job(service, spec, any_budget=any_budget)
+    if job is not None and job.spec.budget < spec.budget:
+        job = service.extend(job.id, max(spec.iterations, job.spent + 1))
     if job is None:
         claim = service.submit_embedded(spec)
         job = claim.job

@@ -41,14 +41,19 @@ class Progress(Protocol):
 
 @contextmanager
 def show_progress(
-    *, particles: int, iterations_planned: int, iterations: int = 0, evaluations: int = 0
+    *,
+    particles: int,
+    iterations_planned: int,
+    evaluations_planned: int,
+    iterations: int = 0,
+    evaluations: int = 0,
 ) -> Iterator[Progress]:
     """Progress of one job on stderr.
 
     particles: designs of one iteration, at most; iterations_planned: the budget, in iterations of
-    so many; iterations, evaluations: committed already.
+    so many; evaluations_planned: the same in designs; iterations, evaluations: committed already.
     """
-    pace = _Pace(particles, iterations_planned, iterations, evaluations)
+    pace = _Pace(particles, iterations_planned, evaluations_planned, iterations, evaluations)
     console = stderr_console()
     if not console.is_terminal:
         yield _Lines(pace)
@@ -85,7 +90,9 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
 
     job = jobs.job(job_id)
     with show_progress(
-        particles=job.spec.optimizer.particles, iterations_planned=job.iterations_planned
+        particles=job.spec.optimizer.particles,
+        iterations_planned=job.iterations_planned,
+        evaluations_planned=job.evaluations_planned,
     ) as progress:
         last: StateView | None = None
         for event in jobs.follow(job_id):
@@ -124,10 +131,16 @@ class _Pace:
     """Budget spent, rate and rest, from the iterations seen."""
 
     def __init__(
-        self, particles: int, iterations_planned: int, iterations: int, evaluations: int
+        self,
+        particles: int,
+        iterations_planned: int,
+        evaluations_planned: int,
+        iterations: int,
+        evaluations: int,
     ) -> None:
         self._particles = particles
-        self._planned = iterations_planned
+        self._iterations_planned = iterations_planned
+        self._evaluations_planned = evaluations_planned
         self._iterations = iterations
         self._evaluations = evaluations
         self._seen = 0
@@ -141,12 +154,13 @@ class _Pace:
             self._iterations,
             self._evaluations,
             particles=self._particles,
-            iterations_planned=self._planned,
+            iterations_planned=self._iterations_planned,
+            evaluations_planned=self._evaluations_planned,
         )
 
     @property
     def ended(self) -> bool:
-        return self._evaluations >= self._planned * self._particles
+        return self._evaluations >= self._evaluations_planned
 
     def saw(self, index: int, designs: int, seconds: float) -> tuple[float, float]:
         """(evaluations per second, seconds left) after this iteration."""
@@ -155,7 +169,7 @@ class _Pace:
         self._seen += designs
         self._seconds += seconds
         rate = self._seen / max(self._seconds, 1e-9)
-        return rate, max(0, self._planned * self._particles - self._evaluations) / rate
+        return rate, max(0, self._evaluations_planned - self._evaluations) / rate
 
 
 class _Live:

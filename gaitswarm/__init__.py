@@ -59,6 +59,7 @@ if TYPE_CHECKING:
         StateView,
     )
     from gaitswarm.views.calibration import TargetsView
+    from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
         TournamentView,
     )
     from services.optimizer.jobs.calibration import CalibrationSpec
+    from services.optimizer.jobs.certificate import CertificateSpec
     from services.optimizer.jobs.identification import IdentificationSpec
     from services.optimizer.jobs.preference import PREFERENCES, Preference
     from services.optimizer.jobs.tournament import TournamentSpec
@@ -124,6 +126,8 @@ __all__ = [
     "BayesianSettings",
     "BestView",
     "CalibrationSpec",
+    "CertificateSpec",
+    "CertificateView",
     "CmaEsSettings",
     "Conflict",
     "DatabaseJobs",
@@ -235,6 +239,7 @@ _MODULES: Final = {
     "gaitswarm.views.calibration": ("TargetsView",),
     "gaitswarm.views.families": ("ScenarioFamiliesView",),
     "gaitswarm.views.firmware": ("FirmwareView",),
+    "gaitswarm.views.certificate": ("CertificateView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.preferences": ("RobustPreferencesView",),
     "gaitswarm.views.replay": ("WalkReplay",),
@@ -244,6 +249,7 @@ _MODULES: Final = {
         "ProblemRunsView", "TournamentStandingsView", "TournamentView",
     ),
     "services.optimizer.jobs.calibration": ("CalibrationSpec",),
+    "services.optimizer.jobs.certificate": ("CertificateSpec",),
     "services.optimizer.jobs.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.tournament": ("TournamentSpec",),

@@ -34,6 +34,7 @@ from gaitswarm.views import (
     RankingView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
@@ -265,6 +266,14 @@ class AsyncDatabaseJobs(AsyncJobs):
     async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
         """Read the runs on a problem."""
         return await to_thread.run_sync((await self._jobs()).problem_runs, job_id, problem)
+
+    async def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """Say what a certificate comes to, from what is stored."""
+        jobs = await self._jobs()
+        asked = partial(jobs.certificate, job_id, worlds=worlds, most=most)
+        return await to_thread.run_sync(asked)
 
     async def export(
         self, job_id: str, file_format: TableFormat = "parquet"

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         RankingView,
     )
     from gaitswarm.views.calibration import TargetsView
+    from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
     from gaitswarm.views.replay import WalkReplay
@@ -183,6 +184,12 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
         """See all runs of a tournament on one problem."""
+
+    @abstractmethod
+    async def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """See what a design comes to in many worlds."""
 
     @abstractmethod
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> AsyncIterator[bytes]:

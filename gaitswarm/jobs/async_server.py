@@ -50,6 +50,7 @@ from gaitswarm.views import (
     RankingView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
@@ -231,6 +232,13 @@ class AsyncServerJobs(AsyncJobs):
     async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
         """Ask the server for the runs on a problem."""
         return await self._send(calls.problem_runs(job_id, problem))
+
+    async def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """Ask the server what a certificate comes to."""
+        arguments.certificate(worlds, most)
+        return await self._send(calls.certificate(job_id, worlds, most))
 
     async def export(
         self, job_id: str, file_format: TableFormat = "parquet"

@@ -34,6 +34,7 @@ from gaitswarm.views import (
     SimulationView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
@@ -297,6 +298,19 @@ def problem_runs(job_id: str, problem: str) -> Call[ProblemRunsView]:
     """
     path = f"/tournaments/{_segment(job_id, 'job')}/problems/{_segment(problem, 'problem')}"
     return _got(path, ProblemRunsView)
+
+
+def certificate(job_id: str, worlds: int | None, most: int) -> Call[CertificateView]:
+    """Find out what a certificate comes to.
+
+    Args:
+        job_id: Identifier of the job.
+        worlds: Worlds to take, the first ones; None for all.
+        most: Worst worlds to name.
+    """
+    asked = {"most": str(most)} | ({} if worlds is None else {"worlds": str(worlds)})
+    path = f"{_job(job_id)}/certificate"
+    return Call("GET", path, CertificateView.model_validate_json, asked)
 
 
 def record(walk: RecordedWalk) -> Call[RecordingView]:

@@ -15,6 +15,7 @@ from gaitswarm.jobs.news import PAGE, JobNews
 from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.jobs.tournaments import DatabaseTournaments
 from gaitswarm.requests import arguments
+from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.requests.families import run_scenario_families
 from gaitswarm.requests.replay import run_replay
 from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
@@ -42,6 +43,7 @@ from gaitswarm.views import (
     RankingView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
@@ -281,6 +283,13 @@ class DatabaseJobs(DatabaseTournaments, Jobs):
     def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
         """Compare runs with their targets, from what is stored."""
         return run_targets(self._service, arguments.runs(job_ids), arguments.leave_out(leave_out))
+
+    def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """Say what a certificate comes to, from what is stored."""
+        arguments.certificate(worlds, most)
+        return run_certificate(self._service, job_id, worlds=worlds, most=most)
 
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
         """Write every evaluation as a file, in parts as they are read."""

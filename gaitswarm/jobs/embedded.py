@@ -202,8 +202,10 @@ def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) ->
         for job in page.items:
             if not job.readable or job.state is JobState.CANCELLED:
                 continue
-            budget = wanted.iterations if any_budget else job.spec.iterations
-            if job.spec.model_copy(update={"iterations": budget}) != wanted:
+            budget = wanted.iterations
+            if job.spec != wanted and not (
+                any_budget and job.spec.with_budget(budget) == wanted.with_budget(budget)
+            ):
                 continue
             with suppress(ProvenanceChanged):
                 service.check_unchanged(job)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         RankingView,
     )
     from gaitswarm.views.calibration import TargetsView
+    from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
     from services.optimizer.analysis.targets import LeaveOut
@@ -340,6 +341,25 @@ class Jobs(Tournaments, Walks, ABC):
         Raises:
             InvalidRequest: A job of another kind, jobs of different problems, or of one seed.
             Conflict: One of them has no design yet that did not fail.
+        """
+
+    @abstractmethod
+    def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """See what a design comes to in many worlds.
+
+        Args:
+            job_id: Identifier of a certificate.
+            worlds: Worlds to take, the first ones; None for all that have walked.
+            most: Worst worlds to name, 0 to 1000.
+
+        Returns:
+            Chances of failure, spreads by scenario, the worst worlds, and what goes with them.
+
+        Raises:
+            InvalidRequest: The job is of another kind, or an argument makes no sense.
+            Conflict: No drawn world has walked yet, or the job is too large to be held in memory.
         """
 
     @abstractmethod

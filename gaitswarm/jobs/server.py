@@ -49,6 +49,7 @@ from gaitswarm.views import (
     RankingView,
 )
 from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.replay import WalkReplay
@@ -225,6 +226,13 @@ class ServerJobs(Jobs):
     def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
         """Ask the server for the runs on a problem."""
         return self._send(calls.problem_runs(job_id, problem))
+
+    def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """Ask the server what a certificate comes to."""
+        arguments.certificate(worlds, most)
+        return self._send(calls.certificate(job_id, worlds, most))
 
     def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
         """Download every evaluation as a file, in parts as they come."""

@@ -26,6 +26,7 @@ from gaitswarm.specs import (
 )
 from gaitswarm.tables import TableFormat
 from gaitswarm.views import RankingRequest
+from services.optimizer.analysis.certificate import MOST_WORST
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from sim.controllers import CONTROLLERS, ControllerName
@@ -148,6 +149,22 @@ def leave_out(text: str | None) -> LeaveOut | None:
         known = ", ".join(get_args(LeaveOut))
         raise InvalidRequest(f"{text!r} is none of {known}", field="leave_out")
     return cast(LeaveOut | None, text)
+
+
+def certificate(worlds: int | None, most: int) -> None:
+    """Check what is asked of a certificate.
+
+    Args:
+        worlds: Worlds to take; None for all.
+        most: Worst worlds to name.
+
+    Raises:
+        InvalidRequest: A number is out of range; names it.
+    """
+    if worlds is not None and worlds < 1:
+        raise InvalidRequest("must be at least 1", field="worlds")
+    if not 0 <= most <= MOST_WORST:
+        raise InvalidRequest(f"must be 0 to {MOST_WORST}", field="most")
 
 
 def ranking(preference: PreferenceInput, top: int) -> RankingRequest:

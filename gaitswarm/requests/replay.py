@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from pydantic import Field
 
 from gaitswarm.requests.walk import WalkRequest, resolved
@@ -11,7 +10,6 @@ from sim.outcome import Status
 from sim.replay import CONTROL_RATE, replay
 from sim.robot import load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES, ScenarioChoice, with_gait
-from sim.simulate import simulate
 
 
 class ReplayRequest(WalkRequest):
@@ -47,14 +45,7 @@ def run_replay(request: ReplayRequest) -> bytes:
     request.check_design()
     request.check_reach(scenario, field="scenario")
     robot = load_robot(request.robot)
-    walk = simulate(
-        scenario,
-        request.controller,
-        tuple(request.design),
-        np.array([tuple(request.numbers.values())], dtype=np.float64),
-        robot=robot,
-        log=True,
-    )
+    walk = request.walk(scenario, log=True)
     (log,) = walk.logs
     if log is None:
         raise AssertionError("a gait within reach is walked")

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
@@ -18,8 +19,9 @@ from sim.errors import SimulationInputError
 from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
-from sim.simulate import check_reach, simulate
+from sim.simulate import Simulation, check_reach, simulate
 from sim.variables import VariableName, VariableValue
+from sim.worlds import WorldWalk, check_worlds
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 
@@ -43,6 +45,24 @@ class WalkRequest(BaseModel):
         " one takes a choice's name or index.",
         examples=[PUBLISHED_DESIGN],
     )
+    world: dict[VariableName, FiniteFloat] = Field(
+        default_factory=dict,
+        description="What is different from the model, as in a world of a certificate: values of"
+        " perturbations by name; those that are not named are nominal.",
+        examples=[{}, {"friction_factor": 0.75}],
+    )
+
+    @model_validator(mode="after")
+    def _world_can_be(self) -> Self:
+        try:
+            check_worlds(tuple(self.world), self._worlds)
+        except SimulationInputError as error:
+            raise ValueError(f"world.{error}") from error
+        return self
+
+    @property
+    def _worlds(self) -> NDArray[np.float64]:
+        return np.array([tuple(self.world.values())], dtype=np.float64)
 
     @model_validator(mode="after")
     def _design_fits(self) -> Self:
@@ -99,6 +119,42 @@ class WalkRequest(BaseModel):
             check_reach(scenario, names, values, robot=self.robot)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field=field) from error
+
+    def walk(
+        self,
+        scenario: Scenario,
+        *,
+        log: bool,
+        backend: Backend = "auto",
+        precision: Precision = "double",
+    ) -> Simulation:
+        """Let the design walk through a scenario of its world.
+
+        Args:
+            scenario: The walk, in full.
+            log: Whether to keep its log.
+            backend: Which kernel; of another world than the nominal one always the first that
+                works on this machine.
+            precision: Of the physics' numbers.
+
+        Returns:
+            The walk.
+        """
+        names, values = tuple(self.design), tuple(self.numbers.values())
+        if self.world:
+            design, known = tuple(self.numbers.items()), tuple(self.world)
+            case = WorldWalk(self.robot, self.controller, design, scenario, known, precision)
+            return case.simulate(self._worlds, log=log)
+        return simulate(
+            scenario,
+            self.controller,
+            names,
+            np.array([values], dtype=np.float64),
+            robot=self.robot,
+            log=log,
+            backend=backend,
+            precision=precision,
+        )
 
 
 def check_names(controller: ControllerName, design: Mapping[str, float | str]) -> None:
@@ -215,16 +271,7 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
     request.check_walks()
     scenarios = request.resolved_scenarios()
     walks = [
-        simulate(
-            scenario,
-            request.controller,
-            tuple(request.design),
-            np.array([tuple(request.numbers.values())], dtype=np.float64),
-            robot=request.robot,
-            log=request.log,
-            backend=backend,
-            precision=request.precision,
-        )
+        request.walk(scenario, log=request.log, backend=backend, precision=request.precision)
         for scenario in scenarios
     ]
     return SimulationView.from_walks(

@@ -31,7 +31,12 @@ class Spent:
 
 
 def budget_spent(
-    iterations: int, evaluations: int, *, particles: int, iterations_planned: int
+    iterations: int,
+    evaluations: int,
+    *,
+    particles: int,
+    iterations_planned: int,
+    evaluations_planned: int,
 ) -> Spent:
     """Say how much of a job's budget is spent.
 
@@ -40,15 +45,15 @@ def budget_spent(
         evaluations: Designs judged in them.
         particles: Designs of one iteration, at most; 0 if that is not known.
         iterations_planned: Of the budget, of `particles` designs each.
+        evaluations_planned: Designs of the budget.
 
     Returns:
         The count in iterations, if all so far were whole ones, else in designs.
     """
-    planned = iterations_planned * particles
     whole = iterations <= iterations_planned and evaluations == iterations * particles
     if particles == 0 or whole:
         return Spent(iterations, iterations_planned, "iterations")
-    return Spent(evaluations, planned, "designs")
+    return Spent(evaluations, evaluations_planned, "designs")
 
 
 class EstimateView(View):

@@ -28,6 +28,8 @@ from sim.kernel.walk import Precision
 PREFIX: Final = "/v1"
 """Version of the HTTP API, in every path."""
 
+JobKind = Literal["tuning", "identification", "calibration", "tournament", "certificate"]
+
 _RESOURCES: Final = ("iterations", "events")
 
 _RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
@@ -70,9 +72,10 @@ class JobSummaryView(View):
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
-    kind: Literal["tuning", "identification", "calibration", "tournament"] | None = Field(
-        description="Whether it tunes a drive, fits parameters of the robot to recorded walks, or"
-        " fits robot and conventions to a table of results; null if its spec cannot be read.",
+    kind: JobKind | None = Field(
+        description="Whether it tunes a drive, fits parameters of the robot to recorded walks, fits"
+        " robot and conventions to a table of results, runs a search method many times, or puts a"
+        " design to the test in many worlds; null if its spec cannot be read.",
         examples=["tuning"],
     )
     state: JobState = Field(
@@ -176,6 +179,7 @@ class JobSummaryView(View):
             self.evaluations,
             particles=self.particles,
             iterations_planned=self.iterations_planned,
+            evaluations_planned=self.evaluations_planned,
         )
 
     @classmethod
@@ -368,5 +372,7 @@ def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
         "optimizer": None if isinstance(spec, UnreadableSpec) else spec.optimizer.name,
         "particles": particles,
         "iterations_planned": spec.iterations,
-        "evaluations_planned": spec.iterations * particles,
+        "evaluations_planned": spec.iterations * particles
+        if isinstance(spec, UnreadableSpec)
+        else spec.budget,
     }

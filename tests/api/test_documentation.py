@@ -51,6 +51,7 @@ def test_the_routes_are_these(document: Document) -> None:
         "get /v1/tournaments",
         "get /v1/tournaments/{job_id}",
         "get /v1/tournaments/{job_id}/problems/{problem}",
+        f"get {job}/certificate",
         "post /v1/estimates",
         "post /v1/recordings",
         "get /v1/recordings/{recording_id}",
@@ -111,7 +112,8 @@ def test_every_error_is_a_problem(document: Document) -> None:
 def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -> None:
     schemas = document["components"]["schemas"]
 
-    kinds = ["JobSpec", "IdentificationSpec", "CalibrationSpec", "TournamentSpec"]
+    named = ("Job", "Identification", "Calibration", "Tournament", "Certificate")
+    kinds = [f"{kind}Spec" for kind in named]
     assert not [name for name in schemas if name.startswith(tuple(f"{kind}-" for kind in kinds))]
     spec, null = schemas["JobView"]["properties"]["spec"]["anyOf"]
     answered = spec["oneOf"]

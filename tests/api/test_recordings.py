@@ -69,7 +69,10 @@ def test_an_unknown_kind_names_those_there_are(client: httpx2.Client) -> None:
     answer = client.post("/v1/jobs", json={"kind": "guess"})
     assert answer.status_code == 422
     assert answer.json()["errors"] == [
-        {"field": "kind", "message": "must be tuning, identification, calibration or tournament"}
+        {
+            "field": "kind",
+            "message": "must be tuning, identification, calibration, tournament or certificate",
+        }
     ]
 
 

@@ -138,6 +138,8 @@ REFUSED: dict[str, tuple[Callable[[gaitswarm.Jobs, str], Any], str]] = {
         lambda jobs, job: jobs.targets([job], leave_out=cast(Any, "row")),
         "leave_out",
     ),
+    "a drive's certificate": (lambda jobs, job: jobs.certificate(job), "job_id"),
+    "no world": (lambda jobs, job: jobs.certificate(job, worlds=0), "worlds"),
     "no design": (lambda jobs, _: jobs.simulate(cast(Any, 3)), "design"),
     "half a design": (lambda jobs, _: jobs.simulate({"P": 0.4}, controller="pi"), "design"),
     "gait out of reach": (
@@ -175,6 +177,7 @@ MISSING: tuple[Callable[[gaitswarm.Jobs], Any], ...] = (
     lambda jobs: jobs.ranking("nosuchjob", "B"),
     lambda jobs: jobs.parameters(["nosuchjob"]),
     lambda jobs: jobs.targets(["nosuchjob"]),
+    lambda jobs: jobs.certificate("nosuchjob"),
     lambda jobs: list(jobs.export("nosuchjob")),
     lambda jobs: jobs.recording("0" * 32),
     lambda jobs: jobs.surface(PUBLISHED, controller=cast(Any, "bang-bang")),
@@ -386,6 +389,24 @@ def test_a_calibration_is_compared_with_its_targets(reach: Reach, db: Path) -> N
         1.0 / (run.best.scenarios["pi"].objectives["reciprocal_speed"] or 0.0)
     )
     assert energy.left_out is not None
+
+
+def test_a_certificate_is_summed_up(reach: Reach, db: Path) -> None:
+    spec = {
+        "kind": "certificate",
+        "controller": "pi",
+        "design": PI,
+        "scenarios": [SHORT_WALK],
+        "variables": ["friction_factor"],
+        "worlds": 6,
+    }
+    run = gaitswarm.optimize(spec, db=db, evaluator="in-process")
+    found = reach(db).certificate(run.job.id, most=2)
+    worths = run.evaluations().fitness.tolist()[1:]
+    assert found.worlds == 6
+    assert found.fitness.worst == max(worths)
+    assert [world.fitness for world in found.worst] == sorted(worths, reverse=True)[:2]
+    assert reach(db).certificate(run.job.id, worlds=3).worlds == 3
 
 
 def test_a_recorded_walk_is_kept_and_taken_back(reach: Reach, db: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from services.optimizer.errors import ProvenanceChanged
 from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.iteration import CompletedIteration
@@ -269,7 +270,8 @@ def test_a_refused_claim_sends_nothing() -> None:
 
 
 def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
-    specs = (JobSpec, IdentificationSpec, CalibrationSpec, TournamentSpec, Spec)
+    kinds = (JobSpec, IdentificationSpec, CalibrationSpec, TournamentSpec, CertificateSpec)
+    specs = (*kinds, Spec)
     used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)
     runs = (FunctionProblem, RaceCase)
     files = {Path(inspect.getfile(thing)) for thing in (*used, *runs)}

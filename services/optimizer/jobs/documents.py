@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 from pydantic import Discriminator, Tag, TypeAdapter
 
 from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.tournament import TournamentSpec
 from services.optimizer.jobs.tuning import JobSpec
@@ -15,6 +16,7 @@ _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"
 _CALIBRATION: Final = "<calibration>"
 _TOURNAMENT: Final = "<tournament>"
+_CERTIFICATE: Final = "<certificate>"
 
 
 def _kind(value: Any) -> str:
@@ -27,15 +29,17 @@ AnySpec = Annotated[
     Annotated[JobSpec, Tag(_TUNING)]
     | Annotated[IdentificationSpec, Tag(_IDENTIFICATION)]
     | Annotated[CalibrationSpec, Tag(_CALIBRATION)]
-    | Annotated[TournamentSpec, Tag(_TOURNAMENT)],
+    | Annotated[TournamentSpec, Tag(_TOURNAMENT)]
+    | Annotated[CertificateSpec, Tag(_CERTIFICATE)],
     Discriminator(
         _kind,
         custom_error_type="unknown_kind",
-        custom_error_message="kind: must be tuning, identification, calibration or tournament",
+        custom_error_message="kind: must be tuning, identification, calibration, tournament or"
+        " certificate",
     ),
 ]
 
-SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | TournamentSpec]] = (
-    TypeAdapter(AnySpec)
-)
+SPECS: Final[
+    TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | TournamentSpec | CertificateSpec]
+] = TypeAdapter(AnySpec)
 """Reads a document with a spec of any kind; raises ValidationError for what is none."""

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.spec import Spec, create_optimizer
@@ -207,6 +208,8 @@ def _kind_of_walk(spec: Spec) -> str:
     """What a walk's speed depends on: robot, controller and precision; a run's, the method, too."""
     if isinstance(spec, TournamentSpec):
         return spec.model_dump_json(include={"method", "problems", "evaluations"})
+    if isinstance(spec, CertificateSpec):
+        return f"world {spec.model_dump_json(include={'controller', 'robot', 'precision'})}"
     controller = spec.controller if isinstance(spec, JobSpec) else _fitted_walks(spec)
     return f"{controller} {spec.model_dump_json(include={'robot', 'precision'})}"
 

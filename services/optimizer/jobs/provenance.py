@@ -17,6 +17,7 @@ _OPTIMIZER: Final = Path(__file__).parents[1]
 
 _JUDGING: Final = (
     "jobs/calibration.py",
+    "jobs/certificate.py",
     "jobs/design_space.py",
     "jobs/identification.py",
     "jobs/misfit.py",

@@ -4,7 +4,8 @@ Spec
 ├── JobSpec              (kind `tuning`) a drive is tuned to walk well
 ├── IdentificationSpec   (kind `identification`) a robot's parameters are fitted to measured walks
 ├── CalibrationSpec      (kind `calibration`) robot and conventions are fitted to tables of results
-└── TournamentSpec       (kind `tournament`) a search method is run many times on several problems
+├── TournamentSpec       (kind `tournament`) a search method is run many times on several problems
+└── CertificateSpec      (kind `certificate`) a design walks in many worlds that differ
 """
 
 from __future__ import annotations
@@ -155,6 +156,17 @@ class Spec(BaseModel):
         """Designs that the job judges in all."""
         return self.iterations * self.optimizer.particles
 
+    def with_budget(self, iterations: int) -> Self:
+        """The same job with another budget.
+
+        Args:
+            iterations: Of the budget, of `particles` designs each.
+
+        Returns:
+            The spec of a job that was extended to it.
+        """
+        return self.model_copy(update={"iterations": iterations})
+
     @property
     def search(self) -> OptimizerSettings:
         """Settings of the method that searches; of `auto`, those of the method that it chooses."""
@@ -199,6 +211,11 @@ class Spec(BaseModel):
             return space.positions(self.start)
         except ValueError as error:
             raise ValueError(f"start.{error}") from error
+
+    def create_search(self) -> Optimizer:
+        """What asks for the job's designs, before its first ask."""
+        box, start = self.design_space().box, self.start_positions()
+        return create_search(self.search, box, self.budget, self.seed, start)
 
     @abstractmethod
     def design_space(self) -> DesignSpace:
@@ -372,6 +389,4 @@ def create_optimizer(spec: Spec) -> Optimizer:
     Returns:
         The optimizer before its first ask.
     """
-    return create_search(
-        spec.search, spec.design_space().box, spec.budget, spec.seed, spec.start_positions()
-    )
+    return spec.create_search()

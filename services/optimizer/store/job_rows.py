@@ -44,7 +44,7 @@ def to_job(row: Row) -> Job:
         if isinstance(spec, UnreadableSpec):
             spec = replace(spec, iterations=row["budget"])
         else:
-            spec = spec.model_copy(update={"iterations": row["budget"]})
+            spec = spec.with_budget(row["budget"])
     return Job(
         id=row["id"],
         stored_spec=spec,

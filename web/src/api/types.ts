@@ -38,8 +38,20 @@ export type Objective = Schemas['ObjectiveView']
 export type IdentificationSpec = Schemas['IdentificationSpec']
 export type CalibrationSpec = Schemas['CalibrationSpec']
 export type TournamentSpec = Schemas['TournamentSpec']
+export type CertificateSpec = Schemas['CertificateSpec']
 /** A spec of any kind. */
-export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | TournamentSpec
+export type AnySpec =
+  | JobSpec
+  | IdentificationSpec
+  | CalibrationSpec
+  | TournamentSpec
+  | CertificateSpec
+export type Certificate = Schemas['CertificateView']
+export type CertifiedScenario = Schemas['CertifiedScenarioView']
+export type Spread = Schemas['SpreadView']
+export type Proportion = Schemas['ProportionView']
+export type World = Schemas['WorldView']
+export type Influence = Schemas['InfluenceView']
 export type Convergence = Schemas['IdentifiabilityView']
 export type FittedParameter = Schemas['ParameterView']
 export type Targets = Schemas['TargetsView']

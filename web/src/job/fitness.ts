@@ -61,6 +61,13 @@ const WORDS: Readonly<Record<Job['kind'], CaseWords>> = {
     worths: 'best values',
     bars: MEAN,
   },
+  certificate: {
+    one: 'scenario',
+    many: 'scenarios',
+    worth: 'utility',
+    worths: 'utilities',
+    bars: MEAN,
+  },
 }
 
 export function caseWords(kind: Job['kind']): CaseWords {

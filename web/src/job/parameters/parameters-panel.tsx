@@ -27,6 +27,7 @@ const AGREEMENT: Readonly<Record<Job['kind'], string>> = {
   tuning: 'at 5 %',
   identification: 'at 5 %',
   tournament: 'at 5 %',
+  certificate: 'at 5 %',
   calibration:
     'among designs whose sum of squared differences, in tolerances, exceeds that of their run’s' +
     ' best by 4 at most',

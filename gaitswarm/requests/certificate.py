@@ -1,0 +1,58 @@
+"""What a design came to in many worlds, from what is stored. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from gaitswarm.views.certificate import CertificateView
+from services.optimizer.analysis.certificate import certificate
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.certificate import CertificateSpec
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
+
+
+class Histories(Protocol):
+    """Where jobs and their evaluations are."""
+
+    def job(self, job_id: str) -> Job:
+        """A job.
+
+        Args:
+            job_id: identifier of the job.
+        """
+
+    def columns(self, job: Job) -> EvaluationColumns:
+        """All evaluations of a job.
+
+        Args:
+            job: as it was read.
+        """
+
+
+def run_certificate(
+    histories: Histories, job_id: str, *, worlds: int | None = None, most: int = 5
+) -> CertificateView:
+    """Say what a certificate comes to.
+
+    Args:
+        histories: Where the job is.
+        job_id: Identifier of the job.
+        worlds: Worlds to take, the first ones; None for all that have walked.
+        most: Worst worlds to name.
+
+    Returns:
+        The summary.
+
+    Raises:
+        InvalidRequest: A job of another kind.
+        Conflict: No drawn world has walked yet, or the job is too large to be held in memory.
+    """
+    job = histories.job(job_id)
+    spec = job.spec
+    if not isinstance(spec, CertificateSpec):
+        raise InvalidRequest(
+            f"job {job.id} is of kind {spec.kind}; only a certificate has worlds", field="job_id"
+        )
+    found = certificate(spec, histories.columns(job), worlds=worlds, most=most)
+    return CertificateView.from_certificate(job.id, spec, found)

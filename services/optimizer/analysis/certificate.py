@@ -1,0 +1,325 @@
+"""What a certificate says: how outcomes spread over worlds, how often walks fail, and where."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.analysis.tournament import spearman
+from services.optimizer.errors import Conflict
+from services.optimizer.jobs.certificate import CertificateSpec
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.preference import HEIGHT_LOSS
+from sim.outcome import Status
+
+Floats = NDArray[np.float64]
+
+QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+LEVEL: Final = 0.95
+"""Of the conditional value at risk, and of all intervals."""
+
+MOST_WORST: Final = 1000
+"""Worst worlds that can be named."""
+
+_NORMAL: Final = 1.959963984540054
+"""The standard normal distribution's quantile at 0.975."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proportion:
+    """How often something happened, and how often it would in all worlds.
+
+    Attributes:
+        count: Worlds in which it happened.
+        worlds: Worlds in all.
+        low: Lower end of the exact interval of 95 % (Clopper and Pearson 1934).
+        high: Upper end.
+    """
+
+    count: int
+    worlds: int
+    low: float
+    high: float
+
+    @property
+    def share(self) -> float:
+        """Of the worlds."""
+        return self.count / self.worlds
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How a quantity spreads over worlds; less is better, and a failed walk is worse than any.
+
+    Attributes:
+        quantiles: At `QUANTILES`, of all worlds: +inf where a quantile is a failed walk.
+        worst: The greatest of walks that did not fail, NaN if all did.
+        cvar: Mean of the worst 5 % of worlds, the conditional value at risk at 0.95. A failed walk,
+            which has no value, counts as `worst`: with failures in the tail this is a lower bound.
+        tail_failed: Share of that tail that failed.
+        nominal: In the nominal world, NaN if the walk failed there.
+    """
+
+    quantiles: tuple[float, ...]
+    worst: float
+    cvar: float
+    tail_failed: float
+    nominal: float
+
+
+@dataclass(frozen=True, slots=True)
+class CaseResult:
+    """One scenario over all worlds.
+
+    Attributes:
+        name: Of the scenario.
+        statuses: How many walks ended so.
+        fell: How often the robot fell.
+        failed: How often the walk failed in any way.
+        utility: By the preference.
+        objectives: f1 to f6 of table 4.1; f6 by its size.
+    """
+
+    name: str
+    statuses: dict[Status, int]
+    fell: Proportion
+    failed: Proportion
+    utility: Spread
+    objectives: tuple[Spread, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class WorldOutcome:
+    """What a design came to in one world.
+
+    Attributes:
+        index: Of the world, from 0.
+        iteration: Of the job, in which it was walked.
+        particle: Its place there.
+        fitness: Geometric mean over the scenarios, +inf if one of them failed.
+        failures: Scenarios that failed, and how.
+        scenario: In which the world is worst: one that failed, or else the one whose utility is the
+            greatest multiple of that in the nominal world.
+        values: Of all perturbations that are drawn or fixed, by name.
+    """
+
+    index: int
+    iteration: int
+    particle: int
+    fitness: float
+    failures: tuple[tuple[str, Status], ...]
+    scenario: str
+    values: dict[str, float | str]
+
+
+@dataclass(frozen=True, slots=True)
+class Influence:
+    """How a perturbation goes with the outcome.
+
+    Attributes:
+        name: Of the perturbation.
+        correlation: Spearman's, of its value with the fitness: worlds in which a scenario failed
+            share the last rank. Positive: greater values go with worse outcomes.
+        low: Lower end of the interval of 95 % (Bonett and Wright 2000).
+        high: Upper end.
+    """
+
+    name: str
+    correlation: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """A design in many worlds.
+
+    Attributes:
+        worlds: How many were drawn and walked.
+        cases: By scenario, in the job's order.
+        fitness: Over all scenarios, by the preference.
+        fell: How often the robot fell in one scenario at least.
+        failed: How often a walk failed in one scenario at least.
+        worst: The worst worlds, first those in which most scenarios failed.
+        influences: Of the perturbations that are drawn, the strongest first.
+    """
+
+    worlds: int
+    cases: tuple[CaseResult, ...]
+    fitness: Spread
+    fell: Proportion
+    failed: Proportion
+    worst: tuple[WorldOutcome, ...]
+    influences: tuple[Influence, ...]
+
+
+def certificate(
+    spec: CertificateSpec, columns: EvaluationColumns, *, worlds: int | None = None, most: int = 5
+) -> Certificate:
+    """Say what a certificate's walks come to.
+
+    Args:
+        spec: Of the job.
+        columns: Its evaluations, in order: the nominal world, then those that were drawn.
+        worlds: Drawn worlds to take, the first ones; None for all that have walked.
+        most: Worst worlds to name.
+
+    Returns:
+        The summary.
+
+    Raises:
+        Conflict: No drawn world has walked yet.
+    """
+    taken = columns.rows(slice(None if worlds is None else worlds + 1))
+    if len(taken) < 2:
+        raise Conflict("no drawn world has walked yet; ask again after the first iteration")
+    values = taken.objectives.copy()
+    values[:, :, HEIGHT_LOSS] = np.abs(values[:, :, HEIGHT_LOSS])
+    judged = spec.judge(taken.objectives, taken.failed)
+    utilities = judged.utilities
+    drawn = taken.rows(slice(1, None))
+    fell = np.asarray(drawn.statuses == Status.FELL)
+    return Certificate(
+        worlds=len(drawn),
+        cases=tuple(
+            _case(name, drawn.statuses[:, k], utilities[:, k], values[:, k])
+            for k, name in enumerate(spec.case_names)
+        ),
+        fitness=_spread(judged.fitness),
+        fell=proportion(np.asarray(fell.any(axis=1))),
+        failed=proportion(np.asarray(drawn.failed.any(axis=1))),
+        worst=_worst(spec, taken, judged.log_utilities, judged.fitness, most),
+        influences=_influences(spec, drawn.designs, judged.fitness[1:]),
+    )
+
+
+def proportion(happened: NDArray[np.bool_]) -> Proportion:
+    """Count worlds, with the exact interval of a binomial proportion (Clopper and Pearson 1934).
+
+    Args:
+        happened: (n,), by world; n >= 1.
+
+    Returns:
+        The count and its interval.
+    """
+    # It takes a quarter of a second to import, and few questions need it.
+    from scipy.special import betaincinv  # noqa: PLC0415
+
+    n, k = len(happened), int(np.count_nonzero(happened))
+    tail = 0.5 * (1.0 - LEVEL)
+    low = float(betaincinv(k, n - k + 1, tail)) if k > 0 else 0.0
+    high = float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0
+    return Proportion(k, n, low, high)
+
+
+def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
+    """Mean of the worst values (Rockafellar and Uryasev 2002), the greatest being the worst.
+
+    Args:
+        values: (n,) finite numbers, n >= 1.
+        level: Share of the values that are not in the tail.
+
+    Returns:
+        Mean of the greatest (1 - level) n values; of a value that is in the tail in part, that part
+        counts.
+    """
+    ordered = np.sort(values)[::-1].tolist()
+    size = max((1.0 - level) * len(ordered), 1.0)
+    whole = math.floor(size + 1e-9)
+    part = size - whole
+    total = math.fsum(ordered[:whole])
+    if part > 1e-9:
+        total += part * ordered[whole]
+    return total / size
+
+
+def _case(name: str, statuses: NDArray[np.uint8], utility: Floats, values: Floats) -> CaseResult:
+    """utility (1 + n,) and values (1 + n, 6) with the nominal world; statuses (n,) without."""
+    found, counts = np.unique(statuses, return_counts=True)
+    return CaseResult(
+        name=name,
+        statuses={Status(s): int(c) for s, c in zip(found.tolist(), counts.tolist(), strict=True)},
+        fell=proportion(statuses == Status.FELL),
+        failed=proportion(statuses != Status.OK),
+        utility=_spread(utility),
+        objectives=tuple(_spread(column) for column in values.T),
+    )
+
+
+def _spread(values: Floats) -> Spread:
+    """values (1 + n,), the nominal world's first; NaN or +inf for a failed walk."""
+    nominal, drawn = float(values[0]), values[1:]
+    failed = ~np.isfinite(drawn)
+    filled = np.where(failed, np.inf, drawn)
+    quantiles = np.quantile(filled, QUANTILES, method="inverted_cdf").tolist()
+    worst = math.nan if failed.all() else float(drawn[~failed].max())
+    tail = (1.0 - LEVEL) * len(drawn)
+    return Spread(
+        quantiles=tuple(quantiles),
+        worst=worst,
+        cvar=math.nan
+        if failed.all()
+        else conditional_value_at_risk(np.where(failed, worst, drawn)),
+        tail_failed=min(1.0, int(failed.sum()) / max(tail, 1.0)),
+        nominal=nominal if math.isfinite(nominal) else math.nan,
+    )
+
+
+def _worst(
+    spec: CertificateSpec,
+    taken: EvaluationColumns,
+    log_utilities: Floats,
+    fitness: Floats,
+    most: int,
+) -> tuple[WorldOutcome, ...]:
+    failed = taken.failed[1:]
+    # The last key sorts first; the earlier of equals is first.
+    order = np.lexsort((-fitness[1:], -failed.sum(axis=1)))[:most]
+    space, names = spec.design_space(), spec.case_names
+    nominal = np.where(np.isfinite(log_utilities[0]), log_utilities[0], 0.0)
+    found = []
+    for index in order.tolist():
+        row = index + 1
+        failures = tuple(
+            (names[k], Status(int(taken.statuses[row, k]))) for k in np.flatnonzero(failed[index])
+        )
+        found.append(
+            WorldOutcome(
+                index=index,
+                iteration=int(taken.iteration[row]),
+                particle=int(taken.particle[row]),
+                fitness=float(fitness[row]),
+                failures=failures,
+                scenario=failures[0][0]
+                if failures
+                else names[int(np.argmax(log_utilities[row] - nominal))],
+                values=space.shown(taken.designs[row].tolist()),
+            )
+        )
+    return tuple(found)
+
+
+def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> tuple[Influence, ...]:
+    """worlds: (n, v) as they were drawn."""
+    found = []
+    for j, variable in enumerate(spec.design_space().variables):
+        correlation = spearman(worlds[:, j], fitness)
+        if not math.isnan(correlation):
+            found.append(
+                Influence(variable.name, correlation, *_interval(correlation, len(worlds)))
+            )
+    return tuple(sorted(found, key=lambda influence: -abs(influence.correlation)))
+
+
+def _interval(correlation: float, n: int) -> tuple[float, float]:
+    """Of Spearman's correlation, by Fisher's z with the variance of Bonett and Wright (2000)."""
+    if n <= 3 or abs(correlation) >= 1.0:
+        return (-1.0, 1.0) if n <= 3 else (correlation, correlation)
+    z = math.atanh(correlation)
+    half = _NORMAL * math.sqrt((1.0 + 0.5 * correlation * correlation) / (n - 3))
+    return math.tanh(z - half), math.tanh(z + half)

@@ -1,0 +1,335 @@
+"""Jobs that put one design to the test: in many worlds, and in scenarios that no job contained."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.optimizer_choice import OptimizerChoice
+from services.optimizer.jobs.preference import (
+    PREFERENCES,
+    Preference,
+    PreferenceChoice,
+    figure_of_merit,
+    judge,
+)
+from services.optimizer.jobs.spec import Judgement, Spec
+from services.optimizer.search.enumeration import Enumeration
+from services.optimizer.search.optimizer import Optimizer
+from services.optimizer.search.random_search import RandomSearchSettings
+from sim.case import Case
+from sim.catalogue import design_catalogue, design_numbers, design_shown
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.errors import SimulationInputError
+from sim.identification.recorded_walk import Recordings
+from sim.outcome import OBJECTIVES, Objective
+from sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from sim.simulate import check_reach
+from sim.variables import VariableName, VariableValue
+from sim.worlds import PERTURBATIONS, WorldWalk, check_worlds, sample_worlds
+from sim.worlds.perturbations import NOMINAL
+
+Floats = NDArray[np.float64]
+
+BATCH: Final = 50
+"""Worlds of an iteration: with eight scenarios 400 walks, half a second or so of two cores."""
+
+CASES: Final = 8
+"""Scenarios of a certificate that names none."""
+
+_MIRRORED: Final = ("turn-left-fast", "downhill-fast")
+"""The held-out scenarios that come first: the turn and the slope of table 4.2, the other way."""
+
+_OPTIMIZER: Final[TypeAdapter[Any]] = TypeAdapter(OptimizerChoice)
+
+
+def certificate_scenarios(tuned: Sequence[Scenario] = SCENARIOS) -> tuple[Scenario, ...]:
+    """The scenarios of a certificate: those that a design was tuned in, and held-out ones.
+
+    Args:
+        tuned: Scenarios of the job that found the design; by default those of table 4.2.
+
+    Returns:
+        These, and so many of `HELD_OUT` that there are `CASES`, but two of them at least.
+    """
+    names = {scenario.name for scenario in tuned}
+    others = [scenario for scenario in HELD_OUT if scenario.name not in names]
+    others.sort(key=lambda scenario: scenario.name not in _MIRRORED)
+    return (*tuned, *others[: max(len(_MIRRORED), CASES - len(tuned))])
+
+
+class CertificateSpec(Spec):
+    """A certificate: one design, in worlds that differ in all that a model may get wrong.
+
+    A design of the job is a world: a value of every perturbation. The first is the nominal world,
+    the others are drawn, each by its number alone.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "kind": "certificate",
+                    "controller": "fuzzy-pi",
+                    "design": dict(CONTROLLERS["fuzzy-pi"].published["A"]),
+                    "preference": "A",
+                    "worlds": 1000,
+                    "seed": 1,
+                }
+            ]
+        },
+    )
+
+    unwalked = (Spec.unwalked or frozenset()) | {"preference", "worlds"}
+
+    kind: Literal["certificate"] = Field(description="Put one design to the test in many worlds.")
+    controller: ControllerName = Field(
+        default="fuzzy-pi", description="Motor controller of the design; see /v1/controllers."
+    )
+    design: dict[VariableName, VariableValue] = Field(
+        description="The design: a value of each of the controller's variables, and of any gait"
+        " variable, which then replaces the scenarios' value.",
+        examples=[dict(CONTROLLERS["fuzzy-pi"].published["A"])],
+    )
+    scenarios: tuple[ScenarioChoice, ...] = Field(
+        default=tuple(scenario.name for scenario in certificate_scenarios()),
+        min_length=1,
+        max_length=32,
+        description="Walks that every world is put to: names or numbers of presets (see"
+        " /v1/scenarios), or your own. Default: the six of table 4.2, and its turn and"
+        " its slope the other way.",
+    )
+    preference: PreferenceChoice = Field(
+        default="A",
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own.",
+    )
+    worlds: int = Field(
+        default=1000,
+        ge=1,
+        le=100_000,
+        description="How many worlds are drawn; the nominal one, which differs in nothing, is"
+        " walked before them. `iterations` follow from it.",
+    )
+    optimizer: OptimizerChoice = Field(
+        default=RandomSearchSettings(particles=BATCH),
+        description="What draws the worlds: `random`, whose `particles` are an iteration's.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _count_worlds(cls, document: Any) -> Any:
+        if not isinstance(document, Mapping):
+            return document
+        if document.get("start"):
+            raise ValueError("start: worlds are drawn; leave it out")
+        try:
+            default = cls.model_fields["optimizer"].default
+            batch = _OPTIMIZER.validate_python(document.get("optimizer", default)).particles
+        except ValidationError:
+            return document
+        worlds, iterations = document.get("worlds"), document.get("iterations")
+        if worlds is None and isinstance(iterations, int) and iterations > 0:
+            return {**document, "worlds": max(1, iterations * batch - 1)}
+        if worlds is None:
+            worlds = cls.model_fields["worlds"].default
+        if not isinstance(worlds, int) or worlds < 1:
+            return document
+        needed = math.ceil((worlds + 1) / batch)
+        if iterations not in (None, needed):
+            raise ValueError(
+                f"iterations: follow from worlds; {worlds} in batches of {batch} are {needed}"
+                " with the nominal one; leave them out"
+            )
+        return {**document, "iterations": needed}
+
+    @model_validator(mode="after")
+    def _can_be_run(self) -> Self:
+        if self.optimizer.name != "random":
+            raise ValueError("optimizer: worlds are drawn by random")
+        names = self.case_names
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"scenarios: {name!r} is named twice")
+        self._check_design()
+        self.design_space()
+        return self
+
+    def _check_design(self) -> None:
+        known = design_catalogue(self.controller)
+        for name in self.design:
+            if name not in known:
+                raise ValueError(f"design: unknown variable {name!r}; known are {', '.join(known)}")
+        needed = [variable.name for variable in CONTROLLERS[self.controller].variables]
+        missing = [name for name in needed if name not in self.design]
+        if missing:
+            raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
+        try:
+            design_numbers(self.controller, self.design)
+        except SimulationInputError as error:
+            raise ValueError(f"design.{error}") from error
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The design as the simulator takes it."""
+        return design_numbers(self.controller, self.design)
+
+    @property
+    def budget(self) -> int:
+        """The nominal world and those that are drawn."""
+        return self.worlds + 1
+
+    def with_budget(self, iterations: int) -> Self:
+        """The same job with as many worlds as so many iterations hold.
+
+        Args:
+            iterations: Of the budget.
+
+        Returns:
+            The spec of a job that was extended to it.
+        """
+        worlds = iterations * self.optimizer.particles - 1
+        return self.model_copy(update={"iterations": iterations, "worlds": worlds})
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios in full, presets looked up."""
+        return tuple(
+            find_scenario(entry) if isinstance(entry, str) else entry for entry in self.scenarios
+        )
+
+    def resolved_preference(self) -> Preference:
+        """The preference in full."""
+        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
+
+    def design_space(self) -> DesignSpace:
+        """The perturbations; what is neither drawn nor fixed is as the robot has it."""
+        chosen = self.variables
+        if chosen is None:
+            chosen = tuple(v for v in PERTURBATIONS if v.name not in self.fixed)
+        return DesignSpace.build(
+            required=(), optional=PERTURBATIONS, chosen=chosen, fixed=self.fixed
+        )
+
+    def create_search(self) -> Optimizer:
+        """What asks for the worlds: the nominal one, then those of `sample_worlds`."""
+        variables = self.design_space().variables
+        nominal = [[min(max(NOMINAL[v.name], v.low), v.high) for v in variables]]
+
+        def positions(start: int, stop: int) -> Floats:
+            drawn = sample_worlds(stop - 1, self.seed, variables)
+            return np.concatenate([np.array(nominal), drawn])[start:]
+
+        return Enumeration(self.optimizer.name, self.optimizer.particles, positions)
+
+    def world(self, index: int) -> dict[str, float]:
+        """One of the worlds that are drawn.
+
+        Args:
+            index: Its number, from 0.
+
+        Returns:
+            Value of every perturbation that is drawn or fixed, by name.
+        """
+        space = self.design_space()
+        drawn = sample_worlds(index + 1, self.seed, space.variables)[index:]
+        (values,) = space.simulated(space.designs(drawn)).tolist()
+        return dict(zip(space.names, values, strict=True))
+
+    def check_can_be_simulated(self) -> None:
+        """Check the design, the scenarios, and the worlds at both ends of all ranges.
+
+        Raises:
+            InvalidRequest: Something cannot be simulated; names the field.
+        """
+        self.check_optimizer()
+        self.check_precision()
+        try:
+            CONTROLLERS[self.controller].compile(self.numbers)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field="design") from error
+        names, values = tuple(self.numbers), tuple(self.numbers.values())
+        for index, scenario in enumerate(self.resolved_scenarios()):
+            try:
+                check_reach(scenario, names, values, robot=self.robot)
+            except SimulationInputError as error:
+                raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
+        space = self.design_space()
+        corners = np.stack([space.low, space.high])
+        try:
+            check_worlds(space.names, space.simulated(space.designs(corners)))
+        except SimulationInputError as error:
+            raise space.refusal(error) from error
+
+    @property
+    def held_out(self) -> tuple[str, ...]:
+        """Names of the scenarios for which no design of the thesis was optimized."""
+        names = {scenario.name for scenario in HELD_OUT}
+        return tuple(name for name in self.case_names if name in names)
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """Raw objectives of a walk: f1..f6 of table 4.1."""
+        return OBJECTIVES
+
+    @property
+    def case_names(self) -> tuple[str, ...]:
+        """Names of the scenarios, in order."""
+        return tuple(scenario.name for scenario in self.resolved_scenarios())
+
+    def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
+        """The design's walk in each scenario, through worlds.
+
+        Args:
+            recordings: None are needed.
+
+        Returns:
+            The walks, in the order of `case_names`.
+        """
+        names, design = self.design_space().names, tuple(self.numbers.items())
+        return tuple(
+            WorldWalk(self.robot, self.controller, design, scenario, names, self.precision)
+            for scenario in self.resolved_scenarios()
+        )
+
+    def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
+        """Judge the design in worlds by the preference (eq. 3.8, 4.1, 4.2).
+
+        Args:
+            objectives: (n, K, 6) raw objectives, in their units.
+            failed: (n, K), true for a walk without a result.
+
+        Returns:
+            Fitness and utilities in the n worlds.
+        """
+        return judge(objectives, failed, self.resolved_preference())
+
+    def figure_of_merit(self, fitness: float) -> float | None:
+        """F of eq. 3.1, to be maximized.
+
+        Args:
+            fitness: In a world, by the job's preference.
+
+        Returns:
+            F if the preference is that of chapter 3, else None.
+        """
+        return figure_of_merit(fitness, self.resolved_preference())
+
+    def resolved(self) -> Self:
+        """The same job with scenarios, preference, design and perturbations written out."""
+        space = self.design_space()
+        return self.model_copy(
+            update={
+                "scenarios": self.resolved_scenarios(),
+                "preference": self.resolved_preference(),
+                "design": design_shown(self.controller, self.numbers),
+                "variables": space.variables,
+                "fixed": space.shown_fixed,
+            }
+        )

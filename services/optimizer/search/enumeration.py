@@ -1,0 +1,129 @@
+"""Positions that follow from their number alone, asked for in order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, NonNegativeInt
+
+from services.optimizer.search.optimizer import checked_fitness, parse_state
+
+Floats = NDArray[np.float64]
+
+
+class _CountedState(BaseModel):
+    """What `dump` writes."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    optimizer: str
+    schema_version: Literal[1]
+    iteration: NonNegativeInt
+    evaluations: NonNegativeInt
+    asked: NonNegativeInt
+
+
+class Enumeration:
+    """An optimizer that listens to nobody: position k is a function of k.
+
+    Its state is how far it is, whatever the number of positions before.
+    """
+
+    def __init__(self, name: str, particles: int, positions: Callable[[int, int], Floats]) -> None:
+        """Create one that has not been asked yet.
+
+        Args:
+            name: Of the method, in its state.
+            particles: Positions of an ask, at most.
+            positions: Gives positions start <= k < stop, (stop - start, d); the same ones whatever
+                the piece.
+        """
+        self._name = name
+        self._particles = particles
+        self._positions = positions
+        self._iteration = 0
+        self._evaluations = 0
+        self._asked = 0
+
+    @property
+    def iteration(self) -> int:
+        """Number of completed tells."""
+        return self._iteration
+
+    @property
+    def evaluations(self) -> int:
+        """Number of positions that were told, in all."""
+        return self._evaluations
+
+    def start_from(self, positions: Floats) -> None:
+        """Refuse to begin elsewhere.
+
+        Args:
+            positions: (k, d); none are allowed.
+
+        Raises:
+            ValueError: There are some.
+        """
+        if len(positions):
+            raise ValueError(f"start_from(): {self._name} begins with the first of its positions")
+
+    def ask(self, most: int | None = None) -> Floats:
+        """Give the positions to evaluate next; the same ones again until they are told.
+
+        Args:
+            most: Positions to give, at most, >= 1; what is asked already stays. Default:
+                `particles`, which also is the limit.
+
+        Returns:
+            (n, d) positions.
+        """
+        if not self._asked:
+            self._asked = self._particles if most is None else min(most, self._particles)
+        return self._positions(self._evaluations, self._evaluations + self._asked)
+
+    def tell(self, fitness: Floats) -> None:
+        """Go on to the next positions.
+
+        Args:
+            fitness: (n,) of each of those last asked for.
+
+        Raises:
+            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
+        """
+        self._evaluations += len(checked_fitness(fitness, self._asked))
+        self._iteration += 1
+        self._asked = 0
+
+    def dump(self) -> dict[str, Any]:
+        """Give the whole state.
+
+        Returns:
+            JSON-able counts.
+        """
+        return {
+            "optimizer": self._name,
+            "schema_version": 1,
+            "iteration": self._iteration,
+            "evaluations": self._evaluations,
+            "asked": self._asked,
+        }
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Take on a state.
+
+        Args:
+            state: As `dump` gave it.
+
+        Raises:
+            ValueError: It is of another method or version; the state before is kept.
+        """
+        dumped = parse_state(state, self._name, _CountedState)
+        if dumped.optimizer != self._name:
+            raise ValueError(f"not a state of {self._name}: optimizer: {dumped.optimizer}")
+        if dumped.asked > self._particles:
+            raise ValueError(f"asked: {dumped.asked} positions, more than {self._name} gives")
+        self._iteration, self._asked = dumped.iteration, dumped.asked
+        self._evaluations = dumped.evaluations

@@ -1,0 +1,140 @@
+"""What a certificate says, on outcomes that are made up."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, spearmanr
+
+from services.optimizer.analysis.certificate import (
+    Certificate,
+    certificate,
+    conditional_value_at_risk,
+    proportion,
+)
+from services.optimizer.errors import Conflict
+from services.optimizer.jobs.certificate import CertificateSpec
+from sim.outcome import Status
+from tests.certificate.examples import columns, small
+
+PRODUCT = {"bias": [0.0] * 5, "exponent": [0.2] * 5}
+"""By which a walk whose objectives are all x is worth x."""
+
+
+def plain(worlds: int) -> CertificateSpec:
+    return small(preference=PRODUCT, worlds=worlds)
+
+
+def summary(values: list[list[float]], statuses: list[list[int]] | None = None) -> Certificate:
+    """Of a design; rows are worlds, the nominal one first, columns the two scenarios."""
+    spec = plain(len(values) - 1)
+    ended = None if statuses is None else np.array(statuses, dtype=np.float64)
+    return certificate(spec, columns(spec, np.array(values), ended))
+
+
+@pytest.mark.parametrize(("count", "of"), [(0, 20), (3, 20), (20, 20), (1, 1000)])
+def test_intervals_of_proportions_are_exact(count: int, of: int) -> None:
+    found = proportion(np.arange(of) < count)
+    expected = binomtest(count, of).proportion_ci(0.95, method="exact")
+    assert (found.count, found.worlds, found.share) == (count, of, count / of)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high), rel=1e-9)
+
+
+def test_the_conditional_value_at_risk_is_the_mean_of_the_tail() -> None:
+    values = np.arange(1.0, 101.0)
+    assert conditional_value_at_risk(values) == pytest.approx((96 + 97 + 98 + 99 + 100) / 5)
+    # Of thirty values the tail is one and a half: the worst, and half of the next.
+    assert conditional_value_at_risk(values[:30]) == pytest.approx((30.0 + 0.5 * 29.0) / 1.5)
+    assert conditional_value_at_risk(values[:4]) == 4.0
+    assert conditional_value_at_risk(values, level=0.0) == pytest.approx(50.5)
+
+
+def test_spreads_are_of_the_drawn_worlds_beside_the_nominal_one() -> None:
+    found = summary([[7.0, 28.0], *([float(k), 4.0 * k] for k in range(1, 101))])
+    level = found.cases[0].utility
+    assert level.nominal == pytest.approx(7.0)
+    assert level.quantiles == pytest.approx((5.0, 25.0, 50.0, 75.0, 95.0))
+    assert (level.worst, level.cvar) == pytest.approx((100.0, 98.0))
+    assert level.tail_failed == 0.0
+    # Of a scenario in which all is four times as bad, and over both: the geometric mean.
+    assert found.cases[1].utility.cvar == pytest.approx(4 * 98.0)
+    assert found.fitness.cvar == pytest.approx(2 * 98.0)
+    assert found.worlds == 100
+
+
+def test_a_failed_walk_is_worse_than_any_and_counts_as_the_worst_of_the_others() -> None:
+    values = [[1.0, 1.0], *([float(k), 1.0] for k in range(1, 41))]
+    statuses = [[Status.OK, Status.OK] for _ in values]
+    for world in (0, 1, 2):
+        statuses[1 + world][0] = Status.FELL
+    statuses[1 + 3][0] = Status.STALLED
+    case, other = summary(values, [list(map(int, row)) for row in statuses]).cases
+    assert case.statuses == {Status.OK: 36, Status.FELL: 3, Status.STALLED: 1}
+    assert (case.fell.count, case.failed.count) == (3, 4)
+    # 36 of 40 did not fail, so that the worst 5 % are failed walks.
+    assert case.utility.quantiles[-1] == math.inf
+    assert case.utility.quantiles[2] == pytest.approx(24.0)
+    assert (case.utility.worst, case.utility.cvar) == pytest.approx((40.0, 40.0))
+    assert case.utility.tail_failed == 1.0
+    assert other.failed.count == 0
+    assert other.utility.cvar == pytest.approx(1.0)
+
+
+def test_a_design_that_always_fails_has_no_values_but_a_probability() -> None:
+    fallen = [[int(Status.FELL), int(Status.OK)]] * 6
+    found = summary([[1.0, 1.0]] * 6, fallen)
+    spread = found.cases[0].utility
+    assert all(map(math.isnan, (spread.nominal, spread.worst, spread.cvar)))
+    assert (found.fell.share, found.failed.high) == (1.0, 1.0)
+    assert found.influences == ()
+
+
+def test_the_worst_worlds_come_first_with_the_scenario_that_broke_them() -> None:
+    ok, fell = int(Status.OK), int(Status.FELL)
+    values = [[10.0, 20.0], [11.0, 21.0], [30.0, 20.0], [10.0, 50.0], [1.0, 1.0], [1.0, 1.0]]
+    statuses = [[ok, ok], [ok, ok], [ok, ok], [ok, ok], [ok, fell], [fell, fell]]
+    spec = plain(5)
+    found = certificate(spec, columns(spec, np.array(values), np.array(statuses)), most=4)
+    assert [world.index for world in found.worst] == [4, 3, 1, 2]
+    assert [world.scenario for world in found.worst] == ["short", "uphill", "short", "uphill"]
+    assert found.worst[0].failures == (("short", Status.FELL), ("uphill", Status.FELL))
+    assert found.worst[3].failures == ()
+    assert found.worst[1].values == spec.world(3)
+    assert (found.worst[1].iteration, found.worst[1].particle) == (1, 0)
+
+
+def test_what_goes_with_bad_worlds_is_named_by_rank_correlation() -> None:
+    spec = plain(60)
+    friction = np.array([spec.world(k)["friction_factor"] for k in range(60)])
+    noise = np.array([spec.world(k)["slope_added"] for k in range(60)])
+    worth = np.concatenate([[1.0], np.exp(-friction) + 0.02 * noise])
+    found = certificate(spec, columns(spec, np.stack([worth, worth], axis=1)))
+    first = found.influences[0]
+    assert first.name == "friction_factor"
+    assert first.correlation == pytest.approx(spearmanr(friction, worth[1:]).statistic)
+    assert -1.0 < first.low < first.correlation < first.high < -0.8
+    sizes = [abs(influence.correlation) for influence in found.influences]
+    assert sizes == sorted(sizes, reverse=True) and len(sizes) == 3
+
+
+def test_the_loss_of_height_counts_by_its_size() -> None:
+    spec = plain(2)
+    made = columns(spec, np.ones((3, 2)))
+    made.objectives[1:, :, 5] = [[-0.03, 0.0], [0.01, 0.0]]
+    assert certificate(spec, made).cases[0].objectives[5].worst == pytest.approx(0.03)
+
+
+def test_fewer_worlds_are_the_first_ones() -> None:
+    spec = plain(20)
+    made = columns(spec, np.arange(1.0, 43.0).reshape(21, 2))
+    few = certificate(spec, made, worlds=5)
+    assert few.worlds == 5
+    assert few.cases[0].utility.worst == pytest.approx(11.0)
+
+
+def test_without_a_drawn_world_there_is_nothing_to_say() -> None:
+    spec = plain(5)
+    with pytest.raises(Conflict, match="no drawn world has walked yet"):
+        certificate(spec, columns(spec, np.ones((1, 2))))

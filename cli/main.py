@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 from cli.commands import (
     bench,
     calibrate,
+    certify,
     compare,
     export,
     firmware,
@@ -101,6 +102,7 @@ for _module in (
     tournament,
     identify,
     calibrate,
+    certify,
     reconstruct,
 ):
     _module.register(app)

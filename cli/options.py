@@ -123,6 +123,29 @@ class SpecOptions:
             help="Search the gait, too: cycle time, stride, height, duty factor and FIR filter.",
         ),
     ] = None
+    worlds: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=100,
+            help="Judge every design in so many worlds that differ from the model, not in the model"
+            " alone.",
+        ),
+    ] = None
+    aggregate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="mean|quantile|worst|cvar",
+            help="With --worlds: what utilities in all worlds come to [default: cvar].",
+        ),
+    ] = None
+    level: Annotated[
+        float | None,
+        typer.Option(help="With --worlds: of a quantile or of the cvar [default: 0.75]."),
+    ] = None
+    worlds_seed: Annotated[
+        int | None, typer.Option(min=0, help="With --worlds: of the worlds [default: 1].")
+    ] = None
     robot: RobotOption = None
     precision: Precision = None
     name: JobName = None

@@ -83,6 +83,7 @@ def build_spec(options: SpecOptions) -> AnySpec:
     if options.robot is not None:
         chosen["robot"] = chosen_robot(options.robot)
     _lay_settings(chosen, data.get("optimizer", {}))
+    _lay_worlds(chosen, data.get("worlds"))
     with_gait = chosen.pop("with_gait", False)
     file = _add_start(chosen, data)
     try:
@@ -128,6 +129,18 @@ def _lay_settings(chosen: dict[str, Any], asked: object) -> None:
                 field="optimizer-settings",
             )
     chosen["optimizer"] = with_settings(named, settings)
+
+
+def _lay_worlds(chosen: dict[str, Any], asked: object) -> None:
+    """What options say of worlds over those of the file. Raises InvalidRequest."""
+    fields = {"worlds": "count", "aggregate": "aggregate", "level": "level", "worlds_seed": "seed"}
+    given = {fields[name]: chosen.pop(name) for name in fields if name in chosen}
+    if not given:
+        return
+    if "count" not in given and asked is None:
+        option = next(o for o, field in fields.items() if field in given).replace("_", "-")
+        raise InvalidRequest("goes with --worlds, which says in how many", field=option)
+    chosen["worlds"] = {**(asked if isinstance(asked, Mapping) else {}), **given}
 
 
 def _settings_object(text: str) -> dict[str, Any]:

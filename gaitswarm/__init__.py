@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.preference import PREFERENCES, Preference
     from services.optimizer.jobs.tournament import TournamentSpec
     from services.optimizer.jobs.tuning import JobSpec
+    from services.optimizer.jobs.tuning_worlds import TuningWorlds
     from services.optimizer.run.coordinator import Backoff
     from services.optimizer.search.automatic import AutoSettings
     from services.optimizer.search.evolution.cma_es import CmaEsSettings
@@ -193,6 +194,7 @@ __all__ = [
     "TournamentSpec",
     "TournamentStandingsView",
     "TournamentView",
+    "TuningWorlds",
     "Unavailable",
     "Unreadable",
     "Variable",
@@ -254,6 +256,7 @@ _MODULES: Final = {
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.tournament": ("TournamentSpec",),
     "services.optimizer.jobs.tuning": ("JobSpec",),
+    "services.optimizer.jobs.tuning_worlds": ("TuningWorlds",),
     "services.optimizer.search.automatic": ("AutoSettings",),
     "services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
     "services.optimizer.search.evolution.differential_evolution": ("DeSettings",),

@@ -16,6 +16,7 @@ from services.optimizer.jobs.optimizer_choice import with_settings
 from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
+from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from services.optimizer.search.automatic import ChoiceName, ChosenSettings
 from sim.controllers import ControllerName
 from sim.kernel.walk import Precision
@@ -69,6 +70,8 @@ class SpecOptions(TypedDict, total=False):
             five best; `{"jobs": [ID, ...], "count": N}` for another number.
         precision: Of the numbers of the search's physics; what is reported as best is judged in
             double.
+        worlds: `TuningWorlds`, or a document of it, for a search that judges every design in worlds
+            that differ from the model.
     """
 
     name: str
@@ -84,6 +87,7 @@ class SpecOptions(TypedDict, total=False):
     seed: int
     start: StartInput
     precision: Precision
+    worlds: TuningWorlds | Document | None
 
 
 def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:

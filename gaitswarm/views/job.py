@@ -357,12 +357,19 @@ def _why_unreadable(spec: AnySpec | UnreadableSpec) -> str | None:
     return spec.reason if isinstance(spec, UnreadableSpec) else None
 
 
+def _walked(spec: AnySpec) -> list[str]:
+    """Names of the cases; of a tuning in many worlds each scenario once."""
+    if isinstance(spec, JobSpec):
+        return [scenario.name for scenario in spec.resolved_scenarios()]
+    return list(spec.case_names)
+
+
 def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
     """What a summary says of a spec."""
     if isinstance(spec, UnreadableSpec):
         kind, scenarios, particles = None, [], spec.particles
     else:
-        kind, scenarios, particles = spec.kind, list(spec.case_names), spec.optimizer.particles
+        kind, scenarios, particles = spec.kind, _walked(spec), spec.optimizer.particles
     return {
         "name": spec.name,
         "kind": kind,

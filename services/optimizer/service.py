@@ -372,7 +372,7 @@ class JobService:
             Conflict: the job is too large to be held in memory.
         """
         spec, columns = tuning_of(job), self.columns(job)
-        return RankedJob(spec, columns, rank(columns, preference, top=top))
+        return RankedJob(spec, columns, rank(columns, preference, top=top, worlds=spec.worlds))
 
     def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
         """Say which parameters several runs of one problem agree on.

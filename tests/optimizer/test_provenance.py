@@ -28,6 +28,7 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
 from services.optimizer.jobs.tournament import TournamentSpec
 from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
@@ -273,7 +274,7 @@ def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     kinds = (JobSpec, IdentificationSpec, CalibrationSpec, TournamentSpec, CertificateSpec)
     specs = (*kinds, Spec)
     used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)
-    runs = (FunctionProblem, RaceCase)
+    runs = (FunctionProblem, RaceCase, TuningWorlds)
     files = {Path(inspect.getfile(thing)) for thing in (*used, *runs)}
     for room in (Path(inspect.getfile(thing)).parent for thing in (create_search, race)):
         files |= set(room.rglob("*.py"))

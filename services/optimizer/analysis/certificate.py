@@ -26,6 +26,9 @@ LEVEL: Final = 0.95
 MOST_WORST: Final = 1000
 """Worst worlds that can be named."""
 
+_SEED: Final = "world_seed"
+"""A perturbation whose order means nothing."""
+
 _NORMAL: Final = 1.959963984540054
 """The standard normal distribution's quantile at 0.975."""
 
@@ -308,6 +311,8 @@ def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> tuple
     """worlds: (n, v) as they were drawn."""
     found = []
     for j, variable in enumerate(spec.design_space().variables):
+        if variable.name == _SEED:
+            continue
         correlation = spearman(worlds[:, j], fitness)
         if not math.isnan(correlation):
             found.append(

@@ -13,6 +13,7 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.tuning_worlds import TuningWorlds
 
 Floats = NDArray[np.float64]
 
@@ -89,18 +90,26 @@ def tuning_of(job: Job) -> JobSpec:
     return job.spec
 
 
-def rank(columns: EvaluationColumns, preference: Preference, *, top: int) -> Ranking:
+def rank(
+    columns: EvaluationColumns,
+    preference: Preference,
+    *,
+    top: int,
+    worlds: TuningWorlds | None = None,
+) -> Ranking:
     """Judge all rows by another preference.
 
     Args:
         columns: evaluations of a job that tunes a drive, with fitness by the job's own preference.
         preference: to judge by.
         top: how many designs to name; fewer if fewer walk in every scenario.
+        worlds: in which the job judges every design; None for the model alone.
 
     Returns:
         The ranking; the designs' order by the new preference beside that by the old.
     """
-    fitness, before = fitness_of(log_utilities(columns, preference)), columns.fitness
+    logarithms, before = log_utilities(columns, preference), columns.fitness
+    fitness = fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
     present, ordered = _best_first(before, 1), np.sort(before)
     return Ranking(
         top=tuple(

@@ -23,6 +23,7 @@ from services.optimizer.search.random_stream import RandomNumbers
 from sim.case import Case, LongCase, Walk
 from sim.outcome import Status
 from sim.simulate import prepare
+from sim.worlds.perturbed_walk import PerturbedWalk
 
 _MOST_JOBS: Final = 5
 """Jobs whose rates are averaged, so that one on a busy machine does not count for all."""
@@ -103,7 +104,7 @@ def duration(spec: Spec, cases: Sequence[Case]) -> float:
     cycle_time = _typical(spec.design_space(), "cycle_time")
     return sum(
         case.scenario.cycles * cycle_time
-        if isinstance(case, Walk) and cycle_time is not None
+        if isinstance(case, Walk | PerturbedWalk) and cycle_time is not None
         else case.duration
         for case in cases
     )
@@ -181,7 +182,7 @@ def _measure(spec: Spec, cases: Sequence[Case], positions: NDArray[np.float64]) 
 
 def _shortened(case: Case) -> Case:
     """A walk of some seconds; a fit needs all of its recording."""
-    if not isinstance(case, Walk):
+    if not isinstance(case, Walk | PerturbedWalk):
         return case
     scenario = case.scenario
     cycles = max(1.0, min(scenario.cycles, _LONGEST_WALK / scenario.cycle_time))

@@ -29,6 +29,7 @@ _JUDGING: Final = (
     "jobs/start.py",
     "jobs/tournament.py",
     "jobs/tuning.py",
+    "jobs/tuning_worlds.py",
 )
 """Files that judge designs."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Final, Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from services.optimizer.jobs.preference import (
     judge,
 )
 from services.optimizer.jobs.spec import Judgement, Spec
+from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
@@ -35,6 +37,8 @@ from sim.scenario import (
 )
 from sim.simulate import check_reach
 from sim.variables import Variable
+from sim.worlds import check_worlds
+from sim.worlds.perturbed_walk import PerturbedWalk
 
 Floats = NDArray[np.float64]
 
@@ -78,6 +82,12 @@ class JobSpec(Spec):
         default="A",
         description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
         " your own.",
+    )
+    worlds: TuningWorlds | None = Field(
+        default=None,
+        description="Worlds that differ from the model, in each of which every design walks through"
+        " every scenario, so that the search pays for robustness; null judges by the model alone.",
+        examples=[None, {"count": 8, "aggregate": "cvar"}],
     )
 
     @model_validator(mode="after")
@@ -135,12 +145,22 @@ class JobSpec(Spec):
                 with_gait(scenarios[0], _gait_of(design))
             except SimulationInputError as error:
                 raise space.refusal(error) from error
+        self._check_worlds()
         gait = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)
         for index, scenario in enumerate(scenarios):
             try:
                 check_reach(scenario, tuple(gait), tuple(gait.values()), robot=self.robot)
             except SimulationInputError as error:
                 raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
+
+    def _check_worlds(self) -> None:
+        """Raises InvalidRequest for a range that cannot be simulated."""
+        variables = () if self.worlds is None else self.worlds.variables()
+        ends = np.array([[v.low for v in variables], [v.high for v in variables]])
+        try:
+            check_worlds(tuple(v.name for v in variables), ends)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field="worlds.ranges") from error
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -149,11 +169,14 @@ class JobSpec(Spec):
 
     @property
     def case_names(self) -> tuple[str, ...]:
-        """Names of the scenarios, in order."""
-        return tuple(scenario.name for scenario in self.resolved_scenarios())
+        """Names of the scenarios, in order; with that of the world where there are worlds."""
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        if self.worlds is None:
+            return tuple(names)
+        return tuple(f"{name}.world-{k}" for name in names for k in range(self.worlds.count))
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
-        """One walk in each scenario.
+        """One walk in each scenario, or in each world of it.
 
         Args:
             recordings: none are needed.
@@ -162,6 +185,14 @@ class JobSpec(Spec):
             The walks, in the order of `case_names`.
         """
         names = self.design_space().names
+        if self.worlds is not None:
+            pairs = product(self.resolved_scenarios(), self.worlds.drawn())
+            return tuple(
+                PerturbedWalk(
+                    name, self.robot, self.controller, scenario, world, names, self.precision
+                )
+                for name, (scenario, world) in zip(self.case_names, pairs, strict=True)
+            )
         return tuple(
             Walk(self.robot, self.controller, scenario, names, self.precision)
             for scenario in self.resolved_scenarios()
@@ -177,7 +208,8 @@ class JobSpec(Spec):
         Returns:
             Fitness and utilities of the n designs.
         """
-        return judge(objectives, failed, self.resolved_preference())
+        judged = judge(objectives, failed, self.resolved_preference())
+        return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
 
     def figure_of_merit(self, fitness: float) -> float | None:
         """F of eq. 3.1, to be maximized.
@@ -200,6 +232,8 @@ class JobSpec(Spec):
                 "variables": space.variables,
                 "fixed": space.shown_fixed,
                 "optimizer": self.search,
+                "worlds": self.worlds
+                and self.worlds.model_copy(update={"ranges": self.worlds.variables()}),
             }
         )
 

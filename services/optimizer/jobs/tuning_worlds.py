@@ -1,0 +1,140 @@
+"""Worlds in which a tuning judges every design, and what it makes of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Final, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from services.optimizer.jobs.preference import geometric_mean
+from services.optimizer.jobs.spec import Judgement
+from sim.variables import Variable, VariableChoice
+from sim.worlds import PERTURBATIONS, sample_worlds
+
+Floats = NDArray[np.float64]
+
+Aggregate = Literal["mean", "quantile", "worst", "cvar"]
+
+_EDGE: Final = 1e-9
+"""Of a world: a share that is nearer to a whole number of worlds is one."""
+
+
+class TuningWorlds(BaseModel):
+    """A set of worlds, the same for all designs and scenarios: common random numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    count: int = Field(
+        default=8, ge=1, le=100, description="How many are drawn; a design walks in each of them."
+    )
+    seed: int = Field(
+        default=1, ge=0, lt=2**63, description="Of the worlds; see `seed` of a certificate."
+    )
+    ranges: tuple[VariableChoice, ...] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=128,
+        description="Perturbations that are drawn: names, or variables with bounds of your own."
+        " Default: all.",
+    )
+    aggregate: Aggregate = Field(
+        default="cvar",
+        description="What a scenario's utilities in all worlds come to: their `mean`, their"
+        " `quantile` at `level`, the `worst`, or the conditional value at risk `cvar`, which is the"
+        " mean of the worst 1 - `level` of them.",
+    )
+    level: float = Field(
+        default=0.75, ge=0.0, lt=1.0, description="Of a quantile or of the value at risk [1]."
+    )
+
+    @model_validator(mode="after")
+    def _can_be_drawn(self) -> Self:
+        self.variables()
+        return self
+
+    def variables(self) -> tuple[Variable, ...]:
+        """The perturbations that are drawn, with their bounds.
+
+        Raises:
+            ValueError: One is unknown or named twice. A set that was validated raises nothing.
+        """
+        known = {variable.name: variable for variable in PERTURBATIONS}
+        chosen = PERTURBATIONS if self.ranges is None else self.ranges
+        found: dict[str, Variable] = {}
+        for entry in chosen:
+            name = entry if isinstance(entry, str) else entry.name
+            if name not in known:
+                raise ValueError(f"ranges: no perturbation {name!r}; known are {', '.join(known)}")
+            if name in found:
+                raise ValueError(f"ranges: {name!r} is named twice")
+            own = {} if isinstance(entry, str) else {"low": entry.low, "high": entry.high}
+            found[name] = known[name].model_copy(update=own)
+        return tuple(found.values())
+
+    def drawn(self) -> tuple[tuple[tuple[str, float], ...], ...]:
+        """Names and values of each of the worlds."""
+        return _drawn(self)
+
+    def judged(self, log_utilities: Floats) -> Judgement:
+        """Judge designs by what their utilities in all worlds come to.
+
+        Args:
+            log_utilities: (n, K W) logarithms of utilities, worlds the fastest, +inf where a walk
+                failed.
+
+        Returns:
+            Fitness, the geometric mean over the K scenarios of the aggregates (eq. 4.2), and the
+            logarithms as they are.
+        """
+        logarithms = self.aggregated(log_utilities)
+        return Judgement(geometric_mean(logarithms), log_utilities)
+
+    def aggregated(self, log_utilities: Floats) -> Floats:
+        """What utilities in all worlds come to, by scenario. A failed walk is infinitely bad.
+
+        Args:
+            log_utilities: (n, K W), as for `judged`.
+
+        Returns:
+            (n, K) logarithms; +inf where as many walks failed that the aggregate has no value: for
+            a quantile more than 1 - `level` of them, for any other a single one.
+        """
+        by_scenario = log_utilities.reshape(len(log_utilities), -1, self.count)
+        rows = [[self._aggregate(worlds) for worlds in row] for row in by_scenario.tolist()]
+        return np.array(rows, dtype=np.float64).reshape(by_scenario.shape[:2])
+
+    def _aggregate(self, logarithms: Sequence[float]) -> float:
+        ordered = sorted(logarithms, reverse=True)
+        tail = (1.0 - self.level) * self.count
+        if self.aggregate == "quantile":
+            # So many may be worse.
+            return ordered[min(math.floor(tail + _EDGE), self.count - 1)]
+        if self.aggregate == "worst" or math.isinf(ordered[0]):
+            return ordered[0]
+        return _log_mean(ordered, self.count if self.aggregate == "mean" else max(1.0, tail))
+
+
+def _log_mean(ordered: Sequence[float], size: float) -> float:
+    """Logarithm of the mean of the greatest `size` numbers, the last of which may count in part.
+
+    ordered: their logarithms, the greatest first.
+    """
+    whole = math.floor(size + _EDGE)
+    terms = [math.exp(value - ordered[0]) for value in ordered[: whole + 1]]
+    total = math.fsum(terms[:whole])
+    if size - whole > _EDGE:
+        total += (size - whole) * terms[whole]
+    return ordered[0] + math.log(total / size)
+
+
+@lru_cache(maxsize=32)
+def _drawn(worlds: TuningWorlds) -> tuple[tuple[tuple[str, float], ...], ...]:
+    variables = worlds.variables()
+    names = [variable.name for variable in variables]
+    rows = sample_worlds(worlds.count, worlds.seed, variables).tolist()
+    return tuple(tuple(zip(names, row, strict=True)) for row in rows)

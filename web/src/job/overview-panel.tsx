@@ -38,10 +38,12 @@ export function OverviewPanel({ live, job }: { live: LiveJob; job: Job }) {
         <DistributionChart job={job} iterations={iterations} distribution={distribution} />
         <DiversityChart distribution={distribution} />
       </div>
-      {job.best && (
+      {job.best && job.kind !== 'certificate' && (
         <>
           <BestCard job={job} />
-          {job.spec.kind === 'tuning' && <LimitsCard job={job} spec={job.spec} />}
+          {job.spec.kind === 'tuning' && !job.spec.worlds && (
+            <LimitsCard job={job} spec={job.spec} />
+          )}
         </>
       )}
     </div>

@@ -5,6 +5,7 @@ import type { Job } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
+import { CertificatePanel } from './certificate-panel'
 import { caseWords } from './fitness'
 import { JobHeader } from './header'
 import { IterationPanel } from './iteration-panel'
@@ -22,6 +23,7 @@ import { VariablesPanel } from './variables-panel'
 
 const TABS = [
   { tab: '', label: 'Overview' },
+  { tab: 'certificate', label: 'Certificate' },
   { tab: 'targets', label: 'Targets' },
   { tab: 'scenarios', label: 'Scenarios' },
   { tab: 'parameters', label: 'Parameters' },
@@ -34,7 +36,10 @@ const TABS = [
 
 /** Parts of jobs of some kinds only. */
 const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
+  certificate: ['certificate'],
   targets: ['calibration'],
+  // Which world is best says nothing.
+  scenarios: ['tuning', 'identification', 'calibration', 'tournament'],
   parameters: ['identification', 'calibration'],
   robustness: ['tuning'],
   preferences: ['tuning'],
@@ -104,6 +109,8 @@ function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
   switch (section) {
     case '':
       return <OverviewPanel live={live} job={job} />
+    case 'certificate':
+      return <CertificatePanel job={job} />
     case 'targets':
       return <TargetsPanel job={job} />
     case 'scenarios':

@@ -202,7 +202,12 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
       header: true,
       value: (row) => row.label,
       cell: (row) =>
-        job.kind === 'tuning' ? <a href={walk(row.scenario)}>{row.label}</a> : row.label,
+        // A scenario of one of a job's worlds is no preset.
+        job.spec.kind === 'tuning' && !job.spec.worlds ? (
+          <a href={walk(row.scenario)}>{row.label}</a>
+        ) : (
+          row.label
+        ),
     },
     ...job.objectives.map(
       (objective): Column<Row> => ({

@@ -21,12 +21,19 @@ export function replaysOf(walks: readonly Recorded[]): Replay[] {
 
 /** Let a design walk through a scenario, a preset's name or one of one's own. */
 export async function recordWalk(
-  { label, robot, controller, design }: ResolvedDesign,
+  { label, robot, controller, design, world = {} }: ResolvedDesign,
   scenario: string | Scenario,
   rate: number,
   signal: AbortSignal,
 ): Promise<Recorded> {
   const name = controller.name as 'fuzzy-pi'
-  const body = { robot, controller: name, design: { ...design }, scenario, rate }
+  const body = {
+    robot,
+    controller: name,
+    design: { ...design },
+    world: { ...world },
+    scenario,
+    rate,
+  }
   return { label, replay: parseReplay(await postBytes('/v1/replays', { body, signal })) }
 }

@@ -15,6 +15,8 @@ export interface ResolvedDesign {
   readonly robot: JobSpec['robot']
   readonly controller: Controller
   readonly design: Design
+  /** What is different from the model where it walks: values of perturbations. */
+  readonly world?: Readonly<Record<string, number>>
   /** Scenarios in which its job judges it; none outside a job. */
   readonly scenarios: readonly Scenario[]
 }
@@ -48,7 +50,7 @@ async function ofJob(
 ): Promise<ResolvedDesign> {
   const job = await readableJob(source.job, signal)
   const { spec } = job
-  if (spec.kind !== 'tuning') {
+  if (spec.kind !== 'tuning' && spec.kind !== 'certificate') {
     throw new ApiProblem(
       422,
       'this job fits parameters of the simulation, so its designs drive no controller; its own' +
@@ -63,9 +65,12 @@ async function ofJob(
       source.kind === 'best'
         ? `Best of ${name}`
         : `${name}, design ${evaluation.particle} of iteration ${evaluation.iteration}`,
+    // The evaluations of a certificate are worlds, in which its one design walks.
+    ...(spec.kind === 'certificate'
+      ? { design: spec.design, world: evaluation.design as Readonly<Record<string, number>> }
+      : { design: evaluation.design }),
     robot: spec.robot,
     controller: named(controllers, spec.controller),
-    design: evaluation.design,
     scenarios: spec.scenarios.filter((entry) => typeof entry !== 'string'),
   }
 }

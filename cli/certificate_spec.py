@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
-from cli.design_file import read_design
+from cli.design_file import given_design, may_be_file
 from cli.robots import chosen_robot, scenario_data
 from cli.spec_file import parse_spec
-from gaitswarm.requests.design import design_of_job, may_be_job
-from services.optimizer.errors import InvalidRequest
+from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.certificate import CertificateSpec, certificate_scenarios
-from sim.controllers import CONTROLLERS
 from sim.worlds import PERTURBATIONS
 
-if TYPE_CHECKING:
-    from gaitswarm.requests.design import DesignOfJob
+_PLAIN: Final = ("worlds", "seed", "preference", "precision", "name")
+"""Options that are fields of the spec."""
 
 _PLAIN: Final = ("worlds", "seed", "preference", "precision", "name")
 """Options that are fields of the spec."""
@@ -39,13 +36,8 @@ def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> C
         NotFound: No such job or database, or a job without a design.
     """
     options = {name: value for name, value in given.items() if value is not None}
-    if may_be_job(design) and not Path(design).exists():
-        document = _of_job(design, db, options)
-    else:
-        document = _of_design(design, options)
-    document |= {
-        k: options[k] for k in ("worlds", "seed", "preference", "precision", "name") if k in options
-    }
+    document = _earlier(design, db, options) or _new(design, db, options)
+    document |= {name: options[name] for name in _PLAIN if name in options}
     if "scenarios" in options:
         # A job's scenarios have names there, whether they are presets or its own.
         known = {scenario.name: scenario for scenario in document.get("scenarios", ())}
@@ -59,47 +51,42 @@ def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> C
     return cast(CertificateSpec, parse_spec(document))
 
 
-def _of_job(job_id: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
+def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Of a certificate that is named by its id; None for any other design."""
     from gaitswarm.jobs.open import open_jobs
 
-    if "controller" in options:
-        raise InvalidRequest("is that of the job; leave it out", field="controller")
+    if may_be_file(design):
+        return None
     with open_jobs(None, db) as jobs:
-        found = design_of_job(jobs, job_id)
-    if isinstance(found.spec, CertificateSpec):
-        document = found.spec.model_dump() | {"scenarios": found.scenarios}
-        # They follow from the number of worlds.
-        del document["iterations"]
-        return document
-    return {**_document(found), "name": f"certificate of {found.spec.name or job_id}"}
+        try:
+            spec = jobs.job(design).spec
+        except NotFound:
+            return None
+    if not isinstance(spec, CertificateSpec):
+        return None
+    if "controller" in options:
+        raise InvalidRequest("is that of the certificate; leave it out", field="controller")
+    document = spec.model_dump() | {"scenarios": spec.resolved_scenarios()}
+    # They follow from the number of worlds.
+    del document["iterations"]
+    return document
 
 
-def _document(found: DesignOfJob) -> dict[str, Any]:
-    return {
+def _new(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
+    found = given_design(design, options.get("controller"), server=None, db=db)
+    document: dict[str, Any] = {
         "kind": "certificate",
-        "robot": found.robot,
+        "name": f"certificate of {found.label}",
         "controller": found.controller,
-        "design": found.design,
-        "preference": found.preference,
-        "scenarios": certificate_scenarios(found.scenarios),
+        "design": found.values,
     }
-
-
-def _of_design(design: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    controller = options.get("controller") or _controller_of(design)
-    return {
-        "kind": "certificate",
-        "name": f"certificate of {design}",
-        "controller": controller,
-        "design": read_design(design, controller),
+    if found.spec is None:
+        return document
+    return document | {
+        "robot": found.spec.robot,
+        "preference": found.spec.resolved_preference(),
+        "scenarios": certificate_scenarios(found.spec.resolved_scenarios()),
     }
-
-
-def _controller_of(design: str) -> str:
-    """The one that has the published design of that name, or fuzzy-pi."""
-    name = design.removeprefix("published:")
-    has = [known for known, family in CONTROLLERS.items() if name in family.published]
-    return has[0] if design.startswith("published:") and has else "fuzzy-pi"
 
 
 def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:

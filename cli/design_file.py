@@ -59,15 +59,22 @@ def given_design(
             field.
         NotFound: no such job, or none of its designs has walked in every scenario.
     """
-    if not given.startswith((_PUBLISHED, _JOB)) and _is_file(given):
+    if may_be_file(given) and not given.startswith(_PUBLISHED):
         return _from_elsewhere(given, Path(given).stem, controller)
     if given.startswith(_PUBLISHED):
         return _from_elsewhere(given, f"published {given.removeprefix(_PUBLISHED)}", controller)
     return _best_of_job(given.removeprefix(_JOB), controller, server, db)
 
 
-def _is_file(given: str) -> bool:
-    return given == "-" or given.endswith(".json") or Path(given).exists()
+def may_be_file(given: str) -> bool:
+    """Whether an argument DESIGN|ID names something else than a job.
+
+    given: as for `given_design`.
+    """
+    if given.startswith(_JOB):
+        return False
+    named = given == "-" or given.startswith(_PUBLISHED) or given.endswith(".json")
+    return named or Path(given).exists()
 
 
 def _from_elsewhere(given: str, label: str, controller: str | None) -> GivenDesign:

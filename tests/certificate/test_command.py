@@ -134,7 +134,7 @@ def test_ranges_and_held_values_are_the_users_to_choose(files: Path) -> None:
     [
         (("published:Z",), 2, "design: no published design 'Z' of fuzzy-pi"),
         (("nowhere.json",), 2, "design: cannot read nowhere.json"),
-        (("bcdfghjkmnpq",), 3, "there is no job 'bcdfghjkmnpq'"),
+        (("bcdfghjkmnpq",), 3, "there is no job 'bcdfghjkmnpq'; a design is the id of a job"),
         (("published:A", "--range", "friction_factor"), 2, "range: 'friction_factor' is not NAME="),
         (("published:A", "--range", "friction_factor=1"), 2, "range: 'friction_factor=1' is not"),
         (("published:A", "--range", "hat=0:1"), 2, "variables: unknown variable 'hat'"),

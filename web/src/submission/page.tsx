@@ -45,7 +45,7 @@ export default function NewJobPage() {
       )}
       {start.loading && <Loading what="the catalogue" />}
       {start.data &&
-        (from && from.kind !== 'tuning' ? (
+        (from && isDocument(from) ? (
           <JsonForm key={String(query)} spec={from.spec} />
         ) : (
           <JobForm
@@ -69,7 +69,7 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
     id === null ? null : readableJob(id, signal),
   ])
   const from = cloned && withSeed(cloned, query.get('seed'))
-  if (!from || from.kind !== 'tuning') {
+  if (!from || isDocument(from)) {
     return { catalogue, draft: startingFrom(emptyDraft(catalogue), query), from }
   }
   let draft = startingFrom(draftOf(from.spec as JobSpec, catalogue), query)
@@ -83,6 +83,11 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
 function startingFrom(draft: Draft, query: URLSearchParams): Draft {
   const jobs = query.get('start')
   return jobs === null ? draft : { ...draft, start: { ...draft.start, jobs } }
+}
+
+/** Whether the form has no fields for a job: of another kind, or judged in many worlds. */
+function isDocument({ spec }: Job): boolean {
+  return spec.kind !== 'tuning' || Boolean(spec.worlds)
 }
 
 function withSeed(job: Job, seed: string | null): Job {

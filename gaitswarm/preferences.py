@@ -70,7 +70,8 @@ def robust_preferences(
     columns = _columns(jobs, job_id)
     if not np.isfinite(columns.fitness).any():
         raise Conflict(f"job {job_id} has no design yet that walks in all scenarios")
-    found = winners(columns, drawn_preferences(columns, count=drawn, seed=seed))
+    drawn_ones = drawn_preferences(columns, count=drawn, seed=seed)
+    found = winners(columns, drawn_ones, worlds=spec.worlds)
     chosen = found[: max(candidates, sum(bool(winner.named) for winner in found))]
     requests = [
         _request(spec, columns, winner, samples, radius, seed, precision) for winner in chosen

@@ -44,8 +44,11 @@ def run_scenario_families(
             field="job_id",
         )
     columns = histories.columns(job)
-    judged = log_utilities(columns, job.spec.resolved_preference())
+    spec, names = job.spec, [scenario.name for scenario in job.spec.resolved_scenarios()]
+    judged = log_utilities(columns, spec.resolved_preference())
+    if spec.worlds is not None:
+        judged = spec.worlds.aggregated(judged)
     if not np.isfinite(judged).all(axis=1).any():
         raise Conflict(f"job {job_id} has no design yet that walks in all scenarios")
     found = scenario_families(judged, tolerance=tolerance)
-    return ScenarioFamiliesView.from_families(found, job.spec.case_names, columns)
+    return ScenarioFamiliesView.from_families(found, names, columns)

@@ -16,6 +16,7 @@ from services.optimizer.analysis.robustness import NORMALISED_OBJECTIVES
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.preference import PREFERENCES, Preference
+from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from services.optimizer.search.random_stream import swarm_uniform
 
 Floats = NDArray[np.float64]
@@ -73,19 +74,25 @@ def drawn_preferences(columns: EvaluationColumns, *, count: int, seed: int) -> l
     ]
 
 
-def winners(columns: EvaluationColumns, drawn: Sequence[Preference]) -> tuple[Winner, ...]:
+def winners(
+    columns: EvaluationColumns,
+    drawn: Sequence[Preference],
+    *,
+    worlds: TuningWorlds | None = None,
+) -> tuple[Winner, ...]:
     """Find who wins under any of the preferences.
 
     Args:
         columns: evaluations of a job; one at least walks in all scenarios.
         drawn: preferences beside those of table 4.5.
+        worlds: in which the job judges every design; None for the model alone.
 
     Returns:
         The winners: those of table 4.5 first, then by the share of preferences.
     """
     preferences = [*NAMED.values(), *drawn]
     names = [*NAMED, *("" for _ in drawn)]
-    judged = np.stack([_log_fitness(columns, preference) for preference in preferences])
+    judged = np.stack([_log_fitness(columns, preference, worlds) for preference in preferences])
     best = judged.argmin(axis=1)
     rows = sorted(set(best.tolist()))
     # How far each winner leads the others, under every preference.
@@ -101,5 +108,9 @@ def winners(columns: EvaluationColumns, drawn: Sequence[Preference]) -> tuple[Wi
     return tuple(sorted(found, key=lambda winner: (not winner.named, -winner.share, winner.row)))
 
 
-def _log_fitness(columns: EvaluationColumns, preference: Preference) -> Floats:
-    return np.asarray(np.log(fitness_of(log_utilities(columns, preference))))
+def _log_fitness(
+    columns: EvaluationColumns, preference: Preference, worlds: TuningWorlds | None
+) -> Floats:
+    logarithms = log_utilities(columns, preference)
+    judged = logarithms if worlds is None else worlds.aggregated(logarithms)
+    return np.asarray(np.log(fitness_of(judged)))

@@ -15,9 +15,6 @@ from sim.worlds import PERTURBATIONS
 _PLAIN: Final = ("worlds", "seed", "preference", "precision", "name")
 """Options that are fields of the spec."""
 
-_PLAIN: Final = ("worlds", "seed", "preference", "precision", "name")
-"""Options that are fields of the spec."""
-
 
 def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> CertificateSpec:
     """The job that a command asks for.

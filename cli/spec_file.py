@@ -143,6 +143,30 @@ def _lay_worlds(chosen: dict[str, Any], asked: object) -> None:
     chosen["worlds"] = {**(asked if isinstance(asked, Mapping) else {}), **given}
 
 
+def optimizer_choice(name: str | None, settings: str | None) -> Any:
+    """A search method with settings, as a spec has it, unchecked; None where neither is given.
+
+    settings: JSON, or a file that holds it. Raises InvalidRequest.
+    """
+    if settings is None:
+        return name
+    chosen: dict[str, Any] = {} if name is None else {"optimizer": name}
+    chosen["optimizer_settings"] = settings
+    _lay_settings(chosen, {})
+    return chosen["optimizer"]
+
+
+def preference_choice(text: str) -> str | dict[str, Any]:
+    """A preference by name, or one's own as JSON, unchecked. Raises InvalidRequest."""
+    if not text.lstrip().startswith("{"):
+        return text
+    try:
+        chosen: dict[str, Any] = json.loads(text)
+    except ValueError as error:
+        raise InvalidRequest(f"not JSON: {error}", field="preference") from error
+    return chosen
+
+
 def _settings_object(text: str) -> dict[str, Any]:
     """A JSON object as text, or that in FILE or @FILE. Raises InvalidRequest."""
     field = "optimizer-settings"

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         SimulatedScenarioView,
         SimulationView,
     )
+    from services.optimizer.jobs.fork import Lineage
     from services.optimizer.jobs.provenance import JobProvenance
     from services.optimizer.jobs.spec import Spec
     from sim.outcome import Objective
@@ -56,13 +57,20 @@ def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
     for job in jobs:
         table.add_row(
             job.id,
-            Text(job.name or MISSING),
+            _name(job),
             Text(job.state.value, style=_STYLES.get(job.state.value, "")),
             _spent(job),
             number(job.best_fitness),
             f"{job.created_at:%Y-%m-%d %H:%M}",
         )
     return table
+
+
+def _name(job: JobSummaryView) -> Text:
+    """Of a fork, also where it comes from."""
+    if job.lineage is None:
+        return Text(job.name or MISSING)
+    return Text("\n".join(filter(None, [job.name, "fork of", job.lineage.parent])))
 
 
 def optimizers_table(optimizers: Iterable[OptimizerView]) -> Table:
@@ -224,6 +232,7 @@ def print_job(job: JobView) -> None:
         "name": job.name or MISSING,
         "state": job.state.value,
         "error": job.error,
+        "lineage": None if job.lineage is None else lineage_line(job.lineage),
         "iterations": _iterations(job),
         "evaluations": f"{job.evaluations} of {job.evaluations_planned}",
         "evaluations saved": str(job.evaluations_saved),
@@ -244,6 +253,19 @@ def print_job(job: JobView) -> None:
     console.print(table)
     if job.best is not None:
         print_best(job.best, job)
+
+
+def lineage_line(lineage: Lineage) -> str:
+    """What a fork took over of which job, and why no more."""
+    first = f"fork of {lineage.parent}, "
+    changed = f" with another {', '.join(lineage.changed)}" if lineage.changed else ""
+    if lineage.carried == "search":
+        begins = lineage.from_iteration
+        return f"{first}goes on from its iteration {begins}{changed}"
+    return (
+        f"{first}a new search{changed} from the best designs of its iterations before"
+        f" {lineage.from_iteration}: {lineage.reason}"
+    )
 
 
 def _spent(job: JobSummaryView) -> str:

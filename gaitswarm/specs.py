@@ -90,6 +90,54 @@ class SpecOptions(TypedDict, total=False):
     worlds: TuningWorlds | Document | None
 
 
+class ForkOptions(TypedDict, total=False):
+    """What is to be different of a fork, by keyword; whatever is not given is the parent's.
+
+    Attributes:
+        name: Name of the job, for people.
+        preference: How objectives are weighed.
+        optimizer: Search method, as in `SpecOptions`; what it does not set has the method's
+            default.
+        particles: Designs of one iteration, at most, in place of `optimizer`'s.
+        scenarios: Walks in which every design is judged; one, or several.
+        robot: Robot to simulate.
+        iterations: Budget in all, with the iterations that the fork begins with.
+        start_count: Where the search cannot be taken over: designs to start from, at most; 5.
+        accept_changes: Whether it goes on with the parent's iterations although what its numbers
+            depend on has changed since.
+    """
+
+    name: str
+    preference: PreferenceInput
+    optimizer: ChoiceName | ChosenSettings | Document
+    particles: int
+    scenarios: ScenarioInput | Iterable[ScenarioInput]
+    robot: RobotInput
+    iterations: int
+    start_count: int
+    accept_changes: bool
+
+
+def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
+    """Options by keyword as a document, with the files of a robot of one's own in it.
+
+    Args:
+        options: Keywords that the caller gave.
+
+    Returns:
+        The document, not checked yet.
+
+    Raises:
+        InvalidRequest: There is no such robot.
+    """
+    given: dict[str, Any] = dict(options)
+    if "robot" in given:
+        given["robot"] = robot_source(given["robot"])
+    if "scenarios" in given:
+        given["scenarios"] = scenario_entries(given["scenarios"])
+    return given
+
+
 def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     """The spec that is meant by a spec and keywords laid over it.
 
@@ -106,11 +154,7 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     if isinstance(spec, Spec) and not options:
         return cast(AnySpec, spec)
     document = dict(spec.model_dump() if isinstance(spec, Spec) else spec or {})
-    given: dict[str, Any] = dict(options)
-    if "robot" in given:
-        given["robot"] = robot_source(given["robot"])
-    if "scenarios" in given:
-        given["scenarios"] = scenario_entries(given["scenarios"])
+    given = laid_options(options)
     if "particles" in given:
         settings = given.get("optimizer", document.get("optimizer", {}))
         given["optimizer"] = with_settings(settings, {"particles": given.pop("particles")})

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
-from api.dependencies import JobId, Service, Slots
+from api.dependencies import JobId, JobIdText, Service, Slots
 from api.documentation import problems
 from gaitswarm.views import (
     PREFIX,
@@ -19,6 +19,7 @@ from gaitswarm.views import (
     ResumeRequest,
 )
 from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from services.optimizer.service import JobService
 
@@ -82,6 +83,43 @@ def submit_job(
 
 
 @router.post(
+    "/jobs/{job_id}/fork",
+    operation_id="fork_job",
+    summary="Fork a job",
+    status_code=status.HTTP_202_ACCEPTED,
+    response_description="The fork is queued; `Location` says where to follow it.",
+    responses={
+        200: {
+            "model": JobView,
+            "description": "The key was used before for the same fork: this is that job.",
+        },
+        **problems(400, 404, 409, 413, 422),
+    },
+)
+def fork_job(
+    request: ForkRequest,
+    job_id: JobId,
+    service: Service,
+    response: Response,
+    sent: Annotated[Any, Depends(request_document)],
+    idempotency_key: IdempotencyKey = None,
+) -> JobView:
+    """Queue a job that begins with iterations of this one, of which nothing is changed.
+
+    With the same settings it goes on as this one did, bit for bit. Under another preference the
+    stored objectives are judged anew and the search is told that, if its method can be; else, and
+    with another optimizer, robot or other scenarios, a new search starts from the best designs. The
+    fork's `lineage` says which, and why. 409 if the search cannot be taken over, or what its
+    numbers depend on has changed and that is not accepted.
+    """
+    job, new = service.fork(job_id, request, idempotency_key=idempotency_key, sent=sent)
+    if not new:
+        response.status_code = status.HTTP_200_OK
+    response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
+    return _in_full(service, job)
+
+
+@router.post(
     "/estimates",
     operation_id="estimate_job",
     summary="Estimate a job",
@@ -100,6 +138,9 @@ async def estimate_job(spec: AnySpec, service: Service, slots: Slots) -> Estimat
 def list_jobs(
     service: Service,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
+    parent: Annotated[
+        JobIdText | None, Query(description="Only jobs that were forked from the job of this id.")
+    ] = None,
     search: Annotated[
         str,
         Query(
@@ -120,7 +161,9 @@ def list_jobs(
     limit: Annotated[int, Query(ge=1, le=200, description="Most jobs on a page.")] = 50,
 ) -> PageView[JobSummaryView]:
     """Jobs with their progress, in pages. Jobs submitted meanwhile do not shift later pages."""
-    page = service.jobs(state=state, search=search, order=order, after=after, limit=limit)
+    page = service.jobs(
+        state=state, parent=parent, search=search, order=order, after=after, limit=limit
+    )
     return PageView(items=[JobSummaryView.from_job(job) for job in page.items], next=page.next)
 
 

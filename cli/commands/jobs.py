@@ -57,6 +57,9 @@ def list_jobs(
             " succeeded."
         ),
     ] = None,
+    forks_of: Annotated[
+        str | None, typer.Option(metavar="ID", help="Only jobs that were forked from this one.")
+    ] = None,
     search: Annotated[
         str, typer.Option(metavar="TEXT", help="Only jobs whose name or id contains this.")
     ] = "",
@@ -77,7 +80,9 @@ def list_jobs(
     in_state = None if state is None else _one_of(JobState, state, "state")
     sorted_by = _one_of(JobOrder, order, "order")
     with open_jobs(server, db) as jobs:
-        found = jobs.jobs(state=in_state, search=search, order=sorted_by, limit=limit)
+        found = jobs.jobs(
+            state=in_state, parent=forks_of, search=search, order=sorted_by, limit=limit
+        )
         if as_json:
             print_json_list(found)
         else:

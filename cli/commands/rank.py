@@ -47,21 +47,13 @@ def rank(
 
 def _request(preference: str, top: int) -> RankingRequest:
     """Raises InvalidRequest that names the field."""
-    import json
-
     from pydantic import ValidationError
 
+    from cli.spec_file import preference_choice
     from gaitswarm.errors import invalid_request
     from gaitswarm.views import RankingRequest
-    from services.optimizer.errors import InvalidRequest
 
-    chosen: object = preference
-    if preference.lstrip().startswith("{"):
-        try:
-            chosen = json.loads(preference)
-        except ValueError as error:
-            raise InvalidRequest(f"not JSON: {error}", field="preference") from error
-    data = {"preference": chosen, "top": top}
+    data = {"preference": preference_choice(preference), "top": top}
     try:
         return RankingRequest.model_validate(data)
     except ValidationError as error:

@@ -17,6 +17,7 @@ from gaitswarm.jobs.port import JobEvent
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
+    ForkOptions,
     PreferenceInput,
     RobotInput,
     ScenarioInput,
@@ -83,6 +84,21 @@ class AsyncDatabaseJobs(AsyncJobs):
         """Queue a job in the database, for `run` or a runner of another process."""
         jobs = await self._jobs()
         call = partial(jobs.submit, spec, idempotency_key=idempotency_key, **options)
+        return await to_thread.run_sync(call)
+
+    async def fork(
+        self,
+        job_id: str,
+        from_iteration: int,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[ForkOptions],
+    ) -> JobView:
+        """Queue a fork in the database, for `run` or a runner of another process."""
+        jobs = await self._jobs()
+        call = partial(
+            jobs.fork, job_id, from_iteration, idempotency_key=idempotency_key, **options
+        )
         return await to_thread.run_sync(call)
 
     async def estimate(
@@ -164,13 +180,16 @@ class AsyncDatabaseJobs(AsyncJobs):
         self,
         *,
         state: JobState | str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]:
         """List the database's jobs, read by pages."""
         jobs = await self._jobs()
-        found = partial(jobs.jobs, state=state, search=search, order=order, limit=limit)
+        found = partial(
+            jobs.jobs, state=state, parent=parent, search=search, order=order, limit=limit
+        )
         async for job in _iterated(found):
             yield job
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import (
+        ForkOptions,
         PreferenceInput,
         RobotInput,
         ScenarioInput,
@@ -72,6 +73,17 @@ class AsyncJobs(ABC):
         """Check that a job can be simulated, and queue it."""
 
     @abstractmethod
+    async def fork(
+        self,
+        job_id: str,
+        from_iteration: int,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[ForkOptions],
+    ) -> JobView:
+        """Queue a job that begins with iterations of another one."""
+
+    @abstractmethod
     async def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
     ) -> EstimateView:
@@ -82,6 +94,7 @@ class AsyncJobs(ABC):
         self,
         *,
         state: JobState | str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,

@@ -30,6 +30,7 @@ from gaitswarm.requests import arguments
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
+    ForkOptions,
     PreferenceInput,
     RobotInput,
     ScenarioInput,
@@ -118,6 +119,19 @@ class AsyncServerJobs(AsyncJobs):
         key = idempotency_key or uuid.uuid4().hex
         return await self._send(calls.submit(chosen_spec(spec, options), key))
 
+    async def fork(
+        self,
+        job_id: str,
+        from_iteration: int,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[ForkOptions],
+    ) -> JobView:
+        """Queue a fork on the server; repeated as often as needed, it is queued once."""
+        key = idempotency_key or uuid.uuid4().hex
+        wanted = arguments.fork(from_iteration, options)
+        return await self._send(calls.fork(job_id, wanted, key))
+
     async def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
     ) -> EstimateView:
@@ -128,6 +142,7 @@ class AsyncServerJobs(AsyncJobs):
         self,
         *,
         state: JobState | str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
@@ -135,7 +150,7 @@ class AsyncServerJobs(AsyncJobs):
         """List the server's jobs, page by page."""
         wanted, sorted_by = arguments.state(state), arguments.order(order)
         left = limit
-        pages = self._items(lambda after: calls.jobs(wanted, search, sorted_by, after))
+        pages = self._items(lambda after: calls.jobs(wanted, parent, search, sorted_by, after))
         async for job in pages:
             if left is not None:
                 if left <= 0:

@@ -46,6 +46,7 @@ from gaitswarm.views.tournament import (
     TournamentsView,
 )
 from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.spec import Spec
 from sim.controllers import ControllerName
@@ -100,6 +101,17 @@ def submit(spec: Spec, key: str) -> Call[JobView]:
     return _posted("/jobs", JobView, spec, headers)
 
 
+def fork(job_id: str, request: ForkRequest, key: str) -> Call[JobView]:
+    """Queue a job that begins with iterations of another one.
+
+    Args:
+        job_id: Identifier of that one.
+        request: From where, and what is to be different.
+        key: Idempotency key: the same key and fork again make no second job.
+    """
+    return _posted(f"{_job(job_id)}/fork", JobView, request, {IDEMPOTENCY_KEY: key})
+
+
 def estimate(spec: Spec) -> Call[EstimateView]:
     """Say what a job would cost.
 
@@ -110,12 +122,13 @@ def estimate(spec: Spec) -> Call[EstimateView]:
 
 
 def jobs(
-    state: JobState | None, search: str, order: JobOrder, after: str | None
+    state: JobState | None, parent: str | None, search: str, order: JobOrder, after: str | None
 ) -> Call[PageView[JobSummaryView]]:
     """A page of the list of jobs.
 
     Args:
         state: Of the jobs; None for any.
+        parent: Identifier of the job that they were forked from; None for any.
         search: Text that name or id contains, whatever its case.
         order: In which they are listed.
         after: `next` of the page before; None for the first page.
@@ -123,6 +136,8 @@ def jobs(
     chosen = {"search": search, "order": order.value}
     if state is not None:
         chosen["state"] = state.value
+    if parent is not None:
+        chosen["parent"] = parent
     return _page("/jobs", PageView[JobSummaryView], after, chosen)
 
 

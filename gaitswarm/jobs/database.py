@@ -5,33 +5,22 @@ from __future__ import annotations
 import shlex
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Final, Unpack
 
 from gaitswarm.errors import NotFound, simulation_errors
 from gaitswarm.jobs.embedded import Workers, run_here
+from gaitswarm.jobs.local_walks import LocalWalks
 from gaitswarm.jobs.news import PAGE, JobNews
 from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.jobs.tournaments import DatabaseTournaments
 from gaitswarm.requests import arguments
 from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.requests.families import run_scenario_families
-from gaitswarm.requests.replay import run_replay
-from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
-from gaitswarm.requests.surface import run_surface
 from gaitswarm.requests.targets import run_targets
 from gaitswarm.settings import default_database
-from gaitswarm.simulation import simulate_request
-from gaitswarm.simulation_result import SimulationResult
-from gaitswarm.specs import (
-    PreferenceInput,
-    RobotInput,
-    ScenarioInput,
-    SpecInput,
-    SpecOptions,
-    chosen_spec,
-)
+from gaitswarm.specs import ForkOptions, PreferenceInput, SpecInput, SpecOptions, chosen_spec
 from gaitswarm.tables import EvaluationTable, TableFormat, encoded_table
 from gaitswarm.views import (
     BestView,
@@ -46,24 +35,18 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from gaitswarm.views.replay import WalkReplay, decoded_replay
-from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
 from services.runtime import EvaluatorKind
-from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
 
 POLL_SECONDS: Final = 0.5
 """How often a job that is followed is looked at [s]."""
 
 
-class DatabaseJobs(DatabaseTournaments, Jobs):
+class DatabaseJobs(DatabaseTournaments, LocalWalks, Jobs):
     """Jobs in a database, which this process can run as well. Owns its store."""
 
     def __init__(
@@ -101,6 +84,20 @@ class DatabaseJobs(DatabaseTournaments, Jobs):
         wanted = chosen_spec(spec, options)
         with simulation_errors("spec"):
             job, _ = self._service.submit(wanted, idempotency_key=idempotency_key)
+        return self._in_full(job)
+
+    def fork(
+        self,
+        job_id: str,
+        from_iteration: int,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[ForkOptions],
+    ) -> JobView:
+        """Queue a fork in the database, for `run` or a runner of another process."""
+        wanted = arguments.fork(from_iteration, options)
+        with simulation_errors("fork"):
+            job, _ = self._service.fork(job_id, wanted, idempotency_key=idempotency_key)
         return self._in_full(job)
 
     def estimate(
@@ -188,12 +185,13 @@ class DatabaseJobs(DatabaseTournaments, Jobs):
         self,
         *,
         state: JobState | str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List the database's jobs, read by pages."""
-        found = self._all(arguments.state(state), search, arguments.order(order))
+        found = self._all(arguments.state(state), parent, search, arguments.order(order))
         return map(JobSummaryView.from_job, islice(found, limit))
 
     def job(self, job_id: str) -> JobView:
@@ -305,80 +303,17 @@ class DatabaseJobs(DatabaseTournaments, Jobs):
         """Read a recorded walk."""
         return self._service.recording(recording_id)
 
-    def simulate(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        preference: PreferenceInput = "A",
-        precision: Precision = "double",
-        log: bool = False,
-    ) -> SimulationResult:
-        """Let a design walk in this process."""
-        return simulate_request(
-            arguments.simulation(
-                design,
-                scenarios=scenarios,
-                controller=controller,
-                robot=robot,
-                preference=preference,
-                precision=precision,
-                log=log,
-            )
-        )
-
-    def robustness(
-        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
-    ) -> RobustnessView:
-        """Let designs around one walk in this process."""
-        with simulation_errors("design"):
-            return run_robustness(arguments.robustness(design, options))
-
-    def replay(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenario: ScenarioInput = "normal-fast",
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        rate: float = 50.0,
-    ) -> WalkReplay:
-        """Let a design walk in this process, to look at it."""
-        request = arguments.replay(
-            design, scenario=scenario, controller=controller, robot=robot, rate=rate
-        )
-        with simulation_errors("design"):
-            return decoded_replay(run_replay(request))
-
-    def surface(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        controller: ControllerName = "fuzzy-pi",
-        error_points: int = 65,
-        current_points: int = 33,
-        velocity_error: float = 0.0,
-    ) -> SurfaceView:
-        """Compute a fuzzy controller's surfaces."""
-        request = arguments.surface(
-            design,
-            error_points=error_points,
-            current_points=current_points,
-            velocity_error=velocity_error,
-        )
-        return run_surface(arguments.controller(controller), request)
-
     def close(self) -> None:
         """Close the store."""
         self._service.store.close()
 
-    def _all(self, state: JobState | None, search: str, order: JobOrder) -> Iterator[Job]:
+    def _all(
+        self, state: JobState | None, parent: str | None, search: str, order: JobOrder
+    ) -> Iterator[Job]:
         after: str | None = None
         while True:
             page = self._service.jobs(
-                state=state, search=search, order=order, after=after, limit=PAGE
+                state=state, parent=parent, search=search, order=order, after=after, limit=PAGE
             )
             yield from page.items
             if page.next is None:

@@ -3,38 +3,31 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeAlias, Unpack
 
+from gaitswarm.jobs.findings import Findings
 from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.jobs.walks import Walks
 from gaitswarm.views import IterationView, StateView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 
 if TYPE_CHECKING:
-    from gaitswarm.specs import PreferenceInput, SpecInput, SpecOptions
-    from gaitswarm.tables import EvaluationTable, TableFormat
+    from gaitswarm.specs import ForkOptions, SpecInput, SpecOptions
     from gaitswarm.views import (
-        BestView,
         EstimateView,
-        HistoryIterationView,
         JobSummaryView,
         JobView,
-        RankingView,
     )
-    from gaitswarm.views.calibration import TargetsView
-    from gaitswarm.views.certificate import CertificateView
-    from gaitswarm.views.families import ScenarioFamiliesView
-    from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-    from services.optimizer.analysis.targets import LeaveOut
+    from gaitswarm.views.identification import RecordingView
     from sim.identification.recorded_walk import RecordedWalk
 
 JobEvent: TypeAlias = IterationView | StateView
 """What happens to a job: an iteration was committed, or its state is another."""
 
 
-class Jobs(Tournaments, Walks, ABC):
+class Jobs(Findings, Tournaments, Walks, ABC):
     """Jobs, in a database (`gaitswarm.open`) or behind a server (`gaitswarm.connect`).
 
     Both answer alike and raise the same errors: every method raises Unavailable if the database or
@@ -78,6 +71,40 @@ class Jobs(Tournaments, Walks, ABC):
         """
 
     @abstractmethod
+    def fork(
+        self,
+        job_id: str,
+        from_iteration: int,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[ForkOptions],
+    ) -> JobView:
+        """Queue a job that begins with iterations of another one, its parent.
+
+        With the same settings it goes on as the parent did, bit for bit. Under another preference
+        what the parent's designs came to is judged anew, and the search is told that, if its method
+        can be; else, and with another optimizer, robot or other scenarios, a new search starts from
+        the parent's best designs. The fork's `lineage` says which.
+
+        Args:
+            job_id: Identifier of the parent, of which nothing is changed.
+            from_iteration: First iteration that is the fork's own, counted from 0: it begins with
+                those before it, 0 to `from_iteration` - 1.
+            idempotency_key: A text of your own. The same key and fork again make no second job.
+            **options: What is to be different, see `ForkOptions`, such as `preference="B"`.
+
+        Returns:
+            The queued fork.
+
+        Raises:
+            InvalidRequest: It makes no sense or cannot be simulated; names the field.
+            ProvenanceChanged: It would go on with numbers of another provenance, and that is not
+                accepted.
+            Conflict: The parent's search cannot be taken over, or it has no design to start from.
+            IdempotencyConflict: The key was used before for another job.
+        """
+
+    @abstractmethod
     def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
     ) -> EstimateView:
@@ -99,6 +126,7 @@ class Jobs(Tournaments, Walks, ABC):
         self,
         *,
         state: JobState | str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
@@ -107,6 +135,7 @@ class Jobs(Tournaments, Walks, ABC):
 
         Args:
             state: Only jobs in this state, such as "running".
+            parent: Only jobs that were forked from the job of this id.
             search: Only jobs whose name or id contains this, whatever its case.
             order: "created" (newest first), "fitness" (best first) or "name".
             limit: Most jobs to list; None for all.
@@ -201,54 +230,6 @@ class Jobs(Tournaments, Walks, ABC):
         """
 
     @abstractmethod
-    def best(self, job_id: str) -> BestView:
-        """Take the best design that a job has found so far.
-
-        Args:
-            job_id: Identifier of the job.
-
-        Returns:
-            The design of least fitness, with its result in every case.
-
-        Raises:
-            NotFound: No design has walked in every scenario yet.
-        """
-
-    @abstractmethod
-    def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
-        """List the committed iterations of a job.
-
-        Args:
-            job_id: Identifier of the job.
-            after: Only iterations with a greater index.
-
-        Returns:
-            Fitness of the designs, iteration by iteration, in order.
-        """
-
-    @abstractmethod
-    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
-        """List the committed iterations of a job with every design.
-
-        Args:
-            job_id: Identifier of the job.
-
-        Returns:
-            Iterations in order, each with its evaluations.
-        """
-
-    @abstractmethod
-    def evaluations(self, job_id: str) -> EvaluationTable:
-        """Take every evaluation of a job at once, as arrays.
-
-        Args:
-            job_id: Identifier of the job.
-
-        Returns:
-            One row an evaluation: design, fitness, and status, utility and objectives by case.
-        """
-
-    @abstractmethod
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Follow a job until it has ended; a paused one is waited for.
 
@@ -274,105 +255,6 @@ class Jobs(Tournaments, Walks, ABC):
         for _ in self.follow(job_id, after=self.job(job_id).last_iteration):
             pass
         return self.job(job_id)
-
-    @abstractmethod
-    def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
-        """Judge all designs of a job by another preference; no walk is run.
-
-        Args:
-            job_id: Identifier of a job that tunes a drive.
-            preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
-                `Preference`.
-            top: How many of the best designs to list, 1 to 1000.
-
-        Returns:
-            The best designs beside their places before, and how far the rankings agree.
-
-        Raises:
-            InvalidRequest: The job has no preference, or an argument makes no sense.
-            Conflict: The job is too large to be held in memory.
-        """
-
-    @abstractmethod
-    def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
-        """See which scenarios of a job matter, from what is stored.
-
-        Args:
-            job_id: Identifier of a job that tunes a drive.
-            tolerance: Largest regret of the smallest family of scenarios, as a share.
-
-        Returns:
-            What the job would have taken for its best without each scenario, and with few.
-
-        Raises:
-            InvalidRequest: The job tunes no drive, or the tolerance makes no sense.
-            Conflict: No design of it walks in all scenarios, or it is too large to be held in
-                memory.
-        """
-
-    @abstractmethod
-    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
-        """See which parameters runs of one problem agree on, so that they can be trusted.
-
-        Args:
-            job_ids: Jobs that differ in name, seed, optimizer and iterations alone; at least one.
-
-        Returns:
-            Intervals of every variable among designs close to the best.
-
-        Raises:
-            InvalidRequest: The jobs are of different problems, or have one seed.
-            Conflict: One of them has no design yet that did not fail.
-        """
-
-    @abstractmethod
-    def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
-        """See how near runs of a calibration come to their targets.
-
-        Args:
-            job_ids: Calibrations that differ in name, seed, optimizer and iterations alone; at
-                least one.
-            leave_out: "target" to predict every target by the design that is best without it,
-                "walk" for without all targets of its walk; nothing is simulated.
-
-        Returns:
-            What the best design of all runs comes to, and what was left out.
-
-        Raises:
-            InvalidRequest: A job of another kind, jobs of different problems, or of one seed.
-            Conflict: One of them has no design yet that did not fail.
-        """
-
-    @abstractmethod
-    def certificate(
-        self, job_id: str, *, worlds: int | None = None, most: int = 5
-    ) -> CertificateView:
-        """See what a design comes to in many worlds.
-
-        Args:
-            job_id: Identifier of a certificate.
-            worlds: Worlds to take, the first ones; None for all that have walked.
-            most: Worst worlds to name, 0 to 1000.
-
-        Returns:
-            Chances of failure, spreads by scenario, the worst worlds, and what goes with them.
-
-        Raises:
-            InvalidRequest: The job is of another kind, or an argument makes no sense.
-            Conflict: No drawn world has walked yet, or the job is too large to be held in memory.
-        """
-
-    @abstractmethod
-    def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
-        """Write every evaluation of a job as a file.
-
-        Args:
-            job_id: Identifier of the job.
-            file_format: "parquet" or "csv".
-
-        Returns:
-            The file in parts, to be written one after the other.
-        """
 
     @abstractmethod
     def record(self, walk: RecordedWalk) -> RecordingView:

@@ -29,6 +29,7 @@ from gaitswarm.requests import arguments
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
+    ForkOptions,
     PreferenceInput,
     RobotInput,
     ScenarioInput,
@@ -129,6 +130,19 @@ class ServerJobs(Jobs):
         key = idempotency_key or uuid.uuid4().hex
         return self._send(calls.submit(chosen_spec(spec, options), key))
 
+    def fork(
+        self,
+        job_id: str,
+        from_iteration: int,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[ForkOptions],
+    ) -> JobView:
+        """Queue a fork on the server; repeated as often as needed, it is queued once."""
+        key = idempotency_key or uuid.uuid4().hex
+        wanted = arguments.fork(from_iteration, options)
+        return self._send(calls.fork(job_id, wanted, key))
+
     def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
     ) -> EstimateView:
@@ -139,13 +153,14 @@ class ServerJobs(Jobs):
         self,
         *,
         state: JobState | str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List the server's jobs, page by page."""
         wanted, sorted_by = arguments.state(state), arguments.order(order)
-        found = self._items(lambda after: calls.jobs(wanted, search, sorted_by, after))
+        found = self._items(lambda after: calls.jobs(wanted, parent, search, sorted_by, after))
         return islice(found, limit)
 
     def job(self, job_id: str) -> JobView:

@@ -18,9 +18,11 @@ from gaitswarm.requests.robustness import RobustnessOptions, RobustnessRequest
 from gaitswarm.requests.surface import SurfaceRequest
 from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.specs import (
+    ForkOptions,
     PreferenceInput,
     RobotInput,
     ScenarioInput,
+    laid_options,
     robot_source,
     scenario_entries,
 )
@@ -28,6 +30,7 @@ from gaitswarm.tables import TableFormat
 from gaitswarm.views import RankingRequest
 from services.optimizer.analysis.certificate import MOST_WORST
 from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.kernel.walk import Precision
@@ -182,6 +185,22 @@ def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
         InvalidRequest: An argument makes no sense; names it.
     """
     return _valid(RankingRequest, {"preference": preference, "top": top})
+
+
+def fork(from_iteration: int, options: ForkOptions) -> ForkRequest:
+    """From where to fork a job, and what is to be different.
+
+    Args:
+        from_iteration: First iteration that is the fork's own, counted from 0.
+        options: Keywords that the caller gave.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    return _valid(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
 
 
 def simulation(

@@ -12,6 +12,7 @@ from gaitswarm.views.budget import Spent, budget_spent
 from gaitswarm.views.evaluation import BestView, ObjectiveView
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import (
     LARGEST_BUDGET,
@@ -155,6 +156,11 @@ class JobSummaryView(View):
         " that succeeded, null unless it runs and has committed an iteration.",
         examples=[16.1],
     )
+    lineage: Lineage | None = Field(
+        default=None,
+        description="Of a job that was forked from another one: from which, and what it took over;"
+        " null for any other. Forks of a job are listed by `/v1/jobs?parent=`.",
+    )
     created_at: datetime = Field(description="When it was submitted, UTC.")
     updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
@@ -162,7 +168,8 @@ class JobSummaryView(View):
     links: dict[str, str] = Field(
         description="Where to go on: `self`, `iterations`, `events`; where the spec can be read,"
         " `best`, `distribution`, `particles`, `export`, and `ranking` (POST) for a job that tunes"
-        " a drive; those of `pause`, `resume`, `cancel`, `extend` (POST) that its state allows.",
+        " a drive; `parent` of a fork; those of `pause`, `resume`, `cancel`, `extend`, `fork`"
+        " (POST) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -325,6 +332,10 @@ def job_links(job: Job) -> dict[str, str]:
     }
     if job.readable and job.state is not JobState.CANCELLED:
         commands["extend"] = f"{here}/extend"
+    if job.readable and job.progress.iterations:
+        commands["fork"] = f"{here}/fork"
+    if job.lineage is not None:
+        resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"
     return {"self": here, **resources, **commands}
 
 
@@ -345,6 +356,7 @@ def _summary(job: Job) -> dict[str, object]:
         "evaluations_per_second": rates.evaluations_per_second,
         "simulations_per_second": rates.simulations_per_second,
         "eta_seconds": rates.eta_seconds,
+        "lineage": job.lineage,
         "created_at": job.created_at,
         "updated_at": job.updated_at,
         "started_at": job.started_at,

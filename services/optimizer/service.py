@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from services.optimizer.analysis.distribution import (
-    Distribution,
-    distribution,
-    iteration_starts,
-)
-from services.optimizer.analysis.history import PIECE, HistoryCache, read_columns, read_history
-from services.optimizer.analysis.identifiability import (
-    Identifiability,
-    check_comparable,
-    identifiability,
-)
-from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
+import numpy as np
+
+from services.optimizer.analysis.fork import Parent, check_begun, forked
+from services.optimizer.analysis.history import read_history
+from services.optimizer.analysis.questions import Questions
 from services.optimizer.analysis.start import started
 from services.optimizer.errors import ProvenanceChanged
-from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
+from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.iteration import Evaluation, Iteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
-from services.optimizer.jobs.preference import Preference
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from services.optimizer.run.runner import runner_name
-from services.optimizer.store.base import Page, Store
+from services.optimizer.store.reading import Page
 from sim.identification.recorded_walk import RecordedWalk
 
 _EARLIER: Final = 50
@@ -37,7 +29,7 @@ _EARLIER: Final = 50
 
 
 @dataclass(frozen=True, slots=True)
-class JobService:
+class JobService(Questions):
     """Jobs as their users see them. Thread-safe, as the store is.
 
     Attributes:
@@ -45,14 +37,12 @@ class JobService:
         provenance: spec -> provenance of what is computed from here for it.
     """
 
-    store: Store
     provenance: Callable[[Spec], JobProvenance] = job_provenance
-    _histories: HistoryCache = field(init=False, repr=False, compare=False)
     _rates: MeasuredRates = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        Questions.__post_init__(self)
         object.__setattr__(self, "_rates", MeasuredRates())
-        object.__setattr__(self, "_histories", HistoryCache(self.store))
 
     def submit(
         self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
@@ -83,6 +73,55 @@ class JobService:
             provenance=self.provenance(spec),
             idempotency_key=idempotency_key,
             request=request,
+        )
+
+    def fork(
+        self,
+        job_id: str,
+        request: ForkRequest,
+        *,
+        idempotency_key: str | None = None,
+        sent: Any = None,
+    ) -> tuple[Job, bool]:
+        """Queue a job that begins with iterations of another one.
+
+        Args:
+            job_id: id of the job that is forked, its parent; nothing of it is changed.
+            request: from where, and what is to be different from there on.
+            idempotency_key: a key by which a repeated request is recognized.
+            sent: the JSON document that asked for the fork, as it was sent; None: the fields that
+                were given to the request.
+
+        Returns:
+            The fork, whose `lineage` says what it took over, and whether it is new.
+
+        Raises:
+            NotFound: no job of that id.
+            InvalidRequest: it makes no sense or cannot be simulated; names the field.
+            ProvenanceChanged: it would go on with numbers of another provenance, and that is not
+                accepted.
+            Conflict: its search cannot be taken over, or it has no design to start from.
+            IdempotencyConflict: the key was used before, for another job.
+        """
+        job = self.job(job_id)
+        check_begun(job, request.from_iteration)
+        columns = self.columns(job)
+        rows = slice(int(np.searchsorted(columns.iteration, request.from_iteration)))
+        parent = Parent(
+            job,
+            columns.rows(rows),
+            lambda: self.store.asked(job_id, 0, request.from_iteration),
+        )
+        spec, fork = forked(parent, request, self.provenance)
+        spec.check_can_be_simulated()
+        if sent is None:
+            sent = request.model_dump(mode="json", exclude_unset=True)
+        return self.store.create_job(
+            spec,
+            provenance=self.provenance(spec),
+            idempotency_key=idempotency_key,
+            request={"fork": job_id, "request": sent},
+            fork=fork,
         )
 
     def submit_embedded(self, spec: Spec) -> Claim:
@@ -169,6 +208,7 @@ class JobService:
         *,
         state: JobState | None = None,
         kind: str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
@@ -179,6 +219,7 @@ class JobService:
         Args:
             state: only jobs in it; None for any.
             kind: only jobs whose specs say that they are of this kind; None for any.
+            parent: only jobs that were forked from the job of this id; None for any.
             search: only jobs whose name or id contains this, whatever its case.
             order: how they are sorted.
             after: `next` of the page before, of the same order.
@@ -191,7 +232,13 @@ class JobService:
             InvalidRequest: `after` is no cursor of that order.
         """
         return self.store.jobs(
-            state=state, kind=kind, search=search, order=order, after=after, limit=limit
+            state=state,
+            kind=kind,
+            parent=parent,
+            search=search,
+            order=order,
+            after=after,
+            limit=limit,
         )
 
     def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
@@ -308,88 +355,3 @@ class JobService:
             NotFound: no job of that id; at the first item.
         """
         return read_history(self.store, job_id, after=after)
-
-    def columns(self, job: Job) -> EvaluationColumns:
-        """Read every committed evaluation at once.
-
-        Args:
-            job: as it was read.
-
-        Returns:
-            Its columns, as of its progress or later.
-
-        Raises:
-            Conflict: the job is too large to be held in memory.
-        """
-        return self._histories.columns(job)
-
-    def column_pieces(self, job: Job, *, rows: int = PIECE) -> Iterator[EvaluationColumns]:
-        """As `columns`, piece by piece as they are consumed: for histories of any length.
-
-        Args:
-            job: As it was read; iterations committed later are left out.
-            rows: Evaluations in a piece on average, but one iteration at least.
-
-        Returns:
-            Whole iterations, in order.
-        """
-        return read_columns(self.store, job, rows=rows)
-
-    def distribution(
-        self, job: Job, *, after: int | None = None, limit: int
-    ) -> tuple[Distribution, bool]:
-        """Say how designs are spread, iteration by iteration.
-
-        Args:
-            job: as it was read.
-            after: only iterations with a greater index; None for all.
-            limit: most iterations.
-
-        Returns:
-            The distribution, and whether more iterations follow.
-
-        Raises:
-            Conflict: the job is too large to be held in memory.
-        """
-        columns = self.columns(job).after(after)
-        following = iteration_starts(columns)[limit:]
-        page = columns.rows(slice(int(following[0]) if len(following) else None))
-        return distribution(page, job.spec.design_space()), len(following) > 0
-
-    def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
-        """Judge all designs by another preference, from what is stored.
-
-        Args:
-            job: that tunes a drive, as it was read.
-            preference: to judge by.
-            top: how many designs to name.
-
-        Returns:
-            The ranking, with the evaluations that it refers to.
-
-        Raises:
-            InvalidRequest: a job of another kind, which has no preference.
-            Conflict: the job is too large to be held in memory.
-        """
-        spec, columns = tuning_of(job), self.columns(job)
-        return RankedJob(spec, columns, rank(columns, preference, top=top, worlds=spec.worlds))
-
-    def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
-        """Say which parameters several runs of one problem agree on.
-
-        Args:
-            jobs: at least one, all of different seeds; name, optimizer and iterations may differ
-                too.
-
-        Returns:
-            Intervals and, of several jobs, how far each parameter can be trusted.
-
-        Raises:
-            InvalidRequest: jobs of different problems, or two of one seed.
-            Conflict: a job has no design yet that did not fail, or is too large to be held in
-                memory.
-        """
-        check_comparable(jobs)
-        runs = [self.columns(job) for job in jobs]
-        spec = jobs[0].spec
-        return identifiability(spec.design_space().variables, runs, spec.as_good_as)

@@ -9,6 +9,7 @@ import numpy as np
 
 from services.optimizer.errors import GaitswarmError, InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
@@ -44,7 +45,8 @@ def started(
     for index, job_id in enumerate(spec.start.jobs):
         try:
             job = job_of(job_id)
-            found = list(_best(job, columns_of(job), searched, spec.start.count))
+            space, count = job.spec.design_space(), spec.start.count
+            found = list(best_designs(space, columns_of(job), searched, count))
             if not found:
                 raise InvalidRequest(f"job {job_id} has no design that has not failed")
             _check(spec, found)
@@ -63,11 +65,21 @@ def started(
     return spec.model_copy(update={"start": start})
 
 
-def _best(
-    job: Job, columns: EvaluationColumns, searched: tuple[str, ...], count: int
+def best_designs(
+    space: DesignSpace, columns: EvaluationColumns, searched: tuple[str, ...], count: int
 ) -> Iterator[Design]:
-    """The best different designs of a job; its values of what the new job searches."""
-    space, seen = job.spec.design_space(), set[tuple[float | str, ...]]()
+    """Choose the best different designs of a job.
+
+    Args:
+        space: Of the job.
+        columns: What it evaluated.
+        searched: Variables that a new job searches.
+        count: Designs, at most.
+
+    Yields:
+        Values of these variables by name, as far as the job has them, the best design first.
+    """
+    seen = set[tuple[float | str, ...]]()
     for row in np.argsort(columns.fitness, kind="stable").tolist():
         if len(seen) == count or not np.isfinite(columns.fitness[row]):
             return

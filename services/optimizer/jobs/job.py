@@ -10,6 +10,7 @@ from typing import Final
 
 from services.optimizer.errors import Conflict, InvalidRequest, Unreadable
 from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.iteration import Answered, Ask
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, changes_since
 from sim.identification.recorded_walk import Recordings
@@ -180,6 +181,8 @@ class Job:
         provenance: what its numbers depend on, since which iteration.
         accepts_changes: whether its user has said that it may go on although that has changed;
             until it is claimed.
+        lineage: where it comes from, if it was forked from another job.
+        submitted_iterations: budget that it was submitted with.
     """
 
     id: str
@@ -193,6 +196,8 @@ class Job:
     progress: Progress = field(default_factory=Progress)
     provenance: ProvenanceRecords = ()
     accepts_changes: bool = False
+    lineage: Lineage | None = None
+    submitted_iterations: int = 0
 
     @property
     def spec(self) -> AnySpec:
@@ -209,6 +214,11 @@ class Job:
     def spent(self) -> int:
         """Iterations of its budget that are spent: whole ones of `particles` designs each."""
         return math.ceil(self.progress.evaluations / self.spec.optimizer.particles)
+
+    @property
+    def own_evaluations(self) -> int:
+        """Designs that were judged for it; a fork has taken over the others."""
+        return self.progress.evaluations - (self.lineage.evaluations if self.lineage else 0)
 
     @property
     def readable(self) -> bool:
@@ -291,14 +301,15 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
         Rates and time left.
     """
     progress = job.progress
-    if progress.iterations == 0 or progress.compute_seconds <= 0.0:
+    if job.own_evaluations == 0 or progress.compute_seconds <= 0.0:
         return TimeLeft(0.0 if job.state is JobState.SUCCEEDED else None, None, None)
-    rate = progress.evaluations / progress.compute_seconds
+    rate = job.own_evaluations / progress.compute_seconds
     eta: float | None = None
     if job.state is JobState.SUCCEEDED:
         eta = 0.0
     elif job.state is JobState.RUNNING and job.readable:
-        one = progress.compute_seconds / progress.iterations
+        own = progress.iterations - (job.lineage.own_from if job.lineage else 0)
+        one = progress.compute_seconds / own
         remaining = max(0, job.spec.budget - progress.evaluations) / rate
         under_way = min(one, max(0.0, (now - job.updated_at).total_seconds()))
         eta = max(0.0, remaining - under_way)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, TypeVar
+from collections.abc import Sequence
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +97,27 @@ class Optimizer(Protocol):
         Raises:
             ValueError: it is of another method, version or shape, or outside the bounds; the state
                 before is kept.
+        """
+
+
+@runtime_checkable
+class Rejudging(Optimizer, Protocol):
+    """A method whose memory can be formed anew, as if its positions had been worth something else.
+
+    It stays where it is, and goes on from there by the other fitness.
+    """
+
+    def rejudge(
+        self, generations: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
+    ) -> None:
+        """Take what earlier positions are worth, in place of what was told of them.
+
+        Args:
+            generations: (n, d) positions and (n,) fitness, +inf for a failed evaluation, of
+                everything that was told, in order.
+
+        Raises:
+            ValueError: This is not all that was told, or a generation was not told as a whole.
         """
 
 

@@ -3,39 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import (
-    Ask,
-    CompletedIteration,
-    Evaluation,
-    Iteration,
-    Known,
-)
+from services.optimizer.jobs.fork import Fork
+from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.reading import CommittedHistory, Page
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
-T = TypeVar("T")
 
-
-@dataclass(frozen=True, slots=True)
-class Page(Generic[T]):
-    """A page of a long list, told by where the one before it ended.
-
-    Attributes:
-        items: In the list's order.
-        next: The `after` of the following page; None on the last.
-    """
-
-    items: tuple[T, ...]
-    next: str | None
-
-
-class Store(Protocol):
+class Store(CommittedHistory, Protocol):
     """Thread-safe. Every method is one transaction: it happens wholly or not at all.
 
     Methods that take an id raise NotFound for an unknown one. Methods that take a claim raise
@@ -49,6 +28,7 @@ class Store(Protocol):
         provenance: JobProvenance | None = None,
         idempotency_key: str | None = None,
         request: Any = None,
+        fork: Fork | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job of the resolved spec, or find the one that the same key made before.
 
@@ -59,11 +39,14 @@ class Store(Protocol):
                 even if presets or defaults have changed in between.
             request: The JSON document that asked for the job, as it was sent. None: the fields
                 that were given to the spec.
+            fork: How the job is forked from another one. What it takes over is copied, so that it
+                stays when its parent goes; None for a job of its own.
 
         Returns:
             The job, and whether it is new.
 
         Raises:
+            Conflict: The job that is forked is gone.
             InvalidRequest: The key is empty, too long or not printable.
             IdempotencyConflict: The key was used for a request that is neither this one nor
                 resolves to the same spec.
@@ -106,6 +89,7 @@ class Store(Protocol):
         *,
         state: JobState | None = None,
         kind: str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
@@ -116,6 +100,7 @@ class Store(Protocol):
         Args:
             state: Only jobs in this state.
             kind: Only jobs whose specs say that they are of this kind.
+            parent: Only jobs that were forked from the job of this id.
             search: Only jobs whose name or id contains this, whatever its case.
             order: By what they are sorted.
             after: `next` of the page before.
@@ -284,85 +269,6 @@ class Store(Protocol):
 
         Raises:
             LeaseLost: The claim is no longer the job's.
-        """
-
-    def iterations(
-        self, job_id: str, *, after: int | None = None, limit: int = 100
-    ) -> Page[Iteration]:
-        """Read a page of committed iterations, in order.
-
-        Args:
-            job_id: Of the job.
-            after: Only iterations with a greater index.
-            limit: Most iterations on the page.
-
-        Returns:
-            The page.
-
-        Raises:
-            InvalidRequest: `limit` is less than 1.
-        """
-
-    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """Read all designs of a committed iteration.
-
-        Args:
-            job_id: Of the job.
-            iteration: Index of the iteration, from 0.
-
-        Returns:
-            The particles, in order.
-
-        Raises:
-            NotFound: There is no such job, or the iteration is not committed.
-        """
-
-    def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
-        """Read all designs of a range of committed iterations.
-
-        For reading a long history by pieces, each a transaction of its own; committed iterations
-        never change, so the pieces fit together.
-
-        Args:
-            job_id: Of the job.
-            first: Least index of an iteration.
-            last: Index after the greatest.
-
-        Returns:
-            The particles, in order of iteration and particle.
-        """
-
-    def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
-        """Find what designs came to in any job.
-
-        Args:
-            keys: As `walk_keys` gives them.
-
-        Returns:
-            Outcomes of those that are known, by key; what cannot be read is not among them.
-        """
-
-    def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
-        """Read all designs of a range of committed iterations as columns, for many at once.
-
-        Args:
-            job_id: Of the job.
-            first: Least index of an iteration.
-            last: Index after the greatest.
-
-        Returns:
-            Rows in the order of `evaluations_between`; None if there is none.
-        """
-
-    def best(self, job_id: str) -> Evaluation | None:
-        """Read the best design so far.
-
-        Args:
-            job_id: Of the job.
-
-        Returns:
-            The evaluation of least fitness in double precision, the earliest of equals; None if
-            none is finite. Its `reevaluation` is there if the job searches in single.
         """
 
     def ping(self) -> None:

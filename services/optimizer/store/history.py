@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import Select, Table, select
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation, Iteration, Known
-from services.optimizer.store.base import Page
+from services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
 from services.optimizer.store.columns import select_columns, select_known
 from services.optimizer.store.engine import Database
+from services.optimizer.store.reading import Page
 from services.optimizer.store.records import job_row
 from services.optimizer.store.rows import LISTED, Row, to_evaluation, to_iteration, to_reevaluation
 from services.optimizer.store.tables import evaluations, iterations, reevaluations
@@ -78,6 +80,36 @@ class SqlHistory:
         with self._database.transaction(write=False) as connection:
             job_row(connection, job_id)
             return select_columns(connection, job_id, _bounded(first), _bounded(last))
+
+    def asked(self, job_id: str, first: int, last: int) -> tuple[NDArray[np.float64], ...]:
+        """Read the asks of a range of committed iterations."""
+        query = (
+            select(iterations.c.positions)
+            .where(
+                iterations.c.job_id == job_id,
+                iterations.c.iteration >= _bounded(first),
+                iterations.c.iteration < _bounded(last),
+                iterations.c.committed_at.is_not(None),
+            )
+            .order_by(iterations.c.iteration)
+        )
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            rows = connection.execute(query).scalars().all()
+        return tuple(np.array(positions, dtype=np.float64) for positions in rows)
+
+    def reevaluations(self, job_id: str) -> tuple[tuple[int, Reevaluation], ...]:
+        """Read the designs that were evaluated anew."""
+        table = reevaluations.c
+        query = (
+            select(reevaluations)
+            .where(table.job_id == job_id)
+            .order_by(table.iteration, table.particle)
+        )
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            rows = connection.execute(query).mappings().all()
+        return tuple((row["iteration"], to_reevaluation(row)) for row in rows)
 
     def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
         """Find what designs came to in any job."""

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final, NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, Select, Text, case, cast, func, select
+from sqlalchemy import ColumnElement, Connection, Select, Text, case, cast, false, func, select
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import JobOrder, JobState
-from services.optimizer.store.records import ID_ALPHABET
+from services.optimizer.store.records import ID_ALPHABET, is_job_id
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import jobs
 
@@ -132,6 +132,27 @@ def no_cursor() -> InvalidRequest:
     )
 
 
+Among = tuple[ColumnElement[bool], ...]
+"""Conditions on jobs, all of which hold for those that are wanted."""
+
+
+def among_jobs(state: JobState | None, parent: str | None) -> Among:
+    """Conditions on jobs that the database itself can tell.
+
+    Args:
+        state: Only jobs in this state; None for any.
+        parent: Only jobs that were forked from the job of this id; None for any.
+
+    Returns:
+        The conditions.
+    """
+    found = [] if state is None else [jobs.c.state == state]
+    # An id that is none might have characters that a database refuses.
+    if parent is not None:
+        found.append(jobs.c.parent_id == parent if is_job_id(parent) else false())
+    return tuple(found)
+
+
 class _Entry(NamedTuple):
     """What a job is found and sorted by."""
 
@@ -144,7 +165,7 @@ class _Entry(NamedTuple):
 def sort_jobs(
     connection: Connection,
     *,
-    state: JobState | None,
+    among: Among,
     kind: str | None,
     search: str,
     order: JobOrder,
@@ -154,7 +175,7 @@ def sort_jobs(
 
     Args:
         connection: An open transaction.
-        state: Only jobs in this state.
+        among: Only jobs for which these hold.
         kind: Only jobs whose specs say that they are of this kind.
         search: Only jobs whose name or id contains this, whatever its case.
         order: By what they are sorted.
@@ -166,9 +187,7 @@ def sort_jobs(
     Raises:
         InvalidRequest: The cursor is none of this order; names the field `after`.
     """
-    query = _entries(connection)
-    if state is not None:
-        query = query.where(jobs.c.state == state)
+    query = _entries(connection).where(*among)
     if kind is not None:
         query = query.where(_field(connection, "kind") == kind)
     wanted = search.casefold()

@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
 from services.optimizer.jobs.provenance import ProvenanceRecord, ProvenanceRecords
 from services.optimizer.jobs.spec import Spec
@@ -36,10 +37,11 @@ def to_job(row: Row) -> Job:
     """
     spec = submitted_spec(row)
     try:
-        provenance = provenance_records(row)
+        provenance, lineage = provenance_records(row), _lineage(row)
     except Unreadable as error:
         # Whoever cannot tell what the numbers depend on must not add others to them.
-        provenance, spec = (), _unreadable(row["spec"], str(error))
+        provenance, lineage, spec = (), None, _unreadable(row["spec"], str(error))
+    submitted_iterations = spec.iterations
     if row["budget"] is not None:
         if isinstance(spec, UnreadableSpec):
             spec = replace(spec, iterations=row["budget"])
@@ -65,6 +67,8 @@ def to_job(row: Row) -> Job:
         ),
         provenance=provenance,
         accepts_changes=bool(row["accepts_changes"]),
+        lineage=lineage,
+        submitted_iterations=submitted_iterations,
     )
 
 
@@ -147,6 +151,28 @@ def provenance_records(row: Row) -> ProvenanceRecords:
     except ValidationError as error:
         problems = first_problems(error)
         raise kept(f"its provenance cannot be read by this gaitswarm ({problems})") from error
+
+
+def _lineage(row: Row) -> Lineage | None:
+    """Where a job comes from. Raises Unreadable."""
+    recorded = row["lineage"]
+    try:
+        return None if recorded is None else Lineage.model_validate(recorded)
+    except ValidationError as error:
+        problems = first_problems(error)
+        raise kept(f"its lineage cannot be read by this gaitswarm ({problems})") from error
+
+
+def lineage_document(lineage: Lineage | None) -> dict[str, Any] | None:
+    """The JSON document of a job's lineage.
+
+    Args:
+        lineage: Where the job comes from; None for one that is not forked.
+
+    Returns:
+        The document, None for none.
+    """
+    return None if lineage is None else lineage.model_dump(mode="json")
 
 
 def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:

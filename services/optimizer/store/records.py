@@ -6,34 +6,22 @@ import math
 import re
 import secrets
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Final
 
 import numpy as np
 from sqlalchemy import Connection, insert, select, update
 
-from services.optimizer.errors import (
-    Conflict,
-    IdempotencyConflict,
-    NotFound,
-)
+from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, with_record
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.job_rows import (
-    provenance_document,
-    provenance_records,
-    spec_document,
-    submitted_spec,
-    to_job,
-)
+from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.provenance import JobProvenance, with_record
+from services.optimizer.store.job_rows import provenance_document, provenance_records, to_job
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
     evaluation_rows,
-    iteration_summary,
+    fitness_summary,
     reevaluation_row,
     to_ask,
 )
@@ -83,83 +71,6 @@ def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
         if row is not None:
             return row
     raise NotFound(f"there is no job {job_id!r}")
-
-
-@dataclass(frozen=True, slots=True)
-class Submission:
-    """A job that is to be made.
-
-    Attributes:
-        spec: Resolved.
-        key: Idempotency key that came with the request, if any.
-        digest: Of the request, as `request_digest` has it; None without a key.
-        provenance: What its numbers are to depend on; empty where its first claim says that.
-    """
-
-    spec: Spec
-    key: str | None = None
-    digest: str | None = None
-    provenance: ProvenanceRecords = ()
-
-
-def repeated_job(connection: Connection, asked: Submission) -> Job | None:
-    """Find the job that an earlier request made with the same key.
-
-    Args:
-        connection: An open transaction.
-        asked: The present request.
-
-    Returns:
-        That job; None if there is none, or no key.
-
-    Raises:
-        IdempotencyConflict: The earlier request asked for another job.
-    """
-    if asked.key is None:
-        return None
-    query = select(jobs).where(jobs.c.idempotency_key == asked.key)
-    row = connection.execute(query).mappings().first()
-    if row is None:
-        return None
-    job = to_job(row)
-    # Presets and defaults may have changed since: then equal requests ask for unequal specs. And a
-    # request that was worded in another way, or not kept, is the same if its spec is.
-    if row["request_digest"] != asked.digest and submitted_spec(row) != asked.spec:
-        what = "the different job" if job.readable else "a job that cannot be read and compared,"
-        raise IdempotencyConflict(
-            f"idempotency key {asked.key!r} was used before, for {what} {row['id']}; use a new key"
-            " for a new job"
-        )
-    return job
-
-
-def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
-    """Store a new queued job.
-
-    Args:
-        connection: An open transaction that may write.
-        asked: What it is to do.
-        now: The time of its submission.
-
-    Returns:
-        The job.
-    """
-    columns = {
-        "id": new_job_id(),
-        "state": JobState.QUEUED,
-        "spec": spec_document(asked.spec),
-        "provenance": provenance_document(asked.provenance),
-        "idempotency_key": asked.key,
-        "request_digest": asked.digest,
-        "created_at": now,
-        "updated_at": now,
-        "lease_token": 0,
-        "iterations": 0,
-        "evaluations": 0,
-        "compute_seconds": 0.0,
-    }
-    row = connection.execute(insert(jobs).values(columns).returning(jobs)).mappings().one()
-    return to_job(row)
 
 
 def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> Row:
@@ -283,7 +194,9 @@ def complete_iteration(
         .values(
             committed_at=now,
             evaluate_seconds=done.evaluate_seconds,
-            **iteration_summary(done, job["best_fitness"]),
+            **fitness_summary(
+                done.fitness, None if done.best is None else done.best[1], job["best_fitness"]
+            ),
         )
     )
     if filled.rowcount != 1:

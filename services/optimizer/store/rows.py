@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import func, select
 
 from services.optimizer.jobs.iteration import (
@@ -69,18 +70,19 @@ def to_iteration(row: Row) -> Iteration:
     )
 
 
-def iteration_summary(done: CompletedIteration, best_before: float | None) -> dict[str, Any]:
+def fitness_summary(
+    fitness: NDArray[np.float64], best: float | None, best_before: float | None
+) -> dict[str, Any]:
     """Columns of a committed iteration: statistics over the finite values of its fitness.
 
     Args:
-        done: What the iteration came to.
-        best_before: Fitness of the best design of all earlier iterations, in double precision;
-            None if there is none.
+        fitness: (n,) of its designs, +inf for one that failed.
+        best: Least of it, in double precision; None if there is none.
+        best_before: The same of all earlier iterations.
 
     Returns:
         Values by name of their columns, None where there is none.
     """
-    fitness = done.fitness
     finite = fitness[np.isfinite(fitness)]
     summary: dict[str, Any] = {
         "failed": len(fitness) - len(finite),
@@ -90,8 +92,7 @@ def iteration_summary(done: CompletedIteration, best_before: float | None) -> di
         "worst": None,
         "best_so_far": best_before,
     }
-    if done.best is not None:
-        _, best = done.best
+    if best is not None:
         summary["best_so_far"] = best if best_before is None else min(best, best_before)
     if len(finite):
         # Huge values may overflow in the sum; such a mean is as good as none.

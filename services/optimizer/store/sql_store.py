@@ -11,11 +11,11 @@ from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import InvalidRequest, Unreadable
+from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, commanded, extended
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.base import Page
 from services.optimizer.store.claims import (
     claimable,
     held,
@@ -33,30 +33,37 @@ from services.optimizer.store.engine import (
     parse_url,
 )
 from services.optimizer.store.history import SqlHistory, checked_limit
-from services.optimizer.store.job_list import cursor_of, from_cursor, job_rows, sort_jobs, to_cursor
+from services.optimizer.store.job_list import (
+    Among,
+    among_jobs,
+    cursor_of,
+    from_cursor,
+    job_rows,
+    sort_jobs,
+    to_cursor,
+)
 from services.optimizer.store.job_rows import request_digest, storable, to_job
 from services.optimizer.store.migrate import check_revision, migrate
+from services.optimizer.store.reading import Page
 from services.optimizer.store.recordings import (
     insert_recording,
     load_recordings,
     recording_id,
 )
 from services.optimizer.store.records import (
-    Submission,
     complete_iteration,
     entering,
     insert_ask,
-    insert_job,
     job_row,
     outstanding_ask,
     progress_after,
     provenance_columns,
-    repeated_job,
     require_readable,
     state_after_commit,
     state_after_release,
     update_job,
 )
+from services.optimizer.store.submissions import Submission, insert_job, repeated_job
 from services.optimizer.store.tables import jobs
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -105,6 +112,7 @@ class SqlStore(SqlHistory):
         provenance: JobProvenance | None = None,
         idempotency_key: str | None = None,
         request: Any = None,
+        fork: Fork | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job, or find the one that the same key made before."""
         _check_key(idempotency_key)
@@ -112,7 +120,7 @@ class SqlStore(SqlHistory):
         if idempotency_key is not None:
             sent = spec.model_dump(mode="json", exclude_unset=True) if request is None else request
             digest = request_digest(sent)
-        asked = Submission(spec.resolved(), idempotency_key, digest, first_record(provenance))
+        asked = Submission(spec.resolved(), idempotency_key, digest, first_record(provenance), fork)
         try:
             with self._database.transaction(write=True) as connection:
                 earlier = repeated_job(connection, asked)
@@ -151,6 +159,7 @@ class SqlStore(SqlHistory):
         *,
         state: JobState | None = None,
         kind: str | None = None,
+        parent: str | None = None,
         search: str = "",
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
@@ -158,22 +167,22 @@ class SqlStore(SqlHistory):
     ) -> Page[Job]:
         """Read a page of jobs."""
         limit = checked_limit(limit)
+        among = among_jobs(state, parent)
         if not search and kind is None and order is JobOrder.CREATED:
-            return self._newest_jobs(state, after, limit)
+            return self._newest_jobs(among, after, limit)
         with self._database.transaction(write=False) as connection:
             found = sort_jobs(
-                connection, state=state, kind=kind, search=search, order=order, after=after
+                connection, among=among, kind=kind, search=search, order=order, after=after
             )
             ids, more = found[:limit], len(found) > limit
             rows = job_rows(connection, ids)
         following = cursor_of(rows[-1], order) if more else None
         return Page(tuple(map(to_job, rows)), following)
 
-    def _newest_jobs(self, state: JobState | None, after: str | None, limit: int) -> Page[Job]:
+    def _newest_jobs(self, among: Among, after: str | None, limit: int) -> Page[Job]:
         """The list as most ask for it: one query, which reads no more than the page."""
-        query = select(jobs).order_by(jobs.c.created_at.desc(), jobs.c.id.desc()).limit(limit + 1)
-        if state is not None:
-            query = query.where(jobs.c.state == state)
+        newest = select(jobs).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
+        query = newest.where(*among).limit(limit + 1)
         if after is not None:
             created_at, job_id = from_cursor(after)
             types = (jobs.c.created_at.type, jobs.c.id.type)

@@ -168,10 +168,14 @@ jobs: Final = Table(
     Column("accepts_changes", Boolean),
     # Of `evaluations`, those that needed no walk; NULL is none.
     Column("evaluations_saved", BigInteger),
+    # Of a fork; no foreign key, for a fork outlives its parent. `Lineage` is the rest of it.
+    Column("parent_id", Text),
+    Column("lineage", Document(none_as_null=True)),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),
     Index(None, "state", "created_at", "id"),
+    Index(None, "parent_id"),
 )
 
 iterations: Final = Table(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -132,8 +133,36 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
             positions: (particles, d) of the swarm.
             fitness: (particles,) of each, +inf for a failed evaluation.
         """
+        self._remember(self.generations, positions, fitness)
+
+    def rejudge(
+        self, generations: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
+    ) -> None:
+        """Let each particle remember its best of what it came by, by another fitness.
+
+        Positions and velocities stay: the swarm goes on from where it is, towards other bests.
+
+        Args:
+            generations: (particles, d) positions and (particles,) fitness of all that were told, in
+                order.
+
+        Raises:
+            ValueError: This is not all that was told, or a generation was not told as a whole.
+        """
+        shape = self.best_positions.shape
+        whole = all(positions.shape == shape for positions, _ in generations)
+        if len(generations) != self.generations or self.iteration != self.generations or not whole:
+            raise ValueError(f"{self.settings.name} was not told whole swarms one after the other")
+        self.best_fitness = np.full(shape[0], np.inf)
+        self._informed_since = 0
+        for number, (positions, fitness) in enumerate(generations):
+            self._remember(number, positions, fitness)
+
+    def _remember(
+        self, generation: int, positions: NDArray[np.float64], fitness: NDArray[np.float64]
+    ) -> None:
         if not fitness.min() < self.best_fitness.min():
-            self._informed_since = self.generations + 1
+            self._informed_since = generation + 1
         better = fitness < self.best_fitness
         self.best_positions[better] = positions[better]
         self.best_fitness[better] = fitness[better]

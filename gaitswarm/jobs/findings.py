@@ -1,0 +1,168 @@
+"""The part of the port that is about what jobs have found."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gaitswarm.specs import PreferenceInput
+    from gaitswarm.tables import EvaluationTable, TableFormat
+    from gaitswarm.views import BestView, HistoryIterationView, IterationView, RankingView
+    from gaitswarm.views.calibration import TargetsView
+    from gaitswarm.views.certificate import CertificateView
+    from gaitswarm.views.families import ScenarioFamiliesView
+    from gaitswarm.views.identification import IdentifiabilityView
+    from services.optimizer.analysis.targets import LeaveOut
+
+
+class Findings(ABC):
+    """What jobs have committed, and what follows from it; nothing is changed."""
+
+    @abstractmethod
+    def best(self, job_id: str) -> BestView:
+        """Take the best design that a job has found so far.
+
+        Args:
+            job_id: Identifier of the job.
+
+        Returns:
+            The design of least fitness, with its result in every case.
+
+        Raises:
+            NotFound: No design has walked in every scenario yet.
+        """
+
+    @abstractmethod
+    def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
+        """List the committed iterations of a job.
+
+        Args:
+            job_id: Identifier of the job.
+            after: Only iterations with a greater index.
+
+        Returns:
+            Fitness of the designs, iteration by iteration, in order.
+        """
+
+    @abstractmethod
+    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
+        """List the committed iterations of a job with every design.
+
+        Args:
+            job_id: Identifier of the job.
+
+        Returns:
+            Iterations in order, each with its evaluations.
+        """
+
+    @abstractmethod
+    def evaluations(self, job_id: str) -> EvaluationTable:
+        """Take every evaluation of a job at once, as arrays.
+
+        Args:
+            job_id: Identifier of the job.
+
+        Returns:
+            One row an evaluation: design, fitness, and status, utility and objectives by case.
+        """
+
+    @abstractmethod
+    def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
+        """Judge all designs of a job by another preference; no walk is run.
+
+        Args:
+            job_id: Identifier of a job that tunes a drive.
+            preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
+                `Preference`.
+            top: How many of the best designs to list, 1 to 1000.
+
+        Returns:
+            The best designs beside their places before, and how far the rankings agree.
+
+        Raises:
+            InvalidRequest: The job has no preference, or an argument makes no sense.
+            Conflict: The job is too large to be held in memory.
+        """
+
+    @abstractmethod
+    def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
+        """See which scenarios of a job matter, from what is stored.
+
+        Args:
+            job_id: Identifier of a job that tunes a drive.
+            tolerance: Largest regret of the smallest family of scenarios, as a share.
+
+        Returns:
+            What the job would have taken for its best without each scenario, and with few.
+
+        Raises:
+            InvalidRequest: The job tunes no drive, or the tolerance makes no sense.
+            Conflict: No design of it walks in all scenarios, or it is too large to be held in
+                memory.
+        """
+
+    @abstractmethod
+    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
+        """See which parameters runs of one problem agree on, so that they can be trusted.
+
+        Args:
+            job_ids: Jobs that differ in name, seed, optimizer and iterations alone; at least one.
+
+        Returns:
+            Intervals of every variable among designs close to the best.
+
+        Raises:
+            InvalidRequest: The jobs are of different problems, or have one seed.
+            Conflict: One of them has no design yet that did not fail.
+        """
+
+    @abstractmethod
+    def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
+        """See how near runs of a calibration come to their targets.
+
+        Args:
+            job_ids: Calibrations that differ in name, seed, optimizer and iterations alone; at
+                least one.
+            leave_out: "target" to predict every target by the design that is best without it,
+                "walk" for without all targets of its walk; nothing is simulated.
+
+        Returns:
+            What the best design of all runs comes to, and what was left out.
+
+        Raises:
+            InvalidRequest: A job of another kind, jobs of different problems, or of one seed.
+            Conflict: One of them has no design yet that did not fail.
+        """
+
+    @abstractmethod
+    def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """See what a design comes to in many worlds.
+
+        Args:
+            job_id: Identifier of a certificate.
+            worlds: Worlds to take, the first ones; None for all that have walked.
+            most: Worst worlds to name, 0 to 1000.
+
+        Returns:
+            Chances of failure, spreads by scenario, the worst worlds, and what goes with them.
+
+        Raises:
+            InvalidRequest: The job is of another kind, or an argument makes no sense.
+            Conflict: No drawn world has walked yet, or the job is too large to be held in memory.
+        """
+
+    @abstractmethod
+    def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
+        """Write every evaluation of a job as a file.
+
+        Args:
+            job_id: Identifier of the job.
+            file_format: "parquet" or "csv".
+
+        Returns:
+            The file in parts, to be written one after the other.
+        """

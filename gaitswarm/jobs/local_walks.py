@@ -1,0 +1,91 @@
+"""Single designs, computed in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Unpack
+
+from gaitswarm.errors import simulation_errors
+from gaitswarm.jobs.walks import Walks
+from gaitswarm.requests import arguments
+from gaitswarm.requests.replay import run_replay
+from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
+from gaitswarm.requests.surface import run_surface
+from gaitswarm.simulation import simulate_request
+from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
+from gaitswarm.views.replay import WalkReplay, decoded_replay
+from gaitswarm.views.robustness import RobustnessView
+from gaitswarm.views.surface import SurfaceView
+from sim.controllers import ControllerName
+from sim.kernel.walk import Precision
+from sim.robot import DEFAULT_ROBOT
+
+
+class LocalWalks(Walks):
+    """Designs walk here, and need no database."""
+
+    def simulate(
+        self,
+        design: Mapping[str, float | str],
+        *,
+        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = DEFAULT_ROBOT,
+        preference: PreferenceInput = "A",
+        precision: Precision = "double",
+        log: bool = False,
+    ) -> SimulationResult:
+        """Let a design walk in this process."""
+        return simulate_request(
+            arguments.simulation(
+                design,
+                scenarios=scenarios,
+                controller=controller,
+                robot=robot,
+                preference=preference,
+                precision=precision,
+                log=log,
+            )
+        )
+
+    def robustness(
+        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
+    ) -> RobustnessView:
+        """Let designs around one walk in this process."""
+        with simulation_errors("design"):
+            return run_robustness(arguments.robustness(design, options))
+
+    def replay(
+        self,
+        design: Mapping[str, float | str],
+        *,
+        scenario: ScenarioInput = "normal-fast",
+        controller: ControllerName = "fuzzy-pi",
+        robot: RobotInput = DEFAULT_ROBOT,
+        rate: float = 50.0,
+    ) -> WalkReplay:
+        """Let a design walk in this process, to look at it."""
+        request = arguments.replay(
+            design, scenario=scenario, controller=controller, robot=robot, rate=rate
+        )
+        with simulation_errors("design"):
+            return decoded_replay(run_replay(request))
+
+    def surface(
+        self,
+        design: Mapping[str, float | str],
+        *,
+        controller: ControllerName = "fuzzy-pi",
+        error_points: int = 65,
+        current_points: int = 33,
+        velocity_error: float = 0.0,
+    ) -> SurfaceView:
+        """Compute a fuzzy controller's surfaces."""
+        request = arguments.surface(
+            design,
+            error_points=error_points,
+            current_points=current_points,
+            velocity_error=velocity_error,
+        )
+        return run_surface(arguments.controller(controller), request)

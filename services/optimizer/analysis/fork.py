@@ -1,0 +1,240 @@
+"""How a job is forked: what of its parent's history and search the fork takes over.
+
+what is different        outcomes hold   search                        the fork begins with
+nothing but the budget   yes             goes on where it was          the parent's iterations
+the preference           yes             the same, its memory judged   the parent's iterations,
+                                         anew, if its method can       judged anew
+anything else            no, but for     a new one                     the best designs
+                         the optimizer
+
+Where the search cannot be taken over under another preference, the fork begins with the best
+designs, too, as judged by that preference.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.analysis.search_path import retraced
+from services.optimizer.analysis.start import best_designs
+from services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.fork import (
+    Fork,
+    ForkRequest,
+    Lineage,
+    TakenHistory,
+    changed_fields,
+    forked_spec,
+)
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.provenance import JobProvenance, changes_since
+from services.optimizer.search.optimizer import Optimizer, Rejudging
+
+Floats = NDArray[np.float64]
+
+_HOLD: Final = frozenset({"preference", "optimizer"})
+"""Fields of a spec without which outcomes stay what they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parent:
+    """A job that is forked, with those of its iterations that the fork begins with.
+
+    Attributes:
+        job: As it was read.
+        columns: Evaluations of these iterations.
+        asked: Reads the (n, d) positions of each of them.
+    """
+
+    job: Job
+    columns: EvaluationColumns
+    asked: Callable[[], tuple[Floats, ...]]
+
+    def by_iteration(self, fitness: Floats) -> tuple[Floats, ...]:
+        """Cut a column.
+
+        Args:
+            fitness: (r,) of every evaluation.
+
+        Returns:
+            (n,) of each iteration.
+        """
+        ends = np.flatnonzero(np.diff(self.columns.iteration)) + 1
+        return tuple(np.split(fitness, ends))
+
+    @property
+    def budgets(self) -> tuple[int, ...]:
+        """Budgets under which its iterations may have been asked for, in order."""
+        earlier = () if self.job.lineage is None else self.job.lineage.budgets
+        present = self.job.spec.iterations
+        known = (*earlier, self.job.submitted_iterations or present, present)
+        return tuple(dict.fromkeys(known))
+
+
+def check_begun(job: Job, iterations: int) -> None:
+    """Check that a job has committed so many iterations.
+
+    Args:
+        job: As it was read.
+        iterations: With which a fork is to begin.
+
+    Raises:
+        InvalidRequest: It has not; names the field of `ForkRequest`.
+    """
+    committed = job.progress.iterations
+    if iterations > committed:
+        raise InvalidRequest(
+            f"must be at most {committed}, the iterations that job {job.id} has committed"
+            if committed
+            else f"job {job.id} has committed no iteration yet",
+            field="from_iteration",
+        )
+
+
+def forked(
+    parent: Parent, request: ForkRequest, provenance: Callable[[AnySpec], JobProvenance]
+) -> tuple[AnySpec, Fork]:
+    """Decide how a job is forked.
+
+    Args:
+        parent: The job that is forked.
+        request: What is asked for.
+        provenance: Spec -> provenance of what is computed here for it.
+
+    Returns:
+        Spec of the fork, and how it is stored.
+
+    Raises:
+        InvalidRequest: It makes no sense; names the field.
+        ProvenanceChanged: The fork would go on with numbers of another provenance, and that is not
+            accepted.
+        Conflict: Its search cannot be brought to where it was.
+    """
+    before = parent.job.spec
+    spec = forked_spec(before, request)
+    changed = changed_fields(before, spec)
+    lineage = Lineage(
+        parent=parent.job.id, from_iteration=request.from_iteration, carried="search"
+    ).model_copy(update={"changed": changed})
+    fitness = parent.columns.fitness
+    if "preference" in changed and _HOLD.issuperset(changed):
+        fitness = spec.judge(parent.columns.objectives, parent.columns.failed).fitness
+    reason = _why_not(before, changed)
+    if not reason:
+        try:
+            state = _search_state(parent, spec, fitness if changed else None)
+        except ValueError as error:
+            if not changed:
+                raise Conflict(
+                    f"job {parent.job.id} cannot be forked so: {error}; code or libraries of the"
+                    " search have changed, or its budget was changed more than once. With another"
+                    " optimizer the fork starts from the best designs"
+                ) from error
+            reason = str(error)
+        else:
+            _check_budget(spec, len(fitness))
+            taken = TakenHistory(
+                state,
+                parent.by_iteration(fitness) if changed else None,
+                tuple(
+                    record
+                    for record in parent.job.provenance
+                    if record.from_iteration < request.from_iteration
+                ),
+                request.accept_changes,
+            )
+            _check_unchanged(parent, taken, provenance(spec))
+            update = {"evaluations": len(fitness), "budgets": parent.budgets}
+            return spec, Fork(lineage.model_copy(update=update), taken)
+    return _started(parent, spec, fitness, request), Fork(
+        lineage.model_copy(update={"carried": "designs", "reason": reason})
+    )
+
+
+def _why_not(parent: AnySpec, changed: Sequence[str]) -> str:
+    """Why the search cannot be taken over, whatever its method; "" if it may be."""
+    others = [name for name in changed if name not in _HOLD]
+    if others:
+        return f"what designs came to does not hold for another {' and '.join(others)}"
+    if "optimizer" in changed:
+        return "another search method, or other settings of it, knows nothing of the parent's"
+    if "preference" in changed and parent.precision == "single":
+        return "which of the designs is the best by another preference is not known in double"
+    return ""
+
+
+def _search_state(parent: Parent, spec: AnySpec, anew: Floats | None) -> dict[str, Any]:
+    """The optimizer's dump after the last ask that is taken over.
+
+    anew: (r,) fitness by another preference; None: by the parent's. Raises ValueError.
+    """
+    asked, told = parent.asked(), parent.by_iteration(parent.columns.fitness)
+    if anew is None:
+        return _dumped(retraced(spec, parent.budgets, asked, told))
+    told_anew = parent.by_iteration(anew)
+    try:
+        # Whatever the method is, if it would have asked for the same, it is where it would be.
+        return _dumped(retraced(spec, parent.budgets, asked, told_anew))
+    except ValueError:
+        search = retraced(spec, parent.budgets, asked, told)
+    name = spec.optimizer.name
+    if isinstance(search, Rejudging):
+        search.rejudge(list(zip(asked[:-1], told_anew[:-1], strict=True)))
+        return _dumped(search)
+    raise ValueError(
+        f"{name} would have asked for other designs by this preference, and cannot take in those"
+        " that were asked for"
+    )
+
+
+def _dumped(search: Optimizer) -> dict[str, Any]:
+    """What the store will give back."""
+    stored: dict[str, Any] = json.loads(json.dumps(search.dump(), allow_nan=False))
+    return stored
+
+
+def _check_budget(spec: AnySpec, evaluations: int) -> None:
+    if spec.budget <= evaluations:
+        raise InvalidRequest(
+            f"the fork begins with {evaluations} evaluations, all of its budget of {spec.budget};"
+            " give more iterations, counted from the parent's first",
+            field="iterations",
+        )
+
+
+def _check_unchanged(parent: Parent, taken: TakenHistory, now: JobProvenance) -> None:
+    changes = changes_since(taken.provenance, 1, now)
+    if changes and not taken.accepts_changes:
+        raise ProvenanceChanged(
+            f"job {parent.job.id} cannot be forked here: what its numbers depend on is not what it"
+            f" was: {'; '.join(changes)}. Fork it where that is as before, or accept the change:"
+            " --accept-changes, accept_changes=True in Python, or"
+            ' {"accept_changes": true} over HTTP'
+        )
+
+
+def _started(parent: Parent, spec: AnySpec, fitness: Floats, request: ForkRequest) -> AnySpec:
+    """The spec that starts from the parent's best designs. Raises InvalidRequest, Conflict."""
+    columns = replace(parent.columns, fitness=fitness)
+    searched = tuple(variable.name for variable in spec.design_space().variables)
+    count = min(request.start_count, spec.budget)
+    designs = tuple(best_designs(parent.job.spec.design_space(), columns, searched, count))
+    if not designs:
+        raise Conflict(
+            f"job {parent.job.id} has no design in these iterations that has not failed, so there"
+            " is nothing that a fork could start from"
+        )
+    started = spec.model_copy(update={"start": designs})
+    try:
+        started.start_positions()
+    except ValueError as error:
+        raise InvalidRequest(f"of the parent's best designs: {error}") from error
+    return started

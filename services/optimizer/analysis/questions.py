@@ -1,0 +1,123 @@
+"""Questions about all that jobs have evaluated, answered from what is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from services.optimizer.analysis.distribution import (
+    Distribution,
+    distribution,
+    iteration_starts,
+)
+from services.optimizer.analysis.history import PIECE, HistoryCache, read_columns
+from services.optimizer.analysis.identifiability import (
+    Identifiability,
+    check_comparable,
+    identifiability,
+)
+from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.preference import Preference
+from services.optimizer.store.base import Store
+
+
+@dataclass(frozen=True, slots=True)
+class Questions:
+    """Histories of jobs as a whole. Thread-safe, as the store is.
+
+    Attributes:
+        store: where jobs are kept.
+    """
+
+    store: Store
+    _histories: HistoryCache = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_histories", HistoryCache(self.store))
+
+    def columns(self, job: Job) -> EvaluationColumns:
+        """Read every committed evaluation at once.
+
+        Args:
+            job: as it was read.
+
+        Returns:
+            Its columns, as of its progress or later.
+
+        Raises:
+            Conflict: the job is too large to be held in memory.
+        """
+        return self._histories.columns(job)
+
+    def column_pieces(self, job: Job, *, rows: int = PIECE) -> Iterator[EvaluationColumns]:
+        """As `columns`, piece by piece as they are consumed: for histories of any length.
+
+        Args:
+            job: As it was read; iterations committed later are left out.
+            rows: Evaluations in a piece on average, but one iteration at least.
+
+        Returns:
+            Whole iterations, in order.
+        """
+        return read_columns(self.store, job, rows=rows)
+
+    def distribution(
+        self, job: Job, *, after: int | None = None, limit: int
+    ) -> tuple[Distribution, bool]:
+        """Say how designs are spread, iteration by iteration.
+
+        Args:
+            job: as it was read.
+            after: only iterations with a greater index; None for all.
+            limit: most iterations.
+
+        Returns:
+            The distribution, and whether more iterations follow.
+
+        Raises:
+            Conflict: the job is too large to be held in memory.
+        """
+        columns = self.columns(job).after(after)
+        following = iteration_starts(columns)[limit:]
+        page = columns.rows(slice(int(following[0]) if len(following) else None))
+        return distribution(page, job.spec.design_space()), len(following) > 0
+
+    def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
+        """Judge all designs by another preference, from what is stored.
+
+        Args:
+            job: that tunes a drive, as it was read.
+            preference: to judge by.
+            top: how many designs to name.
+
+        Returns:
+            The ranking, with the evaluations that it refers to.
+
+        Raises:
+            InvalidRequest: a job of another kind, which has no preference.
+            Conflict: the job is too large to be held in memory.
+        """
+        spec, columns = tuning_of(job), self.columns(job)
+        return RankedJob(spec, columns, rank(columns, preference, top=top, worlds=spec.worlds))
+
+    def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
+        """Say which parameters several runs of one problem agree on.
+
+        Args:
+            jobs: at least one, all of different seeds; name, optimizer and iterations may differ
+                too.
+
+        Returns:
+            Intervals and, of several jobs, how far each parameter can be trusted.
+
+        Raises:
+            InvalidRequest: jobs of different problems, or two of one seed.
+            Conflict: a job has no design yet that did not fail, or is too large to be held in
+                memory.
+        """
+        check_comparable(jobs)
+        runs = [self.columns(job) for job in jobs]
+        spec = jobs[0].spec
+        return identifiability(spec.design_space().variables, runs, spec.as_good_as)

@@ -1,0 +1,51 @@
+"""The path of a search, gone along again: what it was asked and told brings it where it was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.jobs.spec import Spec, create_optimizer
+from services.optimizer.search.optimizer import Optimizer
+
+Floats = NDArray[np.float64]
+
+
+def retraced(
+    spec: Spec, budgets: Sequence[int], asked: Sequence[Floats], told: Sequence[Floats]
+) -> Optimizer:
+    """Take a search along a path, up to its last ask, which is not answered.
+
+    Args:
+        spec: Of its job.
+        budgets: Iterations that the job was to run, in the order in which it was given them. A
+            method may ask for other designs under another budget.
+        asked: (n, d) positions of every iteration, at least one.
+        told: (n,) fitness of every iteration, +inf for a design that failed; that of the last is
+            left out.
+
+    Returns:
+        The search, which has asked for the last of these positions.
+
+    Raises:
+        ValueError: It would have asked for others; names the first such iteration.
+    """
+    searches = [create_optimizer(spec.model_copy(update={"iterations": n})) for n in budgets]
+    search = searches.pop(0)
+    for index, positions in enumerate(asked):
+        if index:
+            search.tell(told[index - 1])
+        state = search.dump()
+        while not _asks_for(search, positions):
+            if not searches:
+                raise ValueError(f"its search would ask for other designs in iteration {index}")
+            search = searches.pop(0)
+            search.load(state)
+    return search
+
+
+def _asks_for(search: Optimizer, positions: Floats) -> bool:
+    found = search.ask(len(positions))
+    return found.shape == positions.shape and found.tobytes() == positions.tobytes()

@@ -1,0 +1,134 @@
+"""The reading half of the memory's port: what jobs have committed, which never changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Page(Generic[T]):
+    """A page of a long list, told by where the one before it ended.
+
+    Attributes:
+        items: In the list's order.
+        next: The `after` of the following page; None on the last.
+    """
+
+    items: tuple[T, ...]
+    next: str | None
+
+
+class CommittedHistory(Protocol):
+    """Committed iterations of jobs. Thread-safe, as all of `Store` is."""
+
+    def iterations(
+        self, job_id: str, *, after: int | None = None, limit: int = 100
+    ) -> Page[Iteration]:
+        """Read a page of committed iterations, in order.
+
+        Args:
+            job_id: Of the job.
+            after: Only iterations with a greater index.
+            limit: Most iterations on the page.
+
+        Returns:
+            The page.
+
+        Raises:
+            InvalidRequest: `limit` is less than 1.
+        """
+
+    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
+        """Read all designs of a committed iteration.
+
+        Args:
+            job_id: Of the job.
+            iteration: Index of the iteration, from 0.
+
+        Returns:
+            The particles, in order.
+
+        Raises:
+            NotFound: There is no such job, or the iteration is not committed.
+        """
+
+    def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
+        """Read all designs of a range of committed iterations.
+
+        For reading a long history by pieces, each a transaction of its own; committed iterations
+        never change, so the pieces fit together.
+
+        Args:
+            job_id: Of the job.
+            first: Least index of an iteration.
+            last: Index after the greatest.
+
+        Returns:
+            The particles, in order of iteration and particle.
+        """
+
+    def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
+        """Find what designs came to in any job.
+
+        Args:
+            keys: As `walk_keys` gives them.
+
+        Returns:
+            Outcomes of those that are known, by key; what cannot be read is not among them.
+        """
+
+    def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
+        """Read all designs of a range of committed iterations as columns, for many at once.
+
+        Args:
+            job_id: Of the job.
+            first: Least index of an iteration.
+            last: Index after the greatest.
+
+        Returns:
+            Rows in the order of `evaluations_between`; None if there is none.
+        """
+
+    def best(self, job_id: str) -> Evaluation | None:
+        """Read the best design so far.
+
+        Args:
+            job_id: Of the job.
+
+        Returns:
+            The evaluation of least fitness in double precision, the earliest of equals; None if
+            none is finite. Its `reevaluation` is there if the job searches in single.
+        """
+
+    def asked(self, job_id: str, first: int, last: int) -> tuple[NDArray[np.float64], ...]:
+        """Read the positions that the search asked for in a range of committed iterations.
+
+        Args:
+            job_id: Of the job.
+            first: Least index of an iteration.
+            last: Index after the greatest.
+
+        Returns:
+            (n, d) of each iteration, in order.
+        """
+
+    def reevaluations(self, job_id: str) -> tuple[tuple[int, Reevaluation], ...]:
+        """Read what designs came to that were evaluated anew in double precision.
+
+        Args:
+            job_id: Of the job.
+
+        Returns:
+            Index of the iteration, and what its best design came to, in order; none of a job that
+            searches in double.
+        """

@@ -1,0 +1,60 @@
+"""`fork`, and what `status` and `list` show of a fork."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Finished, Gaitswarm
+
+pytestmark = pytest.mark.slow
+
+Place = Callable[[Path], list[str]]
+
+
+@pytest.fixture
+def own_db(finished: Finished, db: Path) -> Path:
+    return Path(shutil.copy(finished.db, db))
+
+
+def test_a_fork_is_shown_with_its_parent(
+    gaitswarm: Gaitswarm, finished: Finished, own_db: Path, place: Place
+) -> None:
+    where = place(own_db)
+    made = gaitswarm("fork", finished.id, "--from", "1", *where)
+    assert made.code == 0, made.err
+    fork = made.out.strip()
+    assert "goes on from its iteration 1" in made.err
+    assert f"fork of {finished.id}" in gaitswarm("status", fork, *where).out
+    assert gaitswarm("list", *where).out.count(finished.id) == 2
+    (only,) = gaitswarm("list", "--forks-of", finished.id, *where, "--json").json
+    assert only["id"] == fork
+
+
+def test_a_fork_says_why_it_begins_anew(
+    gaitswarm: Gaitswarm, finished: Finished, own_db: Path, place: Place
+) -> None:
+    asked = ("fork", finished.id, "--from", "2", "--optimizer", "random", "--start-count", "1")
+    made = gaitswarm(
+        *asked,
+        "--preference",
+        '{"bias": [0,0,0,0,0], "exponent": [1,1,1,1,1]}',
+        *place(own_db),
+        "--json",
+    )
+    assert made.code == 0, made.err
+    lineage = made.json["lineage"]
+    assert (lineage["carried"], lineage["changed"]) == ("designs", ["optimizer", "preference"])
+    assert "another search method" in lineage["reason"]
+    assert len(made.json["spec"]["start"]) == 1
+
+
+def test_a_fork_from_an_iteration_that_is_not_there_is_bad_input(
+    gaitswarm: Gaitswarm, finished: Finished, own_db: Path, place: Place
+) -> None:
+    refused = gaitswarm("fork", finished.id, "--from", "3", *place(own_db))
+    assert refused.code == 2
+    assert "at most 2" in refused.err

@@ -1,0 +1,308 @@
+"""Jobs that begin with iterations of another one: what they take over, and how they go on."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
+from services.optimizer.jobs.fork import ForkRequest
+from services.optimizer.jobs.job import Job, JobState, time_left
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.run.embedded import run_embedded
+from services.optimizer.run.evaluator import EvaluationRequest
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
+from sim.outcome import Outcome, Status
+from tests.examples.jobs import history
+from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator
+
+PARTICLES = SPEC.optimizer.particles
+
+REPLAYED = ["de", "nelder-mead", "pso-ps", "random", "sa"]
+
+
+class TradeOff(FormulaEvaluator):
+    """Walks that are the faster the greater the gains, whatever else that costs."""
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        outcomes = super().evaluate(request, should_stop)
+        gains = request.designs.sum(axis=1, keepdims=True)
+        for outcome in outcomes:
+            outcome.objectives[:, 4:5] = 1.0 / (0.1 + gains)
+        return outcomes
+
+
+SPEED = {"bias": [0.0] * 5, "exponent": [0.0, 0.0, 0.0, 0.0, 1.0]}
+"""A preference for nothing else."""
+
+
+def service(store: SqlStore) -> JobService:
+    return JobService(store)
+
+
+def run(store: SqlStore, job: Job) -> Job:
+    done = run_embedded(store, TradeOff(), job.id)
+    assert done.state is JobState.SUCCEEDED, done.error
+    return done
+
+
+def parent(store: SqlStore, spec: JobSpec = SPEC, **given: Any) -> Job:
+    asked = JobSpec.model_validate(spec.model_dump() | given)
+    return run(store, service(store).submit(asked)[0])
+
+
+def fork(store: SqlStore, job: Job, iteration: int, **given: Any) -> Job:
+    request = ForkRequest.model_validate({"from_iteration": iteration, **given})
+    return service(store).fork(job.id, request)[0]
+
+
+def edit(database: Path, statement: str, *values: str) -> None:
+    with closing(sqlite3.connect(database)) as connection, connection:
+        connection.execute(statement, values)
+
+
+def objectives(store: SqlStore, job: Job, iterations: int) -> list[bytes]:
+    rows = store.evaluations_between(job.id, 0, iterations)
+    return [row.design.tobytes() + row.objectives.tobytes() for row in rows]
+
+
+@pytest.mark.parametrize("method", ["pso", *REPLAYED])
+@pytest.mark.parametrize("iteration", [1, 3, 6])
+def test_a_fork_with_the_same_settings_goes_on_bit_for_bit_as_its_parent(
+    store: SqlStore, method: str, iteration: int
+) -> None:
+    optimizer = {"name": method, "particles": PARTICLES}
+    job = parent(store, optimizer=optimizer)
+    # The parent's own further path, where it has spent its budget.
+    if iteration == job.progress.iterations:
+        given = {"iterations": SPEC.iterations + 3}
+        forked = run(store, fork(store, job, iteration, **given))
+        store.extend(job.id, SPEC.iterations + 3)
+        run(store, job)
+    else:
+        forked = run(store, fork(store, job, iteration))
+    assert history(store, forked.id) == history(store, job.id)
+    assert forked.progress.best_fitness == store.job(job.id).progress.best_fitness
+
+
+def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(store: SqlStore) -> None:
+    job = parent(store)
+    forked = fork(store, job, 2)
+    assert forked.state is JobState.QUEUED
+    assert (forked.progress.iterations, forked.progress.evaluations) == (2, 2 * PARTICLES)
+    assert history(store, forked.id) == [row for row in history(store, job.id) if row[0] < 2]
+    listed, expected = (store.iterations(i.id, limit=2).items for i in (forked, job))
+    for taken, own in zip(listed, expected, strict=True):
+        assert (taken.best, taken.median, taken.best_so_far) == (
+            own.best,
+            own.median,
+            own.best_so_far,
+        )
+    best = store.best(forked.id)
+    assert best is not None
+    assert best.fitness == forked.progress.best_fitness == listed[-1].best_so_far
+
+
+def test_lineage_says_what_was_taken_over(store: SqlStore) -> None:
+    job = parent(store)
+    lineage = fork(store, job, 2).lineage
+    assert lineage is not None
+    assert (lineage.parent, lineage.from_iteration, lineage.carried) == (job.id, 2, "search")
+    assert (lineage.changed, lineage.reason, lineage.evaluations) == ((), "", 2 * PARTICLES)
+    assert job.lineage is None
+
+
+def test_forks_are_found_by_their_parent(store: SqlStore) -> None:
+    job = parent(store)
+    forks = [fork(store, job, k) for k in (1, 2)]
+    fork(store, run(store, forks[0]), 3)
+    for order in ("created", "name"):
+        found = service(store).jobs(parent=job.id, order=order).items  # type: ignore[arg-type]
+        assert {one.id for one in found} == {one.id for one in forks}
+    assert service(store).jobs(parent="\0").items == ()
+
+
+def test_a_fork_stays_when_its_parent_goes(store: SqlStore, database: Path) -> None:
+    job = parent(store)
+    forked, whole = fork(store, job, 3), history(store, job.id)
+    for table in ("reevaluations", "evaluations", "iterations"):
+        edit(database, f"DELETE FROM {table} WHERE job_id = ?", job.id)  # noqa: S608
+    edit(database, "DELETE FROM jobs WHERE id = ?", job.id)
+    with pytest.raises(NotFound):
+        store.job(job.id)
+    assert history(store, run(store, forked).id) == whole
+
+
+def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store: SqlStore) -> None:
+    job = parent(store)
+    store.extend(job.id, 9)
+    job = run(store, job)
+    first = run(store, fork(store, job, 4, iterations=12))
+    second = run(store, fork(store, first, 8))
+    assert history(store, second.id) == history(store, first.id)
+    assert history(store, run(store, fork(store, job, 8)).id) == history(store, job.id)
+
+
+@pytest.mark.parametrize("method", ["pso", "random"])
+def test_another_preference_judges_the_history_anew_and_the_search_is_told(
+    store: SqlStore, method: str
+) -> None:
+    job = parent(store, optimizer={"name": method, "particles": PARTICLES})
+    forked = fork(store, job, 4, preference=SPEED)
+    assert forked.lineage is not None
+    assert (forked.lineage.carried, forked.lineage.changed) == ("search", ("preference",))
+    rows = store.evaluations_between(forked.id, 0, 4)
+    assert objectives(store, forked, 4) == objectives(store, job, 4)
+    failed = np.stack([row.statuses for row in rows]) != Status.OK
+    judged = forked.spec.judge(np.stack([row.objectives for row in rows]), failed).fitness
+    assert [row.fitness for row in rows] == judged.tolist()
+    best = store.best(forked.id)
+    assert best is not None
+    assert best.fitness == judged.min() == forked.progress.best_fitness
+    done = run(store, forked)
+    assert done.progress.evaluations == SPEC.budget
+
+
+def test_a_swarm_that_is_judged_anew_flies_on_from_its_place_towards_other_bests(
+    store: SqlStore,
+) -> None:
+    job = parent(store)
+    forked = fork(store, job, 4, preference=SPEED)
+    claim = store.claim("runner", lease_seconds=30.0, job_id=forked.id)
+    assert claim is not None and claim.answered is not None
+    state, asked = claim.answered.ask.state, store.asked(job.id, 0, 4)
+    told = [row.fitness for row in store.evaluations_between(forked.id, 0, 3)]
+    by_particle = np.array(told).reshape(3, PARTICLES)
+    assert state["positions"] == asked[3].tolist()
+    best = by_particle.argmin(axis=0)
+    by_parent = [row.fitness for row in store.evaluations_between(job.id, 0, 3)]
+    assert (best != np.array(by_parent).reshape(3, PARTICLES).argmin(axis=0)).any()
+    assert state["best_positions"] == [asked[k][j].tolist() for j, k in enumerate(best)]
+    finite = np.isfinite(by_particle.min(axis=0))
+    assert [f is not None for f in state["best_fitness"]] == finite.tolist()
+
+
+@pytest.mark.parametrize("method", ["de", "nelder-mead", "pso-ps"])
+def test_a_method_that_cannot_be_told_anew_starts_from_the_best_designs_by_the_preference(
+    store: SqlStore, method: str
+) -> None:
+    job = parent(store, optimizer={"name": method, "particles": PARTICLES}, iterations=25)
+    forked = fork(store, job, job.progress.iterations, preference=SPEED, start_count=3)
+    assert forked.lineage is not None
+    assert (forked.lineage.carried, forked.lineage.evaluations) == ("designs", 0)
+    assert method in forked.lineage.reason
+    assert forked.progress.iterations == 0
+    columns = service(store).columns(job)
+    judged = forked.spec.judge(columns.objectives, columns.failed).fitness
+    shown = job.spec.design_space().shown(columns.designs[judged.argmin()].tolist())
+    assert forked.spec.start[0] == shown  # type: ignore[index]
+    assert len(forked.spec.start) == 3  # type: ignore[arg-type]
+    assert run(store, forked).progress.evaluations == job.spec.budget
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({"scenarios": ["normal-slow"]}, "scenarios"),
+        ({"robot": "szabadka2"}, "robot"),
+        ({"optimizer": {"name": "de", "particles": 4}}, "search method"),
+        ({"optimizer": {"name": "pso", "particles": 4, "social": 1.0}}, "settings"),
+        ({"scenarios": ["normal-slow"], "preference": "B"}, "scenarios"),
+    ],
+    ids=["scenarios", "robot", "method", "settings", "both"],
+)
+def test_where_outcomes_or_search_do_not_hold_the_fork_starts_from_the_best_designs(
+    store: SqlStore, given: dict[str, Any], reason: str
+) -> None:
+    job = parent(store)
+    forked = fork(store, job, 3, **given)
+    assert forked.lineage is not None
+    assert forked.lineage.carried == "designs"
+    assert reason in forked.lineage.reason
+    columns = service(store).columns(job)
+    best = columns.designs[columns.fitness[: 3 * PARTICLES].argmin()]
+    assert forked.spec.start[0] == job.spec.design_space().shown(best.tolist())  # type: ignore[index]
+    done = run(store, forked)
+    first = store.evaluations_between(done.id, 0, 1)[0]
+    assert first.design.tolist() == best.tolist()
+
+
+def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
+    store: SqlStore,
+) -> None:
+    job = parent(store, SINGLE)
+    same = run(store, fork(store, job, 3))
+    assert history(store, same.id) == history(store, job.id)
+    assert store.reevaluations(same.id) != ()
+    assert [(k, anew.fitness) for k, anew in store.reevaluations(same.id)] == [
+        (k, anew.fitness) for k, anew in store.reevaluations(job.id)
+    ]
+    assert same.progress.best_particle == job.progress.best_particle
+    other = fork(store, job, 3, preference="B").lineage
+    assert other is not None and "in double" in other.reason
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"from_iteration": 7}, "from_iteration"),
+        ({"from_iteration": 6}, "iterations"),
+        ({"from_iteration": 3, "iterations": 3}, "iterations"),
+        ({"from_iteration": 3, "preference": "B", "iterations": 2}, "iterations"),
+        ({"from_iteration": 3, "scenarios": ["1", "normal-fast"]}, "scenarios"),
+    ],
+)
+def test_a_fork_that_makes_no_sense_is_refused_by_field_and_nothing_is_stored(
+    store: SqlStore, given: dict[str, Any], field: str
+) -> None:
+    job = parent(store)
+    with pytest.raises(InvalidRequest) as refused:
+        service(store).fork(job.id, ForkRequest.model_validate(given))
+    assert refused.value.field == field or str(refused.value).startswith(field)
+    assert [found.id for found in store.jobs().items] == [job.id]
+
+
+def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: SqlStore) -> None:
+    job = parent(store)
+    other = JobService(store, provenance=lambda _: HERE)
+    with pytest.raises(ProvenanceChanged, match="other code of search and judgement"):
+        other.fork(job.id, ForkRequest(from_iteration=2))
+    forked, _ = other.fork(job.id, ForkRequest(from_iteration=2, accept_changes=True))
+    assert forked.accepts_changes
+    assert forked.provenance == job.provenance[:1]
+
+
+def test_a_job_without_a_design_that_walks_has_nothing_to_start_from(
+    store: SqlStore, database: Path
+) -> None:
+    job = parent(store)
+    edit(database, "UPDATE evaluations SET fitness = NULL")
+    with pytest.raises(Conflict, match="nothing that a fork could start from"):
+        fork(store, job, 2, robot="szabadka2")
+
+
+def test_the_same_key_makes_one_fork(store: SqlStore) -> None:
+    job = parent(store)
+    request = ForkRequest(from_iteration=2)
+    first, new = service(store).fork(job.id, request, idempotency_key="k")
+    again, repeated = service(store).fork(job.id, request, idempotency_key="k")
+    assert (new, repeated, again.id) == (True, False, first.id)
+
+
+def test_rates_count_what_the_fork_has_walked_itself(store: SqlStore) -> None:
+    job = parent(store)
+    forked = fork(store, job, 5)
+    assert (forked.progress.compute_seconds, forked.progress.evaluations_walked) == (0.0, 0)
+    assert time_left(forked, forked.created_at).evaluations_per_second is None
+    done = run(store, forked)
+    rate = time_left(done, done.updated_at).evaluations_per_second
+    assert rate == pytest.approx(PARTICLES / done.progress.compute_seconds)

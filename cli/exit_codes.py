@@ -1,7 +1,7 @@
 """Exit codes of `gaitswarm`, and which error ends in which.
 
 0    done
-1    the job that was waited for failed, was cancelled or was paused
+1    the job that was waited for failed, was cancelled or was paused; or what was checked differs
 2    usage, or input that makes no sense; the message names the option, file or field
 3    no such job, iteration, database or result
 4    the job's present state does not allow it
@@ -34,6 +34,10 @@ class JobEnded(Exception):
     """A command did its work, but the job that it waited for did not succeed."""
 
 
+class CheckFailed(Exception):
+    """A command did its work, but what it checked is not as it should be."""
+
+
 class OutputFailed(Exception):
     """Standard output cannot be written."""
 
@@ -55,6 +59,7 @@ def exit_code(error: BaseException) -> ExitCode | None:
 
     kinds: tuple[tuple[type[BaseException], ExitCode], ...] = (
         (JobEnded, ExitCode.JOB_FAILED),
+        (CheckFailed, ExitCode.JOB_FAILED),
         (OutputFailed, ExitCode.UNAVAILABLE),
         (errors.InvalidRequest, ExitCode.BAD_INPUT),
         (SimulationInputError, ExitCode.BAD_INPUT),

@@ -19,6 +19,7 @@ from cli.commands import (
     calibrate,
     certify,
     compare,
+    evidence,
     export,
     firmware,
     fork,
@@ -73,9 +74,9 @@ app = typer.Typer(
     name="gaitswarm",
     cls=_HelpAtOnce,
     help="Find robust drive controllers for walking robots.",
-    epilog="Exit codes: 0 done, 1 job failed or cancelled, 2 bad input, 3 not found, 4 not possible"
-    " in the job's state, 5 server, database, workers or output unavailable, 70 a bug, 130"
-    " interrupted.",
+    epilog="Exit codes: 0 done, 1 job failed or cancelled, or a check failed, 2 bad input, 3 not"
+    " found, 4 not possible in the job's state, 5 server, database, workers or output unavailable,"
+    " 70 a bug, 130 interrupted.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     # Rich takes longer to import than all the rest of a help text takes.
@@ -94,6 +95,7 @@ for _module in (
     firmware,
     bench,
     export,
+    evidence,
     rank,
     robustness,
     scenarios,

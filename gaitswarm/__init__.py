@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         Unavailable,
         Unreadable,
     )
+    from gaitswarm.evidence.verify import verify
     from gaitswarm.firmware import write_firmware
     from gaitswarm.jobs.async_database import AsyncDatabaseJobs
     from gaitswarm.jobs.async_port import AsyncJobs
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
         TournamentStandingsView,
         TournamentView,
     )
+    from gaitswarm.views.verification import VerificationView
     from services.optimizer.jobs.calibration import CalibrationSpec
     from services.optimizer.jobs.certificate import CertificateSpec
     from services.optimizer.jobs.identification import IdentificationSpec
@@ -198,6 +200,7 @@ __all__ = [
     "Unavailable",
     "Unreadable",
     "Variable",
+    "VerificationView",
     "WalkLog",
     "WalkReplay",
     "__version__",
@@ -210,6 +213,7 @@ __all__ = [
     "robust_preferences",
     "robustness",
     "simulate",
+    "verify",
     "write_firmware",
 ]
 
@@ -219,6 +223,7 @@ _MODULES: Final = {
         "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged",
         "StoreUnavailable", "Unavailable", "Unreadable",
     ),
+    "gaitswarm.evidence.verify": ("verify",),
     "gaitswarm.firmware": ("write_firmware",),
     "gaitswarm.jobs.async_database": ("AsyncDatabaseJobs",),
     "gaitswarm.jobs.async_port": ("AsyncJobs",),
@@ -250,6 +255,7 @@ _MODULES: Final = {
     "gaitswarm.views.tournament": (
         "ProblemRunsView", "TournamentStandingsView", "TournamentView",
     ),
+    "gaitswarm.views.verification": ("VerificationView",),
     "services.optimizer.jobs.calibration": ("CalibrationSpec",),
     "services.optimizer.jobs.certificate": ("CertificateSpec",),
     "services.optimizer.jobs.identification": ("IdentificationSpec",),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import StreamingResponse
 
 from api.dependencies import LARGEST_INDEX, AfterIteration, ExistingJob, JobId, Service
 from api.documentation import binary, problems
+from gaitswarm.evidence.archive import MEDIA_TYPE as ZIP
+from gaitswarm.evidence.contents import evidence
 from gaitswarm.tables import MEDIA_TYPES, TableFormat, encoded_table
 from gaitswarm.views import (
     PREFIX,
@@ -102,4 +104,22 @@ def export_job(
         encoded_table(file_format, job.spec, service.column_pieces(job)),
         media_type=MEDIA_TYPES[file_format],
         headers={"Content-Disposition": f'attachment; filename="{job.id}.{file_format}"'},
+    )
+
+
+@router.get(
+    "/evidence",
+    operation_id="get_evidence",
+    summary="Download evidence",
+    response_class=Response,
+    responses=binary("The archive.", ZIP) | problems(404, 409, 422),
+)
+def get_evidence(job: ExistingJob, service: Service) -> Response:
+    """One file that proves the run: spec, robot, provenance, every evaluation, pictures, and a page
+    that opens offline; `gaitswarm verify` checks it anywhere. 409 before the first iteration.
+    """
+    return Response(
+        evidence(service, job.id),
+        media_type=ZIP,
+        headers={"Content-Disposition": f'attachment; filename="{job.id}.zip"'},
     )

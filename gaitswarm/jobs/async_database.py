@@ -302,6 +302,11 @@ class AsyncDatabaseJobs(AsyncJobs):
         async for part in _iterated(partial(jobs.export, job_id, file_format)):
             yield part
 
+    async def evidence(self, job_id: str) -> bytes:
+        """Write evidence from what is stored."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.evidence, job_id)
+
     async def record(self, walk: RecordedWalk) -> RecordingView:
         """Write a recorded walk into the database."""
         jobs = await self._jobs()

@@ -209,6 +209,10 @@ class AsyncJobs(ABC):
         """Write every evaluation of a job as a file."""
 
     @abstractmethod
+    async def evidence(self, job_id: str) -> bytes:
+        """Write one file that proves a job's run, for `gaitswarm.verify`."""
+
+    @abstractmethod
     async def record(self, walk: RecordedWalk) -> RecordingView:
         """Keep a recorded walk, to which jobs can fit parameters of the robot."""
 

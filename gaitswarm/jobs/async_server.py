@@ -267,6 +267,10 @@ class AsyncServerJobs(AsyncJobs):
             except httpx2.HTTPError as error:
                 raise unreachable(self._url, error) from error
 
+    async def evidence(self, job_id: str) -> bytes:
+        """Let the server write evidence, and download it."""
+        return await self._send(calls.evidence(job_id))
+
     async def record(self, walk: RecordedWalk) -> RecordingView:
         """Send a recorded walk to the server."""
         return await self._send(calls.record(walk))

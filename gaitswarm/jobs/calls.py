@@ -228,6 +228,15 @@ def export(job_id: str, file_format: TableFormat) -> Call[bytes]:
     return Call("GET", f"{_job(job_id)}/export", bytes, {"format": file_format})
 
 
+def evidence(job_id: str) -> Call[bytes]:
+    """One file that proves a job's run.
+
+    Args:
+        job_id: Identifier of the job.
+    """
+    return Call("GET", f"{_job(job_id)}/evidence", bytes)
+
+
 def events(job_id: str, last: int | None) -> Call[bytes]:
     """The stream of what happens to a job, after one iteration.
 

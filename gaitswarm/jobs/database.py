@@ -10,6 +10,7 @@ from itertools import islice
 from typing import Final, Unpack
 
 from gaitswarm.errors import NotFound, simulation_errors
+from gaitswarm.evidence.contents import evidence
 from gaitswarm.jobs.embedded import Workers, run_here
 from gaitswarm.jobs.local_walks import LocalWalks
 from gaitswarm.jobs.news import PAGE, JobNews
@@ -294,6 +295,10 @@ class DatabaseJobs(DatabaseTournaments, LocalWalks, Jobs):
         chosen = arguments.table_format(file_format)
         job = self._service.job(job_id)
         return encoded_table(chosen, job.spec, self._service.column_pieces(job))
+
+    def evidence(self, job_id: str) -> bytes:
+        """Write evidence from what is stored."""
+        return evidence(self._service, job_id)
 
     def record(self, walk: RecordedWalk) -> RecordingView:
         """Write a recorded walk into the database."""

@@ -166,3 +166,18 @@ class Findings(ABC):
         Returns:
             The file in parts, to be written one after the other.
         """
+
+    @abstractmethod
+    def evidence(self, job_id: str) -> bytes:
+        """Write one file that proves a job's run, for `gaitswarm.verify`.
+
+        Args:
+            job_id: Identifier of the job.
+
+        Returns:
+            A zip archive, as docs/evidence.md has it: spec, robot, provenance, all evaluations,
+            pictures and a page; the same bytes for the same stored job.
+
+        Raises:
+            Conflict: The job has committed no iteration yet, or is too large to be held in memory.
+        """

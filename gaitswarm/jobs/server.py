@@ -258,6 +258,10 @@ class ServerJobs(Jobs):
             except httpx2.HTTPError as error:
                 raise unreachable(self._url, error) from error
 
+    def evidence(self, job_id: str) -> bytes:
+        """Let the server write evidence, and download it."""
+        return self._send(calls.evidence(job_id))
+
     def record(self, walk: RecordedWalk) -> RecordingView:
         """Send a recorded walk to the server."""
         return self._send(calls.record(walk))

@@ -168,8 +168,8 @@ class JobSummaryView(View):
     links: dict[str, str] = Field(
         description="Where to go on: `self`, `iterations`, `events`; where the spec can be read,"
         " `best`, `distribution`, `particles`, `export`, and `ranking` (POST) for a job that tunes"
-        " a drive; `parent` of a fork; those of `pause`, `resume`, `cancel`, `extend`, `fork`"
-        " (POST) that its state allows.",
+        " a drive; `evidence` once an iteration is committed; `parent` of a fork; those of `pause`,"
+        " `resume`, `cancel`, `extend`, `fork` (POST) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -333,6 +333,7 @@ def job_links(job: Job) -> dict[str, str]:
     if job.readable and job.state is not JobState.CANCELLED:
         commands["extend"] = f"{here}/extend"
     if job.readable and job.progress.iterations:
+        resources["evidence"] = f"{here}/evidence"
         commands["fork"] = f"{here}/fork"
     if job.lineage is not None:
         resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"

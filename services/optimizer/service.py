@@ -110,7 +110,7 @@ class JobService(Questions):
         parent = Parent(
             job,
             columns.rows(rows),
-            lambda: self.store.asked(job_id, 0, request.from_iteration),
+            lambda: self.asked(job, request.from_iteration),
         )
         spec, fork = forked(parent, request, self.provenance)
         spec.check_can_be_simulated()

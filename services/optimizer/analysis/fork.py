@@ -70,13 +70,20 @@ class Parent:
         ends = np.flatnonzero(np.diff(self.columns.iteration)) + 1
         return tuple(np.split(fitness, ends))
 
-    @property
-    def budgets(self) -> tuple[int, ...]:
-        """Budgets under which its iterations may have been asked for, in order."""
-        earlier = () if self.job.lineage is None else self.job.lineage.budgets
-        present = self.job.spec.iterations
-        known = (*earlier, self.job.submitted_iterations or present, present)
-        return tuple(dict.fromkeys(known))
+
+def budgets_of(job: Job) -> tuple[int, ...]:
+    """Budgets under which the iterations of a job may have been asked for.
+
+    Args:
+        job: As it was read.
+
+    Returns:
+        Iterations, in the order in which the job, or those that it was forked from, were given
+        them. One that was given and replaced by another before the last is not known.
+    """
+    earlier = () if job.lineage is None else job.lineage.budgets
+    present = job.spec.iterations
+    return tuple(dict.fromkeys((*earlier, job.submitted_iterations or present, present)))
 
 
 def check_begun(job: Job, iterations: int) -> None:
@@ -152,7 +159,7 @@ def forked(
                 request.accept_changes,
             )
             _check_unchanged(parent, taken, provenance(spec))
-            update = {"evaluations": len(fitness), "budgets": parent.budgets}
+            update = {"evaluations": len(fitness), "budgets": budgets_of(parent.job)}
             return spec, Fork(lineage.model_copy(update=update), taken)
     return _started(parent, spec, fitness, request), Fork(
         lineage.model_copy(update={"carried": "designs", "reason": reason})
@@ -178,13 +185,13 @@ def _search_state(parent: Parent, spec: AnySpec, anew: Floats | None) -> dict[st
     """
     asked, told = parent.asked(), parent.by_iteration(parent.columns.fitness)
     if anew is None:
-        return _dumped(retraced(spec, parent.budgets, asked, told))
+        return _dumped(retraced(spec, budgets_of(parent.job), asked, told))
     told_anew = parent.by_iteration(anew)
     try:
         # Whatever the method is, if it would have asked for the same, it is where it would be.
-        return _dumped(retraced(spec, parent.budgets, asked, told_anew))
+        return _dumped(retraced(spec, budgets_of(parent.job), asked, told_anew))
     except ValueError:
-        search = retraced(spec, parent.budgets, asked, told)
+        search = retraced(spec, budgets_of(parent.job), asked, told)
     name = spec.optimizer.name
     if isinstance(search, Rejudging):
         search.rejudge(list(zip(asked[:-1], told_anew[:-1], strict=True)))

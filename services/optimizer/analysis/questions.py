@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from services.optimizer.analysis.distribution import (
     Distribution,
     distribution,
@@ -18,6 +21,7 @@ from services.optimizer.analysis.identifiability import (
 )
 from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.iteration import Reevaluation
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.store.base import Store
@@ -62,6 +66,30 @@ class Questions:
             Whole iterations, in order.
         """
         return read_columns(self.store, job, rows=rows)
+
+    def asked(self, job: Job, iterations: int | None = None) -> tuple[NDArray[np.float64], ...]:
+        """Read what the search asked for.
+
+        Args:
+            job: as it was read.
+            iterations: how many of the first iterations; None for all that it had committed.
+
+        Returns:
+            (n, d) positions of each iteration, in the variables' units.
+        """
+        end = job.progress.iterations if iterations is None else iterations
+        return self.store.asked(job.id, 0, end)
+
+    def reevaluations(self, job: Job) -> tuple[tuple[int, Reevaluation], ...]:
+        """Read what designs came to that were evaluated anew in double precision.
+
+        Args:
+            job: as it was read.
+
+        Returns:
+            Index of the iteration, and what its best design came to, in order.
+        """
+        return self.store.reevaluations(job.id)
 
     def distribution(
         self, job: Job, *, after: int | None = None, limit: int

@@ -1,0 +1,1 @@
+"""Evidence: one file that proves a run, written from what is stored and checked without it."""

@@ -1,0 +1,245 @@
+"""What is in a file of evidence, made from what is stored of a job."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from importlib import resources
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.errors import Conflict
+from gaitswarm.evidence.archive import archived
+from gaitswarm.evidence.page import page
+from gaitswarm.evidence.pictures import bars, convergence, heat_map
+from gaitswarm.requests.surface import SurfaceRequest, run_surface
+from gaitswarm.tables import encoded_table
+from gaitswarm.views import BestView, IterationView
+from services.optimizer.analysis.fork import budgets_of
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.iteration import Evaluation
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.provenance import job_provenance
+from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.service import JobService
+from sim.kernel.source import kernel_identity
+from sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
+
+JOB: Final = "job.json"
+SPEC: Final = "spec.json"
+PROVENANCE: Final = "provenance.json"
+BEST: Final = "best.json"
+ITERATIONS: Final = "history/iterations.json"
+EVALUATIONS: Final = "history/evaluations.parquet"
+ASKS: Final = "history/asks.parquet"
+REEVALUATIONS: Final = "history/reevaluations.parquet"
+PAGE: Final = "index.html"
+
+_PIECE: Final = 1000
+
+
+def evidence(service: JobService, job_id: str) -> bytes:
+    """Write the evidence of a job.
+
+    Args:
+        service: Where the job is.
+        job_id: Its id.
+
+    Returns:
+        The archive: the same bytes for the same stored job and the same gaitswarm.
+
+    Raises:
+        NotFound: There is no such job.
+        Conflict: It has committed nothing yet, cannot be read, or is too large for this.
+    """
+    job = service.job(job_id)
+    if not job.progress.iterations:
+        raise Conflict(f"job {job_id} has committed no iteration yet, so there is no evidence")
+    return archived(dict(_members(service, job)))
+
+
+def _members(service: JobService, job: Job) -> Iterator[tuple[str, bytes]]:
+    spec, columns = job.spec, _committed(service.columns(job), job)
+    best = service.best(job.id)
+    iterations = list(_iterations(service, job))
+    view = None if best is None else BestView.from_evaluation(best, spec)
+    documents: dict[str, Any] = {
+        JOB: _job(job, best),
+        SPEC: json.loads(spec.model_dump_json()),
+        PROVENANCE: provenance_document(job),
+        BEST: None if view is None else json.loads(view.model_dump_json()),
+        ITERATIONS: [json.loads(iteration.model_dump_json()) for iteration in iterations],
+    }
+    files: dict[str, bytes] = {name: _json(document) for name, document in documents.items()}
+    files[EVALUATIONS] = b"".join(encoded_table("parquet", spec, [columns]))
+    files[ASKS] = _asks(spec, service.asked(job))
+    if spec.precision != "double":
+        anew = _reevaluated(service, job, columns)
+        files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), anew))
+    for name in spec.recording_ids:
+        files[f"recordings/{name}.json"] = service.recording(name).model_dump_json().encode()
+    for number, robot in enumerate(spec.described):
+        files |= _robot(f"robots/{number}", robot)
+    pictures = dict(_pictures(spec, view, iterations))
+    files |= {f"figures/{name}.svg": picture.encode() for name, picture in pictures.items()}
+    files[PAGE] = page(job, view, documents[PROVENANCE], pictures, tuple(files)).encode()
+    yield from files.items()
+
+
+def provenance_document(job: Job) -> dict[str, Any]:
+    """What a job's numbers depend on, and by what this file was written.
+
+    Args:
+        job: As it was read.
+
+    Returns:
+        The document.
+    """
+    here = job_provenance(job.spec)
+    kernels = [
+        kernel_identity(load_robot(robot), job.spec.precision).hex() for robot in job.spec.described
+    ]
+    return {
+        "records": [record.model_dump(mode="json") for record in job.provenance],
+        "written_by": here.model_dump(mode="json"),
+        "kernels": kernels,
+    }
+
+
+def _committed(columns: EvaluationColumns, job: Job) -> EvaluationColumns:
+    """Without what was committed after the job was read."""
+    end = int(np.searchsorted(columns.iteration, job.progress.iterations))
+    return columns.rows(slice(end))
+
+
+def _job(job: Job, best: Evaluation | None) -> dict[str, Any]:
+    times = {"created_at": job.created_at, "started_at": job.started_at}
+    times |= {"updated_at": job.updated_at, "finished_at": job.finished_at}
+    found = None
+    if best is not None:
+        fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
+        found = {"iteration": best.iteration, "particle": best.particle, "fitness": fitness}
+    return {
+        "id": job.id,
+        "name": job.spec.name,
+        "kind": job.spec.kind,
+        "state": job.state.value,
+        **{name: None if time is None else time.isoformat() for name, time in times.items()},
+        "iterations": job.progress.iterations,
+        "evaluations": job.progress.evaluations,
+        "lineage": None if job.lineage is None else job.lineage.model_dump(mode="json"),
+        "budgets": list(budgets_of(job)),
+        "best": found,
+    }
+
+
+def _iterations(service: JobService, job: Job) -> Iterator[IterationView]:
+    after: int | None = None
+    while True:
+        page_of = service.iterations(job.id, after=after, limit=_PIECE)
+        for iteration in page_of.items:
+            if iteration.index < job.progress.iterations:
+                yield IterationView.from_iteration(iteration)
+            after = iteration.index
+        if page_of.next is None:
+            return
+
+
+def _asks(spec: AnySpec, asked: Sequence[NDArray[np.float64]]) -> bytes:
+    """What the search asked for, one row a position, in the variables' units."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    positions = np.concatenate(asked)
+    sizes = [len(one) for one in asked]
+    columns = {
+        "iteration": pa.array(np.repeat(np.arange(len(asked)), sizes)),
+        "particle": pa.array(np.concatenate([np.arange(size) for size in sizes])),
+    }
+    for variable, column in zip(spec.design_space().variables, positions.T, strict=True):
+        columns[f"position.{variable.name}"] = pa.array(column)
+    sink = io.BytesIO()
+    pq.write_table(pa.table(columns), sink)
+    return sink.getvalue()
+
+
+def _reevaluated(
+    service: JobService, job: Job, columns: EvaluationColumns
+) -> Iterator[EvaluationColumns]:
+    """The designs that were evaluated anew in double, by what they came to there."""
+    found = [(k, anew) for k, anew in service.reevaluations(job) if k < job.progress.iterations]
+    if not found:
+        return
+    starts = np.searchsorted(columns.iteration, [k for k, _ in found])
+    rows = columns.rows(starts + np.array([anew.particle for _, anew in found]))
+    yield replace(
+        rows,
+        objectives=np.stack([anew.objectives for _, anew in found]),
+        statuses=np.stack([anew.statuses for _, anew in found]),
+        fitness=np.array([anew.fitness for _, anew in found]),
+    )
+
+
+def _robot(folder: str, source: RobotSource) -> dict[str, bytes]:
+    """The robot as it was resolved, and the files that it was read from."""
+    robot = load_robot(source)
+    files = {
+        f"{folder}/description.json": robot.description.model_dump_json().encode(),
+        f"{folder}/robot.urdf": robot.urdf.text.encode(),
+    }
+    if isinstance(source, RobotFiles):
+        return {**files, f"{folder}/robot.toml": source.toml.encode()}
+    name = source.name if isinstance(source, RobotVariant) else source
+    for file in (resources.files("sim.robot") / name).iterdir():
+        if file.name.endswith(".toml"):
+            files[f"{folder}/{file.name}"] = file.read_bytes()
+    return files
+
+
+def _pictures(
+    spec: AnySpec, best: BestView | None, iterations: Sequence[IterationView]
+) -> Iterator[tuple[str, str]]:
+    yield "convergence", convergence(iterations)
+    if best is None:
+        return
+    results = best.scenarios
+    yield (
+        "scenarios",
+        bars(
+            list(results),
+            [result.utility for result in results.values()],
+            label="utility, minimized",
+            title="What the best design is worth in each case",
+        ),
+    )
+    if isinstance(spec, JobSpec):
+        yield from _surfaces(spec, best.design)
+
+
+def _surfaces(spec: JobSpec, design: Mapping[str, float | str]) -> Iterator[tuple[str, str]]:
+    request = SurfaceRequest(design=dict(design), error_points=49, current_points=25)
+    try:
+        view = run_surface(spec.controller, request)
+    except InvalidRequest:
+        # A controller that is not fuzzy has none.
+        return
+    for output in view.outputs:
+        yield (
+            f"surface-{output.name}",
+            heat_map(
+                np.array(output.table),
+                across="angle error, from its least to its greatest",
+                up="motor current, from its least to its greatest",
+                title=f"Output {output.name} over angle error and motor current",
+            ),
+        )
+
+
+def _json(document: Any) -> bytes:
+    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False).encode() + b"\n"

@@ -1,0 +1,261 @@
+"""A file of evidence as it is read back: every member checked before anything is made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from gaitswarm.evidence.archive import BadArchive, parsed_json
+from gaitswarm.evidence.contents import (
+    ASKS,
+    EVALUATIONS,
+    JOB,
+    PROVENANCE,
+    REEVALUATIONS,
+    SPEC,
+)
+from gaitswarm.tables import EvaluationTable
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.fork import Lineage
+from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
+from sim.identification.recorded_walk import RecordedWalk, Recordings
+from sim.outcome import Status
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_LARGEST_TABLE: Final = 1 << 30
+"""Of a table's numbers in memory [B]."""
+
+_THRIFT: Final = 1 << 22
+"""Of strings and lists in a Parquet file's own description."""
+
+M = TypeVar("M", bound=BaseModel)
+
+Floats = NDArray[np.float64]
+
+Budget = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class _Read(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+
+class BestFound(_Read):
+    """Where the best design is, and what it is worth in double precision."""
+
+    iteration: int = Field(ge=0)
+    particle: int = Field(ge=0)
+    fitness: float
+
+
+class JobDocument(_Read):
+    """What is said of the job as a whole."""
+
+    id: str = Field(max_length=64)
+    iterations: int = Field(ge=1)
+    evaluations: int = Field(ge=1)
+    lineage: Lineage | None
+    budgets: tuple[Budget, ...] = Field(min_length=1, max_length=100)
+    best: BestFound | None
+
+
+class ProvenanceDocument(_Read):
+    """What the numbers depend on, and by what the file was written."""
+
+    records: tuple[ProvenanceRecord, ...]
+    written_by: JobProvenance
+    kernels: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What a file of evidence says.
+
+    Attributes:
+        job: As a whole.
+        spec: What the job was asked to do.
+        provenance: What its numbers depend on.
+        columns: All evaluations.
+        asked: (n, d) positions that the search asked for, by iteration.
+        reevaluated: Designs that were evaluated anew in double; None of a search in double.
+        recordings: Recorded walks that its cases need.
+    """
+
+    job: JobDocument
+    spec: AnySpec
+    provenance: ProvenanceDocument
+    columns: EvaluationColumns
+    asked: tuple[Floats, ...]
+    reevaluated: EvaluationColumns | None
+    recordings: Recordings
+
+
+def read_evidence(members: Mapping[str, bytes]) -> Evidence:
+    """Read the members of an archive.
+
+    Args:
+        members: Contents by name.
+
+    Returns:
+        What they say; rows are in order, complete, and as the spec has them.
+
+    Raises:
+        BadArchive: One is missing or makes no sense; names it.
+    """
+    spec = _spec(_member(members, SPEC))
+    job = _parsed(JobDocument, members, JOB)
+    columns = _evaluations(members, EVALUATIONS, spec)
+    anew = None
+    if spec.precision != "double":
+        anew = _evaluations(members, REEVALUATIONS, spec.in_double())
+    evidence = Evidence(
+        job,
+        spec,
+        _parsed(ProvenanceDocument, members, PROVENANCE),
+        columns,
+        _asks(_member(members, ASKS), spec),
+        anew,
+        {
+            name: _parsed(RecordedWalk, members, f"recordings/{name}.json")
+            for name in spec.recording_ids
+        },
+    )
+    _check_order(evidence)
+    return evidence
+
+
+def _check_order(evidence: Evidence) -> None:
+    """Whole iterations, in order, of as many designs as were asked for."""
+    job, columns = evidence.job, evidence.columns
+    sizes = [len(positions) for positions in evidence.asked]
+    expected = np.repeat(np.arange(len(sizes)), sizes)
+    particles = np.concatenate([np.arange(size) for size in sizes])
+    if (
+        len(sizes) != job.iterations
+        or len(columns) != job.evaluations
+        or not np.array_equal(columns.iteration, expected)
+        or not np.array_equal(columns.particle, particles)
+    ):
+        raise BadArchive(
+            f"{EVALUATIONS}, {ASKS} and {JOB} do not have the same iterations and particles"
+        )
+
+
+def _spec(content: bytes) -> AnySpec:
+    try:
+        return SPECS.validate_python(parsed_json(content, SPEC))
+    except ValidationError as error:
+        raise _unreadable(SPEC, error) from error
+    except BadArchive:
+        raise
+    except Exception as error:
+        # A robot's files are read with it, by parsers of other projects.
+        raise BadArchive(f"{SPEC} cannot be read: {type(error).__name__}") from error
+
+
+def _parsed(kind: type[M], members: Mapping[str, bytes], name: str) -> M:
+    document = parsed_json(_member(members, name), name)
+    try:
+        return kind.model_validate(document)
+    except ValidationError as error:
+        raise _unreadable(name, error) from error
+
+
+def _unreadable(name: str, error: ValidationError) -> BadArchive:
+    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+    where = ".".join(str(part) for part in first["loc"])
+    return BadArchive(f"{name} cannot be read by this gaitswarm: {where}: {first['msg'][:200]}")
+
+
+def _member(members: Mapping[str, bytes], name: str) -> bytes:
+    if name not in members:
+        raise BadArchive(f"it has no {name}")
+    return members[name]
+
+
+def _evaluations(members: Mapping[str, bytes], name: str, spec: AnySpec) -> EvaluationColumns:
+    content = _member(members, name)
+    _checked_table(content, name)
+    try:
+        table = EvaluationTable.from_parquet(spec, content)
+        statuses = [[Status.from_label(str(s)) for s in row] for row in table.statuses.tolist()]
+        fitness = np.asarray(table.fitness, dtype=np.float64)
+        columns = EvaluationColumns(
+            iteration=_whole(table.iteration),
+            particle=_whole(table.particle),
+            designs=table.designs.astype(np.float64),
+            objectives=table.objectives.astype(np.float64),
+            statuses=np.array(statuses, dtype=np.uint8).reshape(len(table), len(spec.case_names)),
+            fitness=np.where(np.isnan(fitness), np.inf, fitness),
+        )
+    except (KeyError, ValueError, TypeError, ArithmeticError, IndexError, OSError) as error:
+        raise BadArchive(f"{name} is no table of this job: {type(error).__name__}") from error
+    space = spec.design_space()
+    if not np.isfinite(columns.designs).all() or columns.designs.shape[1] != len(space.names):
+        raise BadArchive(f"{name} has designs with numbers that are none")
+    return columns
+
+
+def _asks(content: bytes, spec: AnySpec) -> tuple[Floats, ...]:
+    table = _checked_table(content, ASKS)
+    try:
+        names = [f"position.{variable.name}" for variable in spec.design_space().variables]
+        iteration = _whole(table.column("iteration").to_numpy())
+        columns = [np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in names]
+    except (KeyError, ValueError, TypeError) as error:
+        raise BadArchive(f"{ASKS} is no table of this job: {type(error).__name__}") from error
+    positions = np.stack(columns, axis=1)
+    steps = np.diff(iteration, prepend=0)
+    if not len(positions) or not np.isfinite(positions).all() or iteration[0] != 0:
+        raise BadArchive(f"{ASKS} has positions with numbers that are none")
+    if not np.isin(steps, (0, 1)).all():
+        raise BadArchive(f"{ASKS} is not in the order of its iterations")
+    return tuple(np.split(positions, np.flatnonzero(steps)))
+
+
+def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
+    if column.dtype.kind != "i":
+        raise ValueError("no column of whole numbers")
+    return column.astype(np.int64)
+
+
+def _checked_table(content: bytes, name: str) -> pa.Table:
+    """A Parquet table that is not larger in memory than it may be."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    limits = {"thrift_string_size_limit": _THRIFT, "thrift_container_size_limit": _THRIFT}
+    try:
+        file = pq.ParquetFile(pa.BufferReader(content), **limits)
+        described = file.metadata
+        cells = described.num_rows * max(1, described.num_columns)
+        claimed = sum(
+            described.row_group(k).total_byte_size for k in range(described.num_row_groups)
+        )
+        if described.num_rows < 0 or max(8 * cells, claimed) > _LARGEST_TABLE:
+            raise BadArchive(f"{name} claims more numbers than are read")
+        return file.read()
+    except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
+        if isinstance(error, BadArchive):
+            raise
+        raise BadArchive(f"{name} is no whole Parquet file") from error
+
+
+def by_iteration(evidence: Evidence, column: Floats) -> Sequence[Floats]:
+    """Cut a column.
+
+    Args:
+        evidence: Whose iterations count.
+        column: (r,) of every evaluation.
+
+    Returns:
+        (n,) of each iteration.
+    """
+    return np.split(column, np.cumsum([len(positions) for positions in evidence.asked])[:-1])

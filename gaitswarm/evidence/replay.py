@@ -1,0 +1,105 @@
+"""Stored evaluations, simulated anew and compared bit by bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+
+import numpy as np
+
+from gaitswarm.views.verification import DifferenceView
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.run.evaluator import EvaluationRequest
+from services.runtime import open_evaluator
+from sim.identification.recorded_walk import Recordings
+from sim.outcome import Outcome, Status
+from sim.provenance import provenance_of
+
+
+def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
+    """Say whether evaluations of a job can be compared here.
+
+    Args:
+        spec: Of the job.
+
+    Returns:
+        None if they can; else None or false, as the job or this machine rules it out, and why.
+    """
+    if spec.unwalked is None:
+        return None, "what a run of a tournament comes to depends on more than what is simulated"
+    if provenance_of(*spec.described, precision=spec.precision).backend == "reference":
+        return False, (
+            "there is no C compiler here: interpreted walks have other bits, and take some hundred"
+            " times as long"
+        )
+    return None
+
+
+def simulated_differences(
+    tables: Sequence[tuple[AnySpec, EvaluationColumns]], recordings: Recordings
+) -> list[DifferenceView]:
+    """Simulate evaluations, and list what is not the same to the bit.
+
+    Args:
+        tables: Evaluations, with a spec that says in which cases and precision they were made.
+        recordings: Recorded walks that the cases need.
+
+    Returns:
+        Every objective and status that differs, in the order of the tables and their cases.
+
+    Raises:
+        SimulationInputError: A design cannot be simulated.
+    """
+    found: list[DifferenceView] = []
+    with closing(open_evaluator("in-process")) as evaluator:
+        for spec, columns in tables:
+            request = EvaluationRequest(
+                job_id="evidence",
+                cases=spec.cases(recordings),
+                designs=spec.design_space().simulated(columns.designs),
+                provenance=provenance_of(*spec.described, precision=spec.precision),
+            )
+            outcomes = evaluator.evaluate(request, lambda: False)
+            for number, (case, outcome) in enumerate(zip(spec.case_names, outcomes, strict=True)):
+                found += _different(spec, columns, number, case, outcome)
+    return found
+
+
+def _different(
+    spec: AnySpec, columns: EvaluationColumns, number: int, case: str, outcome: Outcome
+) -> Iterator[DifferenceView]:
+    stored = columns.objectives[:, number]
+    simulated = np.where(np.isfinite(outcome.objectives), outcome.objectives, np.nan)
+    same = (stored == simulated) & (np.signbit(stored) == np.signbit(simulated))
+    same |= np.isnan(stored) & np.isnan(simulated)
+    for row in np.flatnonzero(~same.all(axis=1)).tolist():
+        for k in np.flatnonzero(~same[row]).tolist():
+            values = (float(stored[row, k]), float(simulated[row, k]))
+            yield _difference(columns, row, case, spec.objectives[k].name, *values)
+    for row in np.flatnonzero(columns.statuses[:, number] != outcome.statuses).tolist():
+        statuses = (columns.statuses[row, number], outcome.statuses[row])
+        labels = [Status(int(status)).label for status in statuses]
+        yield _difference(columns, row, case, "status", *labels)
+
+
+def _difference(
+    columns: EvaluationColumns,
+    row: int,
+    case: str,
+    what: str,
+    stored: float | str,
+    simulated: float | str,
+) -> DifferenceView:
+    shown = [
+        None if isinstance(value, float) and np.isnan(value) else value
+        for value in (stored, simulated)
+    ]
+    return DifferenceView(
+        iteration=int(columns.iteration[row]),
+        particle=int(columns.particle[row]),
+        case=case,
+        what=what,
+        stored=shown[0],
+        simulated=shown[1],
+    )

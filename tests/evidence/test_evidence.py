@@ -1,0 +1,96 @@
+"""What evidence holds, and that it is the same for the same job."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+import gaitswarm
+from gaitswarm.evidence.archive import read_archive
+from tests.evidence.conftest import JOB, Proved
+from tests.examples.servers import Server
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_same_job_has_the_same_evidence_wherever_its_database_is(
+    proved: Proved, tmp_path: Path, serve_database: Callable[[Path], str]
+) -> None:
+    copy = Path(shutil.copy(proved.db, tmp_path / "copy.db"))
+    with gaitswarm.open(copy) as jobs:
+        assert jobs.evidence(proved.id) == proved.content
+    with gaitswarm.connect(serve_database(copy)) as jobs:
+        assert jobs.evidence(proved.id) == proved.content
+
+
+def test_every_file_but_the_manifest_has_its_hash_in_it(proved: Proved) -> None:
+    with zipfile.ZipFile(BytesIO(proved.content)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+        assert archive.namelist() == sorted(members)
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+    manifest = json.loads(members.pop("manifest.json"))
+    assert (manifest["format"], manifest["version"]) == ("gaitswarm-evidence", 1)
+    assert manifest["files"] == {
+        name: {"sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}
+        for name, content in members.items()
+    }
+
+
+def test_all_of_a_job_is_in_it(proved: Proved) -> None:
+    members = read_archive(proved.content)
+    job, spec = (json.loads(members[name]) for name in ("job.json", "spec.json"))
+    assert (job["id"], job["iterations"], job["evaluations"]) == (proved.id, 3, 12)
+    assert spec["name"] == JOB["name"]
+    with gaitswarm.open(proved.db) as jobs:
+        assert json.loads(members["best.json"]) == json.loads(
+            jobs.best(proved.id).model_dump_json()
+        )
+        exported = b"".join(jobs.export(proved.id, "parquet"))
+        provenance = [r.model_dump(mode="json") for r in jobs.job(proved.id).provenance]
+    assert members["history/evaluations.parquet"] == exported
+    assert json.loads(members["provenance.json"])["records"] == provenance
+    assert {"robots/0/robot.urdf", "robots/0/description.json"} <= set(members)
+
+
+def test_its_pictures_are_drawings_and_its_page_needs_no_network(proved: Proved) -> None:
+    members = read_archive(proved.content)
+    for name in ("figures/convergence.svg", "figures/scenarios.svg"):
+        assert ET.fromstring(members[name]).tag.endswith("svg")  # noqa: S314
+    page = members["index.html"].decode()
+    addresses = set(re.findall(r"\w+://[^\s\"'<]+", page))
+    assert addresses == {"http://www.w3.org/2000/svg"}
+    assert not re.findall(r"<(?:script|link|img|iframe)\b|\bsrc=|\bhref=|@import|url\(", page)
+    assert "to be &lt;proved&gt;" in page and "<proved>" not in page
+    assert "short" in page
+
+
+def test_a_job_that_has_committed_nothing_has_no_evidence(tmp_path: Path) -> None:
+    with gaitswarm.open(tmp_path / "new.db") as jobs:
+        job = jobs.submit(**JOB)
+        assert "evidence" not in job.links
+        with pytest.raises(gaitswarm.Conflict, match="no iteration yet"):
+            jobs.evidence(job.id)
+        with pytest.raises(gaitswarm.NotFound):
+            jobs.evidence("nosuchjob")
+
+
+def test_a_server_sends_it_as_an_archive(proved: Proved, lasting_server: Server) -> None:
+    from services.optimizer.service import JobService
+    from services.runtime import open_store
+
+    store = open_store(str(proved.db))
+    lasting_server.serve(JobService(store))
+    link = lasting_server.client.get(f"/v1/jobs/{proved.id}").json()["links"]["evidence"]
+    answer = lasting_server.client.get(link)
+    assert answer.headers["Content-Type"] == "application/zip"
+    assert answer.content == proved.content
+    store.close()

@@ -10,7 +10,6 @@ from itertools import islice
 from typing import Final, Unpack
 
 from gaitswarm.errors import NotFound, simulation_errors
-from gaitswarm.evidence.contents import evidence
 from gaitswarm.jobs.embedded import Workers, run_here
 from gaitswarm.jobs.local_walks import LocalWalks
 from gaitswarm.jobs.news import PAGE, JobNews
@@ -298,6 +297,8 @@ class DatabaseJobs(DatabaseTournaments, LocalWalks, Jobs):
 
     def evidence(self, job_id: str) -> bytes:
         """Write evidence from what is stored."""
+        from gaitswarm.evidence.contents import evidence
+
         return evidence(self._service, job_id)
 
     def record(self, walk: RecordedWalk) -> RecordingView:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
-from services.optimizer.jobs.fork import ForkRequest
+from services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistory
 from services.optimizer.jobs.job import Job, JobState, time_left
 from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
@@ -140,6 +140,17 @@ def test_a_fork_stays_when_its_parent_goes(store: SqlStore, database: Path) -> N
     with pytest.raises(NotFound):
         store.job(job.id)
     assert history(store, run(store, forked).id) == whole
+
+
+def test_a_fork_whose_iterations_are_gone_when_it_is_stored_is_not_stored_at_all(
+    store: SqlStore,
+) -> None:
+    job = parent(store)
+    lineage = Lineage(parent=job.id, from_iteration=7, carried="search")
+    taken = TakenHistory(state={}, fitness=None, provenance=job.provenance)
+    with pytest.raises(Conflict, match="has not the 7 iterations any more"):
+        store.create_job(SPEC, fork=Fork(lineage, taken))
+    assert [found.id for found in store.jobs().items] == [job.id]
 
 
 def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store: SqlStore) -> None:

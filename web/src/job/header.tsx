@@ -11,6 +11,7 @@ import { tournamentPath } from '../router/routes'
 import { JobActions } from './actions'
 import { budgetSpent } from './budget'
 import { fitnessUnit } from './fitness'
+import { LineageNote } from './lineage'
 import { startDesigns } from './start'
 import type { LiveJob } from './use-job'
 
@@ -35,6 +36,7 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
               <a href={tournamentPath(job.id)}>Its tournament: all methods compared</a>
             </p>
           )}
+          <LineageNote job={job} />
         </div>
         <JobActions job={job} onJob={live.replace} />
       </div>

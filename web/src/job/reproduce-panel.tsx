@@ -1,5 +1,6 @@
 /** The job as it was asked for, and commands that ask for the same again. */
 
+import { url } from '../api/client'
 import type { Job } from '../api/types'
 import { CopyBlock } from '../components/copy-button'
 import { withQuery } from '../router/routes'
@@ -33,6 +34,7 @@ export function ReproducePanel({ job }: { job: Job }) {
           </div>
         </div>
       </section>
+      {job.iterations > 0 && <EvidenceCard job={job} />}
       <OptimizerCard job={job} />
       <StartCard job={job} />
       <ProvenanceCard job={job} />
@@ -41,5 +43,29 @@ export function ReproducePanel({ job }: { job: Job }) {
         <CopyBlock label="the spec" text={JSON.stringify(job.spec, null, 2)} />
       </section>
     </div>
+  )
+}
+
+function EvidenceCard({ job }: { job: Job }) {
+  return (
+    <section class="card" aria-labelledby="evidence">
+      <header class="row spread">
+        <h2 id="evidence">Evidence</h2>
+        <a
+          class="button compact"
+          href={url('/v1/jobs/{job_id}/evidence', { job_id: job.id })}
+          download={`${job.id}.zip`}
+        >
+          Download
+        </a>
+      </header>
+      <div class="stack">
+        <p class="muted small">
+          One file with spec, robot, provenance and every evaluation, which can be checked anywhere,
+          to the bit.
+        </p>
+        <CopyBlock label="the check" text={`gaitswarm verify ${job.id}.zip --replay 50`} />
+      </div>
+    </section>
   )
 }

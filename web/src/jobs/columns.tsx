@@ -78,6 +78,11 @@ function NameCell({ job }: { job: JobSummary }) {
     <div class="job-name">
       <a href={jobPath(job.id)}>{job.name || job.id}</a>
       <span class="muted small">{details.join(' · ')}</span>
+      {job.lineage && (
+        <span class="muted small">
+          fork of <a href={jobPath(job.lineage.parent)}>{job.lineage.parent}</a>
+        </span>
+      )}
       {job.error && <span class="wrong">{job.error}</span>}
     </div>
   )

@@ -1,0 +1,51 @@
+"""A fork's page leads to its parent, the parent's to its forks, and both to their evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+import gaitswarm
+from tests.examples.servers import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_fork_and_its_parent_lead_to_each_other(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    expect(page.get_by_text("Submitted", exact=True)).to_be_visible()
+    assert page.locator("[data-forks], [data-parent]").count() == 0
+
+    with gaitswarm.connect(server.url) as jobs:
+        fork = jobs.fork(finished_job, 2, optimizer="random", particles=4, name="another way")
+    server.wait_for(fork.id, "succeeded")
+    page.goto(f"{server.url}/jobs/{fork.id}")
+    parent = page.locator(f"[data-parent={finished_job}]")
+    expect(parent).to_contain_text("with another optimizer")
+    expect(parent).to_contain_text("another search method")
+    parent.get_by_role("link").click()
+    expect(page).to_have_url(f"{server.url}/jobs/{finished_job}")
+    forks = page.locator("[data-forks='1']")
+    expect(forks).to_contain_text("from iteration 2")
+    forks.get_by_role("link", name=fork.id).click()
+    expect(page).to_have_url(f"{server.url}/jobs/{fork.id}")
+
+    page.goto(f"{server.url}/jobs")
+    row = page.get_by_role("row").filter(has_text="another way")
+    expect(row).to_contain_text(f"fork of {finished_job}")
+
+
+def test_evidence_is_downloaded_and_verified(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/reproduce")
+    evidence = page.get_by_role("region", name="Evidence")
+    with page.expect_download() as download:
+        evidence.get_by_role("link", name="Download").click()
+    assert download.value.suggested_filename == f"{finished_job}.zip"
+    assert gaitswarm.verify(download.value.path(), replay=1).verified

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from functools import partial
 from typing import Self, TypeVar, Unpack
 
@@ -11,16 +11,13 @@ import anyio
 from anyio import from_thread, to_thread
 from anyio.lowlevel import checkpoint
 
+from gaitswarm.jobs.async_local_walks import AsyncLocalWalks
 from gaitswarm.jobs.async_port import AsyncJobs
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.port import JobEvent
-from gaitswarm.requests.robustness import RobustnessOptions
-from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
-    RobotInput,
-    ScenarioInput,
     SpecInput,
     SpecOptions,
 )
@@ -38,23 +35,17 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from gaitswarm.views.replay import WalkReplay
-from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from services.optimizer.analysis.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind
-from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
 
 
-class AsyncDatabaseJobs(AsyncJobs):
+class AsyncDatabaseJobs(AsyncLocalWalks, AsyncJobs):
     """Jobs in a database, which is opened with the context, or when it is first used."""
 
     def __init__(self, url: str, connect: Callable[[], DatabaseJobs]) -> None:
@@ -316,75 +307,6 @@ class AsyncDatabaseJobs(AsyncJobs):
         """Read a recorded walk."""
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.recording, recording_id)
-
-    async def simulate(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        preference: PreferenceInput = "A",
-        precision: Precision = "double",
-        log: bool = False,
-    ) -> SimulationResult:
-        """Let a design walk in a thread of this process."""
-        jobs = await self._jobs()
-        call = partial(
-            jobs.simulate,
-            design,
-            scenarios=scenarios,
-            controller=controller,
-            robot=robot,
-            preference=preference,
-            precision=precision,
-            log=log,
-        )
-        return await to_thread.run_sync(call)
-
-    async def robustness(
-        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
-    ) -> RobustnessView:
-        """Let designs around one walk in threads of this process."""
-        jobs = await self._jobs()
-        return await to_thread.run_sync(partial(jobs.robustness, design, **options))
-
-    async def replay(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenario: ScenarioInput = "normal-fast",
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        rate: float = 50.0,
-    ) -> WalkReplay:
-        """Let a design walk in a thread of this process, to look at it."""
-        jobs = await self._jobs()
-        call = partial(
-            jobs.replay, design, scenario=scenario, controller=controller, robot=robot, rate=rate
-        )
-        return await to_thread.run_sync(call)
-
-    async def surface(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        controller: ControllerName = "fuzzy-pi",
-        error_points: int = 65,
-        current_points: int = 33,
-        velocity_error: float = 0.0,
-    ) -> SurfaceView:
-        """Compute a fuzzy controller's surfaces in a thread."""
-        jobs = await self._jobs()
-        call = partial(
-            jobs.surface,
-            design,
-            controller=controller,
-            error_points=error_points,
-            current_points=current_points,
-            velocity_error=velocity_error,
-        )
-        return await to_thread.run_sync(call)
 
     async def close(self) -> None:
         """Close the database, if it was opened."""

@@ -20,12 +20,14 @@ from gaitswarm.jobs.attempts import (
     Attempts,
     Following,
     foreign,
+    request_of,
     result,
+    server_url,
     unreachable,
 )
-from gaitswarm.jobs.calls import Call
+from gaitswarm.jobs.call import Call
 from gaitswarm.jobs.port import JobEvent
-from gaitswarm.jobs.server import TIMEOUT, request_of, server_url
+from gaitswarm.jobs.server import TIMEOUT
 from gaitswarm.requests import arguments
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult

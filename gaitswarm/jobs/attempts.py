@@ -24,7 +24,7 @@ from gaitswarm.errors import (
     StoreUnavailable,
     Unreadable,
 )
-from gaitswarm.jobs.calls import Call
+from gaitswarm.jobs.call import Call
 from gaitswarm.jobs.port import JobEvent
 from gaitswarm.views import IterationView, ProblemView, StateView
 from services.optimizer.jobs.job import JobState
@@ -269,3 +269,38 @@ def _retry_after(response: httpx2.Response) -> float:
         return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
     except ValueError:
         return 0.0
+
+
+def server_url(url: str) -> str:
+    """A server's URL without a slash at its end.
+
+    Args:
+        url: As a user gave it.
+
+    Returns:
+        The same, without that slash.
+
+    Raises:
+        InvalidRequest: It is not a URL of HTTP.
+    """
+    if not url.startswith(("http://", "https://")):
+        raise InvalidRequest(f"{url!r} is not a URL like http://127.0.0.1:8000", field="server")
+    return url.rstrip("/")
+
+
+def request_of(client: httpx2.Client | httpx2.AsyncClient, call: Call[T]) -> httpx2.Request:
+    """A call as the client sends it.
+
+    Args:
+        client: Which knows the server's URL.
+        call: What is asked.
+
+    Returns:
+        The request, with body and headers.
+    """
+    headers = dict(call.headers)
+    if call.body is not None:
+        headers["Content-Type"] = "application/json"
+    return client.build_request(
+        call.method, call.path, params=dict(call.params), content=call.body, headers=headers
+    )

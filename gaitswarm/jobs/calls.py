@@ -6,14 +6,9 @@ The client that blocks and the one that does not send the same ones.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final, Generic, TypeVar
-from urllib.parse import quote
+from collections.abc import Sequence
 
-from pydantic import BaseModel
-
-from gaitswarm.errors import NotFound
+from gaitswarm.jobs.call import IDEMPOTENCY_KEY, Call, got, job_path, page, posted, segment
 from gaitswarm.requests.replay import ReplayRequest
 from gaitswarm.requests.robustness import RobustnessRequest
 from gaitswarm.requests.surface import SurfaceRequest
@@ -52,43 +47,6 @@ from services.optimizer.jobs.spec import Spec
 from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
 
-T = TypeVar("T")
-V = TypeVar("V", bound=BaseModel)
-
-IDEMPOTENCY_KEY: Final = "Idempotency-Key"
-
-_PAGE: Final = 100
-"""Items asked for at once."""
-
-
-@dataclass(frozen=True, slots=True)
-class Call(Generic[T]):
-    """One request.
-
-    Attributes:
-        method: HTTP method.
-        path: Path under the API's prefix.
-        read: Makes the result of a successful answer's body; raises ValueError for one that is
-            not what it should be.
-        params: Query.
-        body: JSON; None for none.
-        headers: Further headers.
-        reads: Whether it changes nothing on the server, as no GET does.
-    """
-
-    method: str
-    path: str
-    read: Callable[[bytes], T]
-    params: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
-    body: str | None = None
-    headers: Mapping[str, str] = field(default_factory=dict)
-    reads: bool = False
-
-    @property
-    def repeatable(self) -> bool:
-        """Whether sending it twice does what sending it once does."""
-        return self.reads or self.method == "GET" or IDEMPOTENCY_KEY in self.headers
-
 
 def submit(spec: Spec, key: str) -> Call[JobView]:
     """Queue a job.
@@ -98,7 +56,7 @@ def submit(spec: Spec, key: str) -> Call[JobView]:
         key: Idempotency key: the same key and spec again make no second job.
     """
     headers = {IDEMPOTENCY_KEY: key}
-    return _posted("/jobs", JobView, spec, headers)
+    return posted("/jobs", JobView, spec, headers)
 
 
 def fork(job_id: str, request: ForkRequest, key: str) -> Call[JobView]:
@@ -109,7 +67,7 @@ def fork(job_id: str, request: ForkRequest, key: str) -> Call[JobView]:
         request: From where, and what is to be different.
         key: Idempotency key: the same key and fork again make no second job.
     """
-    return _posted(f"{_job(job_id)}/fork", JobView, request, {IDEMPOTENCY_KEY: key})
+    return posted(f"{job_path(job_id)}/fork", JobView, request, {IDEMPOTENCY_KEY: key})
 
 
 def estimate(spec: Spec) -> Call[EstimateView]:
@@ -118,7 +76,7 @@ def estimate(spec: Spec) -> Call[EstimateView]:
     Args:
         spec: What it would do.
     """
-    return _posted("/estimates", EstimateView, spec, reads=True)
+    return posted("/estimates", EstimateView, spec, reads=True)
 
 
 def jobs(
@@ -138,7 +96,7 @@ def jobs(
         chosen["state"] = state.value
     if parent is not None:
         chosen["parent"] = parent
-    return _page("/jobs", PageView[JobSummaryView], after, chosen)
+    return page("/jobs", PageView[JobSummaryView], after, chosen)
 
 
 def job(job_id: str) -> Call[JobView]:
@@ -147,7 +105,7 @@ def job(job_id: str) -> Call[JobView]:
     Args:
         job_id: Identifier of the job.
     """
-    return _got(_job(job_id), JobView)
+    return got(job_path(job_id), JobView)
 
 
 def command(job_id: str, asked: Command, accept_changes: bool) -> Call[JobView]:
@@ -160,7 +118,7 @@ def command(job_id: str, asked: Command, accept_changes: bool) -> Call[JobView]:
             has changed.
     """
     body = json.dumps({"accept_changes": True}) if accept_changes else None
-    return Call("POST", f"{_job(job_id)}/{asked.value}", JobView.model_validate_json, body=body)
+    return Call("POST", f"{job_path(job_id)}/{asked.value}", JobView.model_validate_json, body=body)
 
 
 def extend(job_id: str, iterations: int) -> Call[JobView]:
@@ -171,7 +129,7 @@ def extend(job_id: str, iterations: int) -> Call[JobView]:
         iterations: The budget, in all.
     """
     body = json.dumps({"iterations": iterations})
-    return Call("POST", f"{_job(job_id)}/extend", JobView.model_validate_json, body=body)
+    return Call("POST", f"{job_path(job_id)}/extend", JobView.model_validate_json, body=body)
 
 
 def best(job_id: str) -> Call[BestView]:
@@ -180,7 +138,7 @@ def best(job_id: str) -> Call[BestView]:
     Args:
         job_id: Identifier of the job.
     """
-    return _got(f"{_job(job_id)}/best", BestView)
+    return got(f"{job_path(job_id)}/best", BestView)
 
 
 def iterations(job_id: str, after: str | None) -> Call[PageView[IterationView]]:
@@ -190,7 +148,7 @@ def iterations(job_id: str, after: str | None) -> Call[PageView[IterationView]]:
         job_id: Identifier of the job.
         after: `next` of the page before; None for the first page.
     """
-    return _page(f"{_job(job_id)}/iterations", PageView[IterationView], after)
+    return page(f"{job_path(job_id)}/iterations", PageView[IterationView], after)
 
 
 def evaluations_of(job_id: str, iteration: int) -> Call[CatalogueView[EvaluationView]]:
@@ -200,8 +158,8 @@ def evaluations_of(job_id: str, iteration: int) -> Call[CatalogueView[Evaluation
         job_id: Identifier of the job.
         iteration: Its index.
     """
-    path = f"{_job(job_id)}/iterations/{iteration}/evaluations"
-    return _got(path, CatalogueView[EvaluationView])
+    path = f"{job_path(job_id)}/iterations/{iteration}/evaluations"
+    return got(path, CatalogueView[EvaluationView])
 
 
 def evaluations(job_id: str, spec: Spec) -> Call[EvaluationTable]:
@@ -215,7 +173,7 @@ def evaluations(job_id: str, spec: Spec) -> Call[EvaluationTable]:
     def read(content: bytes) -> EvaluationTable:
         return EvaluationTable.from_parquet(spec, content)
 
-    return Call("GET", f"{_job(job_id)}/export", read, {"format": "parquet"})
+    return Call("GET", f"{job_path(job_id)}/export", read, {"format": "parquet"})
 
 
 def export(job_id: str, file_format: TableFormat) -> Call[bytes]:
@@ -225,7 +183,7 @@ def export(job_id: str, file_format: TableFormat) -> Call[bytes]:
         job_id: Identifier of the job.
         file_format: Of the file.
     """
-    return Call("GET", f"{_job(job_id)}/export", bytes, {"format": file_format})
+    return Call("GET", f"{job_path(job_id)}/export", bytes, {"format": file_format})
 
 
 def evidence(job_id: str) -> Call[bytes]:
@@ -234,7 +192,7 @@ def evidence(job_id: str) -> Call[bytes]:
     Args:
         job_id: Identifier of the job.
     """
-    return Call("GET", f"{_job(job_id)}/evidence", bytes)
+    return Call("GET", f"{job_path(job_id)}/evidence", bytes)
 
 
 def events(job_id: str, last: int | None) -> Call[bytes]:
@@ -247,7 +205,7 @@ def events(job_id: str, last: int | None) -> Call[bytes]:
     headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
     if last is not None:
         headers["Last-Event-ID"] = str(last)
-    return Call("GET", f"{_job(job_id)}/events", bytes, headers=headers)
+    return Call("GET", f"{job_path(job_id)}/events", bytes, headers=headers)
 
 
 def ranking(job_id: str, request: RankingRequest) -> Call[RankingView]:
@@ -257,7 +215,7 @@ def ranking(job_id: str, request: RankingRequest) -> Call[RankingView]:
         job_id: Identifier of the job.
         request: The preference, and how many designs to list.
     """
-    return _posted(f"{_job(job_id)}/ranking", RankingView, request, reads=True)
+    return posted(f"{job_path(job_id)}/ranking", RankingView, request, reads=True)
 
 
 def scenarios(job_id: str, tolerance: float) -> Call[ScenarioFamiliesView]:
@@ -267,7 +225,7 @@ def scenarios(job_id: str, tolerance: float) -> Call[ScenarioFamiliesView]:
         job_id: Identifier of the job.
         tolerance: Largest regret of the smallest family, as a share.
     """
-    path, read = f"{_job(job_id)}/scenarios", ScenarioFamiliesView.model_validate_json
+    path, read = f"{job_path(job_id)}/scenarios", ScenarioFamiliesView.model_validate_json
     return Call("GET", path, read, {"tolerance": repr(tolerance)})
 
 
@@ -278,7 +236,7 @@ def parameters(job_ids: Sequence[str]) -> Call[IdentifiabilityView]:
         job_ids: Identifiers of the runs, at least one.
     """
     first, *others = job_ids
-    path = f"{_job(first)}/parameters"
+    path = f"{job_path(first)}/parameters"
     return Call("GET", path, IdentifiabilityView.model_validate_json, {"also": others})
 
 
@@ -293,12 +251,12 @@ def targets(job_ids: Sequence[str], leave_out: LeaveOut | None) -> Call[TargetsV
     asked: dict[str, str | Sequence[str]] = {"also": others}
     if leave_out is not None:
         asked["leave_out"] = leave_out
-    return Call("GET", f"{_job(first)}/targets", TargetsView.model_validate_json, asked)
+    return Call("GET", f"{job_path(first)}/targets", TargetsView.model_validate_json, asked)
 
 
 def tournaments() -> Call[TournamentsView]:
     """List tournaments."""
-    return _got("/tournaments", TournamentsView)
+    return got("/tournaments", TournamentsView)
 
 
 def standings(job_id: str, compare_with: str | None) -> Call[TournamentStandingsView]:
@@ -310,7 +268,7 @@ def standings(job_id: str, compare_with: str | None) -> Call[TournamentStandings
     """
     asked = {} if compare_with is None else {"compare_with": compare_with}
     read = TournamentStandingsView.model_validate_json
-    return Call("GET", f"/tournaments/{_segment(job_id, 'job')}", read, asked)
+    return Call("GET", f"/tournaments/{segment(job_id, 'job')}", read, asked)
 
 
 def problem_runs(job_id: str, problem: str) -> Call[ProblemRunsView]:
@@ -320,8 +278,8 @@ def problem_runs(job_id: str, problem: str) -> Call[ProblemRunsView]:
         job_id: Identifier of one of its jobs.
         problem: Name of the problem.
     """
-    path = f"/tournaments/{_segment(job_id, 'job')}/problems/{_segment(problem, 'problem')}"
-    return _got(path, ProblemRunsView)
+    path = f"/tournaments/{segment(job_id, 'job')}/problems/{segment(problem, 'problem')}"
+    return got(path, ProblemRunsView)
 
 
 def certificate(job_id: str, worlds: int | None, most: int) -> Call[CertificateView]:
@@ -343,7 +301,7 @@ def record(walk: RecordedWalk) -> Call[RecordingView]:
     Args:
         walk: As it was measured.
     """
-    return _posted("/recordings", RecordingView, walk)
+    return posted("/recordings", RecordingView, walk)
 
 
 def recording(recording_id: str) -> Call[RecordedWalk]:
@@ -352,7 +310,7 @@ def recording(recording_id: str) -> Call[RecordedWalk]:
     Args:
         recording_id: Its identifier.
     """
-    return _got(f"/recordings/{_segment(recording_id, 'recording')}", RecordedWalk)
+    return got(f"/recordings/{segment(recording_id, 'recording')}", RecordedWalk)
 
 
 def simulate(request: SimulationRequest) -> Call[SimulationResult]:
@@ -374,7 +332,7 @@ def robustness(request: RobustnessRequest) -> Call[RobustnessView]:
     Args:
         request: The design, its walks and the sample.
     """
-    return _posted("/robustness", RobustnessView, request, reads=True)
+    return posted("/robustness", RobustnessView, request, reads=True)
 
 
 def replay(request: ReplayRequest) -> Call[WalkReplay]:
@@ -394,40 +352,5 @@ def surface(controller: ControllerName, request: SurfaceRequest) -> Call[Surface
         controller: Name of the controller.
         request: The design, and how finely to look at it.
     """
-    path = f"/controllers/{_segment(controller, 'controller')}/surface"
-    return _posted(path, SurfaceView, request, reads=True)
-
-
-def _got(path: str, kind: type[V]) -> Call[V]:
-    return Call("GET", path, kind.model_validate_json)
-
-
-def _posted(
-    path: str,
-    kind: type[V],
-    body: BaseModel,
-    headers: Mapping[str, str] | None = None,
-    *,
-    reads: bool = False,
-) -> Call[V]:
-    read, text = kind.model_validate_json, body.model_dump_json()
-    return Call("POST", path, read, body=text, headers=headers or {}, reads=reads)
-
-
-def _page(
-    path: str, kind: type[V], after: str | None, params: Mapping[str, str] | None = None
-) -> Call[V]:
-    cursor = {} if after is None else {"after": after}
-    chosen = {**(params or {}), **cursor, "limit": str(_PAGE)}
-    return Call("GET", path, kind.model_validate_json, chosen)
-
-
-def _job(job_id: str) -> str:
-    return f"/jobs/{_segment(job_id, 'job')}"
-
-
-def _segment(name: str, what: str) -> str:
-    """An id or a name as one segment of a path."""
-    if not name or name in (".", ".."):
-        raise NotFound(f"no {what} has the id {name!r}")
-    return quote(name, safe="")
+    path = f"/controllers/{segment(controller, 'controller')}/surface"
+    return posted(path, SurfaceView, request, reads=True)

@@ -12,7 +12,7 @@ from typing import Final, TypeVar, Unpack
 import httpx2
 from pydantic import BaseModel, ValidationError
 
-from gaitswarm.errors import InvalidRequest, StoreUnavailable
+from gaitswarm.errors import StoreUnavailable
 from gaitswarm.jobs import calls
 from gaitswarm.jobs.attempts import (
     BACKOFF,
@@ -20,10 +20,12 @@ from gaitswarm.jobs.attempts import (
     Attempts,
     Following,
     foreign,
+    request_of,
     result,
+    server_url,
     unreachable,
 )
-from gaitswarm.jobs.calls import Call
+from gaitswarm.jobs.call import Call
 from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.requests import arguments
 from gaitswarm.requests.robustness import RobustnessOptions
@@ -379,38 +381,3 @@ class ServerJobs(Jobs):
             else:
                 seconds = attempts.after_refusal(response)
             time.sleep(seconds)
-
-
-def server_url(url: str) -> str:
-    """A server's URL without a slash at its end.
-
-    Args:
-        url: As a user gave it.
-
-    Returns:
-        The same, without that slash.
-
-    Raises:
-        InvalidRequest: It is not a URL of HTTP.
-    """
-    if not url.startswith(("http://", "https://")):
-        raise InvalidRequest(f"{url!r} is not a URL like http://127.0.0.1:8000", field="server")
-    return url.rstrip("/")
-
-
-def request_of(client: httpx2.Client | httpx2.AsyncClient, call: Call[T]) -> httpx2.Request:
-    """A call as the client sends it.
-
-    Args:
-        client: Which knows the server's URL.
-        call: What is asked.
-
-    Returns:
-        The request, with body and headers.
-    """
-    headers = dict(call.headers)
-    if call.body is not None:
-        headers["Content-Type"] = "application/json"
-    return client.build_request(
-        call.method, call.path, params=dict(call.params), content=call.body, headers=headers
-    )

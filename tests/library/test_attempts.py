@@ -16,7 +16,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm.jobs.attempts import Attempts, error_of
-from gaitswarm.jobs.calls import Call
+from gaitswarm.jobs.call import Call
 from tests.library.conftest import SMALL, Finished
 
 URL = "http://127.0.0.1:1"

@@ -291,7 +291,7 @@ def certificate(job_id: str, worlds: int | None, most: int) -> Call[CertificateV
         most: Worst worlds to name.
     """
     asked = {"most": str(most)} | ({} if worlds is None else {"worlds": str(worlds)})
-    path = f"{_job(job_id)}/certificate"
+    path = f"{job_path(job_id)}/certificate"
     return Call("GET", path, CertificateView.model_validate_json, asked)
 
 

@@ -22,6 +22,7 @@ JOB: dict[str, Any] = {
     "name": "to be <proved>",
     "controller": "pi",
     "scenarios": [SHORT_WALK],
+    "optimizer": "pso",
     "particles": 4,
     "iterations": 3,
     "seed": 5,

@@ -24,7 +24,7 @@ SCREENSHOTS = os.environ.get("GAITSWARM_SCREENSHOTS", "")
 
 SMALL_JOB: dict[str, Any] = SMALL_SPEC | {
     "scenarios": [SHORT_WALK, SHORT_WALK | {"name": "loaded", "load": 5.0}],
-    "optimizer": {"particles": 8},
+    "optimizer": {"name": "pso", "particles": 8},
     "iterations": 6,
     "seed": 5,
 }

@@ -25,7 +25,7 @@ def test_a_fork_and_its_parent_lead_to_each_other(
         fork = jobs.fork(finished_job, 2, optimizer="random", particles=4, name="another way")
     server.wait_for(fork.id, "succeeded")
     page.goto(f"{server.url}/jobs/{fork.id}")
-    parent = page.locator(f"[data-parent={finished_job}]")
+    parent = page.locator(f"[data-parent='{finished_job}']")
     expect(parent).to_contain_text("with another optimizer")
     expect(parent).to_contain_text("another search method")
     parent.get_by_role("link").click()

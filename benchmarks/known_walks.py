@@ -44,7 +44,7 @@ class _Job:
     """
 
     def __init__(self, store: Store, particles: int, seed: int) -> None:
-        document = {"optimizer": {"particles": particles}, "iterations": 1_000_000}
+        document = {"optimizer": {"name": "pso", "particles": particles}, "iterations": 1_000_000}
         spec = JobSpec.model_validate(document)
         store.create_job(spec)
         claim = store.claim("benchmark", lease_seconds=3600.0)

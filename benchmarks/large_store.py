@@ -35,7 +35,11 @@ _TYPICAL: Final = np.array([8.7, 1.8, 16.0, 42.0, 6.4, -0.004])
 def long_spec(iterations: int = 4000) -> JobSpec:
     """Nine variables, six scenarios, six objectives."""
     return JobSpec.model_validate(
-        {"name": "long", "optimizer": {"particles": PARTICLES}, "iterations": iterations}
+        {
+            "name": "long",
+            "optimizer": {"name": "pso", "particles": PARTICLES},
+            "iterations": iterations,
+        }
     )
 
 
@@ -46,7 +50,7 @@ def short_spec(number: int) -> JobSpec:
             "name": f"short {number:04d}",
             "controller": _CONTROLLERS[number % len(_CONTROLLERS)],
             "scenarios": ["1", "2"],
-            "optimizer": {"particles": 2},
+            "optimizer": {"name": "pso", "particles": 2},
             "iterations": 2,
             "seed": number,
         }

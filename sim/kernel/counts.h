@@ -17,7 +17,7 @@ typedef divec mask;    /* of lanes, -1 or 0 */
 /* Of a NaN the lower bound. */
 static dvec clamp(dvec x, dvec low, dvec high) { return dvec_min(dvec_max(x, low), high); }
 
-static dvec choose(divec mask, dvec a, dvec b) { return dvec_select(mask, a, b); }
+static dvec choose(divec where, dvec a, dvec b) { return dvec_select(where, a, b); }
 
 static dvec half_up(dvec x) { return dvec_floor(x + DSPLAT(0.5)); }
 static dvec whole_of_fine(dvec x) { return half_up(x); }

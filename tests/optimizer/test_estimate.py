@@ -32,7 +32,7 @@ SPEC = JobSpec.model_validate(
             SHORT_WALK | {"name": "one", "cycle_time": 1.5, "cycles": 2},
             SHORT_WALK | {"name": "two"},
         ],
-        "optimizer": {"particles": 10},
+        "optimizer": {"name": "pso", "particles": 10},
         "iterations": 5,
     }
 )

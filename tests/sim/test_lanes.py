@@ -206,7 +206,7 @@ def test_walks_of_many_threads_have_the_bits_of_walks_one_after_the_other(log: b
 
 def taken_over(kernel: NativeKernel, coding: Coding, *, log: bool) -> int:
     """Rounds that a call of one walk walks for another one, which has many at the same time."""
-    long, brief = still_walk(1000, 0.2), still_walk(50, 0.2)
+    long, brief = still_walk(5000, 0.2), still_walk(50, 0.2)
     alone = kernel.walk([long], coding, log=log).lane_use.walked
     with ThreadPoolExecutor(1) as pool:
         other = pool.submit(kernel.walk, [brief] * (400 * kernel.lanes), coding, log=log)

@@ -94,10 +94,11 @@ def numbers(count: int) -> CTE:
 
 
 def copied_id(job_id: ColumnElement[str], n: ColumnElement[int]) -> ColumnElement[str]:
-    """An id that begins as another one; of the characters that ids have."""
+    """An id that begins as another one and differs from it; of the characters that ids have."""
     size = len(ID_ALPHABET)
-    letters = [func.substr(ID_ALPHABET, digit + 1, 1) for digit in (n // size, n % size)]
-    return func.printf("%.10s%s%s", job_id, *letters)
+    other = func.instr(ID_ALPHABET, func.substr(job_id, 10, 1)) % size
+    letters = [func.substr(ID_ALPHABET, k + 1, 1) for k in (other, n // size, n % size)]
+    return func.printf("%.9s%s%s%s", job_id, *letters)
 
 
 def copy_rows(

@@ -28,9 +28,9 @@ def test_a_method_is_chosen_and_set_in_the_form_and_shown_with_its_job(
 ) -> None:
     page = visit(server.url, allowed="status of 422").go("/jobs/new")
     fill_in(page, "a simplex", iterations=2)
-    expect(page.get_by_label(re.compile("^Inertia end"))).to_have_value("0.7")
+    expect(page.get_by_label(re.compile("^Sigma"))).to_have_value("0.25")
     page.get_by_label("Method").select_option("nelder-mead")
-    expect(page.get_by_label(re.compile("^Inertia end"))).to_have_count(0)
+    expect(page.get_by_label(re.compile("^Sigma"))).to_have_count(0)
     # How many designs an iteration has stays; all else is the method's own.
     expect(page.get_by_label(re.compile("^Particles"))).to_have_value("8")
 

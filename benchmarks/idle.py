@@ -27,7 +27,7 @@ from unittest.mock import patch
 
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.service import JobService
 from services.runtime import open_store, run_embedded

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import create_optimizer, judge_outcomes
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store

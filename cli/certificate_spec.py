@@ -9,7 +9,7 @@ from cli.design_file import given_design, may_be_file
 from cli.robots import chosen_robot, scenario_data
 from cli.spec_file import parse_spec
 from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.certificate import CertificateSpec, certificate_scenarios
+from services.optimizer.jobs.kinds.certificate import CertificateSpec, certificate_scenarios
 from sim.worlds import PERTURBATIONS
 
 _PLAIN: Final = ("worlds", "seed", "preference", "precision", "name")

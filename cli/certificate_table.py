@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView
-    from services.optimizer.jobs.certificate import CertificateSpec
+    from services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 _STRONGEST = 5
 """Perturbations that are named."""

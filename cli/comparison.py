@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
 from gaitswarm.views import SimulationView
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.tuning import JobSpec
 from sim.controllers import CONTROLLERS
 from sim.scenario import GAIT_VARIABLE_NAMES
 

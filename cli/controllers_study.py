@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from services.optimizer.analysis.ratio import Interval, median_interval, median_ratio
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.optimizer_choice import with_settings
 from services.optimizer.jobs.preference import figure_of_merit
-from services.optimizer.jobs.tuning import JobSpec
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -14,7 +14,7 @@ from sim.scenario import GAIT_VARIABLES
 from sim.variables import Variable
 
 if TYPE_CHECKING:
-    from services.optimizer.jobs.tuning import JobSpec
+    from services.optimizer.jobs.kinds.tuning import JobSpec
 
 _PUBLISHED: Final = "published:"
 _JOB: Final = "job:"
@@ -86,7 +86,7 @@ def _best_of_job(
     job_id: str, controller: str | None, server: str | None, db: str | None
 ) -> GivenDesign:
     from gaitswarm.jobs.open import open_jobs
-    from services.optimizer.jobs.tuning import JobSpec
+    from services.optimizer.jobs.kinds.tuning import JobSpec
     from sim.catalogue import design_numbers
 
     with open_jobs(server, db) as jobs:

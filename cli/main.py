@@ -14,32 +14,28 @@ from typing import Any, TextIO, cast
 import typer
 from typer.core import TyperGroup
 
-from cli.commands import (
-    bench,
-    calibrate,
+from cli.commands.designs import (
     certify,
     compare,
-    evidence,
-    export,
     firmware,
-    fork,
-    history,
-    identify,
-    jobs,
-    optimize,
     plot,
     preferences,
-    rank,
-    reconstruct,
     robustness,
     scenarios,
-    serve,
     simulate,
-    study,
-    synthesize,
-    tournament,
-    validate,
 )
+from cli.commands.jobs import (
+    evidence,
+    export,
+    fork,
+    history,
+    lifecycle,
+    optimize,
+    rank,
+    serve,
+)
+from cli.commands.robots import calibrate, identify, reconstruct, synthesize, validate
+from cli.commands.studies import bench, study, tournament
 from cli.exit_codes import ExitCode, exit_code, explanation
 from cli.output import OutputClosed, Stdout, note, replace_closed_streams, warnings_as_notes
 
@@ -86,7 +82,7 @@ app = typer.Typer(
 for _module in (
     optimize,
     serve,
-    jobs,
+    lifecycle,
     fork,
     history,
     simulate,

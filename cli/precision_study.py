@@ -13,7 +13,7 @@ from gaitswarm.simulation import simulate
 from gaitswarm.simulation_result import SimulationResult
 from services.optimizer.analysis.ranking import rank_correlation
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from sim.kernel.walk import Precision
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.robot import RobotVariant

@@ -180,7 +180,7 @@ def _settings_object(text: str) -> dict[str, Any]:
 
 
 def _searching_gait(spec: AnySpec) -> AnySpec:
-    from services.optimizer.jobs.tuning import JobSpec
+    from services.optimizer.jobs.kinds.tuning import JobSpec
 
     if not isinstance(spec, JobSpec):
         raise InvalidRequest("only a job that tunes a drive has a gait", field="with-gait")

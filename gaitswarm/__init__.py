@@ -74,13 +74,13 @@ if TYPE_CHECKING:
         TournamentView,
     )
     from gaitswarm.views.verification import VerificationView
-    from services.optimizer.jobs.calibration import CalibrationSpec
-    from services.optimizer.jobs.certificate import CertificateSpec
-    from services.optimizer.jobs.identification import IdentificationSpec
+    from services.optimizer.jobs.kinds.calibration import CalibrationSpec
+    from services.optimizer.jobs.kinds.certificate import CertificateSpec
+    from services.optimizer.jobs.kinds.identification import IdentificationSpec
+    from services.optimizer.jobs.kinds.tournament import TournamentSpec
+    from services.optimizer.jobs.kinds.tuning import JobSpec
+    from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
     from services.optimizer.jobs.preference import PREFERENCES, Preference
-    from services.optimizer.jobs.tournament import TournamentSpec
-    from services.optimizer.jobs.tuning import JobSpec
-    from services.optimizer.jobs.tuning_worlds import TuningWorlds
     from services.optimizer.run.coordinator import Backoff
     from services.optimizer.search.automatic import AutoSettings
     from services.optimizer.search.evolution.cma_es import CmaEsSettings
@@ -256,13 +256,13 @@ _MODULES: Final = {
         "ProblemRunsView", "TournamentStandingsView", "TournamentView",
     ),
     "gaitswarm.views.verification": ("VerificationView",),
-    "services.optimizer.jobs.calibration": ("CalibrationSpec",),
-    "services.optimizer.jobs.certificate": ("CertificateSpec",),
-    "services.optimizer.jobs.identification": ("IdentificationSpec",),
+    "services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
+    "services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
+    "services.optimizer.jobs.kinds.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
-    "services.optimizer.jobs.tournament": ("TournamentSpec",),
-    "services.optimizer.jobs.tuning": ("JobSpec",),
-    "services.optimizer.jobs.tuning_worlds": ("TuningWorlds",),
+    "services.optimizer.jobs.kinds.tournament": ("TournamentSpec",),
+    "services.optimizer.jobs.kinds.tuning": ("JobSpec",),
+    "services.optimizer.jobs.kinds.tuning_worlds": ("TuningWorlds",),
     "services.optimizer.search.automatic": ("AutoSettings",),
     "services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
     "services.optimizer.search.evolution.differential_evolution": ("DeSettings",),

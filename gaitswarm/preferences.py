@@ -14,9 +14,13 @@ from gaitswarm.requests.robustness import RobustnessRequest, run_robustness
 from gaitswarm.views.base import finite
 from gaitswarm.views.preferences import PreferenceWinnerView, RobustPreferencesView
 from gaitswarm.views.robustness import IndexView
-from services.optimizer.analysis.preference_winners import Winner, drawn_preferences, winners
+from services.optimizer.analysis.robustness.preference_winners import (
+    Winner,
+    drawn_preferences,
+    winners,
+)
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from sim.kernel.walk import Precision
 from sim.outcome import Status
 

@@ -12,11 +12,11 @@ from pydantic import ValidationError
 from gaitswarm.errors import InvalidRequest, invalid_request
 from gaitswarm.start import StartFile, start_from
 from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.optimizer_choice import with_settings
 from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
-from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from services.optimizer.search.automatic import ChoiceName, ChosenSettings
 from sim.controllers import ControllerName
 from sim.kernel.walk import Precision

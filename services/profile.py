@@ -11,7 +11,7 @@ from typing import Any, cast
 
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.store.base import Store

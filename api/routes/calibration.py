@@ -11,7 +11,7 @@ from api.documentation import problems
 from gaitswarm.requests.targets import run_targets
 from gaitswarm.views import PREFIX
 from gaitswarm.views.calibration import TargetsView
-from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.analysis.fits.targets import LeaveOut
 
 router = APIRouter(prefix=PREFIX)
 

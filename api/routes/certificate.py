@@ -11,7 +11,7 @@ from api.documentation import problems
 from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.views import PREFIX
 from gaitswarm.views.certificate import CertificateView
-from services.optimizer.analysis.certificate import MOST_WORST
+from services.optimizer.analysis.robustness.certificate import MOST_WORST
 
 router = APIRouter(prefix=PREFIX)
 

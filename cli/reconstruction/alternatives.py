@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from sim.calibration.catalogue import ROBOT
 from sim.calibration.targets import TargetWalk
 from sim.calibration.walk import RESULTS, CalibrationWalk

@@ -31,14 +31,14 @@ from cli.reconstruction.optimality import (
     walk_all,
 )
 from cli.reconstruction.plan import Size
-from services.optimizer.analysis.identifiability import (
+from services.optimizer.analysis.fits.identifiability import (
     Identifiability,
     ParameterIdentifiability,
     identifiability,
 )
-from services.optimizer.analysis.targets import TargetResults, target_results
-from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.analysis.fits.targets import TargetResults, target_results
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.provenance import job_provenance
 from sim.provenance import source_digest

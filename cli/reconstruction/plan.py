@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from cli.spec_file import parse_spec
 from cli.target_file import read_targets
-from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from sim.robot.shipped import DEFAULT_ROBOT
 
 TARGETS: Final = Path(__file__).parent / "targets.csv"

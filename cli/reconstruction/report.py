@@ -12,8 +12,8 @@ import numpy as np
 from cli.atomic_file import replacing
 from cli.reconstruction.evidence import PRINTED, Evidence, Found
 from cli.reconstruction.optimality import OPTIMA
-from services.optimizer.analysis.identifiability import ParameterIdentifiability, Trust
-from services.optimizer.analysis.targets import Reached
+from services.optimizer.analysis.fits.identifiability import ParameterIdentifiability, Trust
+from services.optimizer.analysis.fits.targets import Reached
 
 REPORT: Final = "report.md"
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from cli.spec_file import parse_spec
-from services.optimizer.analysis.entrants import NAME_PREFIX
-from services.optimizer.analysis.standings import looked_at
+from services.optimizer.analysis.tournaments.entrants import NAME_PREFIX
+from services.optimizer.analysis.tournaments.standings import looked_at
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.tournament import TournamentSpec
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.search.registry import METHODS, OPTIMIZERS, missing_of
 from services.optimizer.tournament.functions import FUNCTIONS
 from services.optimizer.tournament.methods import (

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Final
 
 from cli.atomic_file import replacing
 from cli.tournament.pictures import draw_problem, draw_profiles, draw_ranks
-from services.optimizer.analysis.standings import NEAR, Standings, profiles_of
+from services.optimizer.analysis.tournaments.standings import NEAR, Standings, profiles_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.tournament.runs import Entry
-    from services.optimizer.analysis.tournament import Interval
+    from services.optimizer.analysis.tournaments.tournament import Interval
 
 REPORT: Final = "report.html"
 

@@ -21,12 +21,12 @@ from gaitswarm.jobs.embedded import earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.settings import read_settings
 from gaitswarm.tables import Table
-from services.optimizer.analysis.entrants import by_problem
-from services.optimizer.analysis.tournament import Results, Runs, runs_of
+from services.optimizer.analysis.tournaments.entrants import by_problem
+from services.optimizer.analysis.tournaments.tournament import Results, Runs, runs_of
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.service import JobService
 from services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
 

@@ -25,8 +25,8 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.service import JobService
 from sim.kernel.source import kernel_identity
 from sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot

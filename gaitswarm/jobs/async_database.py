@@ -36,7 +36,7 @@ from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
-from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind

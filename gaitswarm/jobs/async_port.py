@@ -46,7 +46,7 @@ if TYPE_CHECKING:
         TournamentStandingsView,
         TournamentView,
     )
-    from services.optimizer.analysis.targets import LeaveOut
+    from services.optimizer.analysis.fits.targets import LeaveOut
     from sim.identification.recorded_walk import RecordedWalk
 
 

@@ -60,7 +60,7 @@ from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
-from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.controllers import ControllerName

@@ -40,7 +40,7 @@ from gaitswarm.views.tournament import (
     TournamentStandingsView,
     TournamentsView,
 )
-from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.spec import Spec

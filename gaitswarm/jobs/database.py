@@ -35,7 +35,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView
-    from services.optimizer.analysis.targets import LeaveOut
+    from services.optimizer.analysis.fits.targets import LeaveOut
 
 
 class Findings(ABC):

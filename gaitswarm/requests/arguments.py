@@ -28,8 +28,8 @@ from gaitswarm.specs import (
 )
 from gaitswarm.tables import TableFormat
 from gaitswarm.views import RankingRequest
-from services.optimizer.analysis.certificate import MOST_WORST
-from services.optimizer.analysis.targets import LeaveOut
+from services.optimizer.analysis.fits.targets import LeaveOut
+from services.optimizer.analysis.robustness.certificate import MOST_WORST
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from sim.controllers import CONTROLLERS, ControllerName

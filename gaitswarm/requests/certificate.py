@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Protocol
 
 from gaitswarm.views.certificate import CertificateView
-from services.optimizer.analysis.certificate import certificate
+from services.optimizer.analysis.robustness.certificate import certificate
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 
 class Histories(Protocol):

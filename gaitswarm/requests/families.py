@@ -8,10 +8,10 @@ import numpy as np
 
 from gaitswarm.requests.targets import Histories
 from gaitswarm.views.families import ScenarioFamiliesView
-from services.optimizer.analysis.scenario_families import scenario_families
+from services.optimizer.analysis.robustness.scenario_families import scenario_families
 from services.optimizer.analysis.utilities import log_utilities
 from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 
 TOLERANCE: Final = 0.01
 """Regret of the smallest family, by default [1]."""

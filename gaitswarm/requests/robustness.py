@@ -12,7 +12,7 @@ from pydantic import Field
 from gaitswarm.requests.walk import WalksRequest
 from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views.robustness import RobustnessView
-from services.optimizer.analysis.robustness import LocalSample, local_sample, robustness
+from services.optimizer.analysis.robustness.index import LocalSample, local_sample, robustness
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.run.evaluator import EvaluationRequest
 from sim.case import Walk

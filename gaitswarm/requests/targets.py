@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from gaitswarm.views.calibration import TargetsView
-from services.optimizer.analysis.identifiability import check_comparable
-from services.optimizer.analysis.targets import LeaveOut, target_results
+from services.optimizer.analysis.fits.identifiability import check_comparable
+from services.optimizer.analysis.fits.targets import LeaveOut, target_results
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
 
 class Histories(Protocol):

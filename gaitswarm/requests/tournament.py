@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Final, Protocol
 
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
-from services.optimizer.analysis.entrants import Tournament, tournaments_of
-from services.optimizer.analysis.standings import looked_at, profiles_of, standings_of
-from services.optimizer.analysis.tournament import Results
+from services.optimizer.analysis.tournaments.entrants import Tournament, tournaments_of
+from services.optimizer.analysis.tournaments.standings import looked_at, profiles_of, standings_of
+from services.optimizer.analysis.tournaments.tournament import Results
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.store.reading import Page
 
 _PAGE: Final = 200

@@ -10,8 +10,8 @@ from services.optimizer.analysis.distribution import QUANTILES, Distribution
 from services.optimizer.analysis.ranking import RankedDesign, RankedJob
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
-from services.optimizer.jobs.tuning import JobSpec
 
 
 class DistributionItemView(View):

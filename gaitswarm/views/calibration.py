@@ -5,8 +5,8 @@ from __future__ import annotations
 from pydantic import Field
 
 from gaitswarm.views.base import View, finite
-from services.optimizer.analysis.targets import Reached, TargetResult, TargetResults
-from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.analysis.fits.targets import Reached, TargetResult, TargetResults
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
 
 class ReachedView(View):

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import StatusName
-from services.optimizer.analysis.certificate import (
+from services.optimizer.analysis.robustness.certificate import (
     LEVEL,
     QUANTILES,
     CaseResult,
@@ -16,7 +16,7 @@ from services.optimizer.analysis.certificate import (
     Spread,
     WorldOutcome,
 )
-from services.optimizer.jobs.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.preference import Preference
 from sim.robot import RobotSource
 

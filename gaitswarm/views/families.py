@@ -9,7 +9,12 @@ import numpy as np
 from pydantic import Field
 
 from gaitswarm.views.base import View, finite
-from services.optimizer.analysis.scenario_families import Family, LeftOut, Loss, ScenarioFamilies
+from services.optimizer.analysis.robustness.scenario_families import (
+    Family,
+    LeftOut,
+    Loss,
+    ScenarioFamilies,
+)
 from services.optimizer.jobs.columns import EvaluationColumns
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gaitswarm.views.base import View, finite
-from services.optimizer.analysis.identifiability import (
+from services.optimizer.analysis.fits.identifiability import (
     THRESHOLDS,
     ChoiceEvidence,
     Identifiability,

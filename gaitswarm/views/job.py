@@ -22,8 +22,8 @@ from services.optimizer.jobs.job import (
     UnreadableSpec,
     time_left,
 )
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import ProvenanceRecord
-from services.optimizer.jobs.tuning import JobSpec
 from sim.kernel.walk import Precision
 
 PREFIX: Final = "/v1"

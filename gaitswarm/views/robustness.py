@@ -10,7 +10,7 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ObjectiveView
-from services.optimizer.analysis.robustness import (
+from services.optimizer.analysis.robustness.index import (
     NORMALISED_OBJECTIVES,
     Interval,
     LocalSample,

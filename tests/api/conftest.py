@@ -12,7 +12,7 @@ import pytest
 
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim, Job
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore

@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.identification import IdentificationSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit
 from tests.examples.servers import unframed

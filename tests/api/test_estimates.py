@@ -6,7 +6,7 @@ import httpx2
 import pytest
 
 from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 from tests.examples.jobs import SMALL_SPEC

@@ -15,7 +15,7 @@ import httpx2
 import pytest
 
 from services.optimizer.jobs.job import Command, Job
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit, Serve
 

@@ -9,9 +9,9 @@ import pytest
 from sqlalchemy import Engine, event
 
 from services.optimizer.jobs.job import Job, JobState
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 

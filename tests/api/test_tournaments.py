@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx2
 
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.service import JobService
 from tests.tournament.examples import entrant, submitted
 

@@ -12,7 +12,7 @@ import pytest
 from gaitswarm.views import JobView
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 

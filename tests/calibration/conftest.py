@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from sim.robot import RobotVariant, load_robot
 from sim.robot.identifiable import with_parameters
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from services.runtime import open_evaluator, run_embedded

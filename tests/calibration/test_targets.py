@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.identifiability import Trust, identifiability
-from services.optimizer.analysis.targets import target_results
-from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.analysis.fits.identifiability import Trust, identifiability
+from services.optimizer.analysis.fits.targets import target_results
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation, Reevaluation
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from sim.calibration.walk import RESULTS
 from sim.variables import Variable
 from tests.calibration.conftest import spec

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store

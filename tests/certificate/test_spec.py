@@ -10,8 +10,8 @@ import pytest
 from pydantic import ValidationError
 
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.certificate import CASES, CertificateSpec, certificate_scenarios
 from services.optimizer.jobs.documents import SPECS
+from services.optimizer.jobs.kinds.certificate import CASES, CertificateSpec, certificate_scenarios
 from sim.scenario import HELD_OUT, SCENARIOS
 from sim.worlds import PERTURBATIONS, sample_worlds
 from tests.certificate.examples import DOCUMENT, PI, small

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, spearmanr
 
-from services.optimizer.analysis.certificate import (
+from services.optimizer.analysis.robustness.certificate import (
     Certificate,
     certificate,
     conditional_value_at_risk,
     proportion,
 )
 from services.optimizer.errors import Conflict
-from services.optimizer.jobs.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from sim.outcome import Status
 from tests.certificate.examples import columns, small
 

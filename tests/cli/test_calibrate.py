@@ -9,7 +9,7 @@ import pytest
 
 from cli.target_file import read_targets
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.calibration import CalibrationSpec
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from tests.cli.conftest import Gaitswarm
 from tests.examples.paths import ROOT
 

@@ -7,7 +7,7 @@ import pytest
 from cli.comparison import on_the_jobs_terms, published_beside
 from cli.design_file import read_design
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.search.swarm.pso import PsoSettings
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.scenario import GAIT_VARIABLE_NAMES

@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 
 from services.optimizer.jobs.iteration import Evaluation
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import judge_outcomes
-from services.optimizer.jobs.tuning import JobSpec
 from services.runtime import open_evaluator, open_store, run_embedded
 from sim.assembly import Backend
 from sim.outcome import OBJECTIVE_NAMES, Status

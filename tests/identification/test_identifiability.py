@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.identifiability import THRESHOLDS, Trust, identifiability
+from services.optimizer.analysis.fits.identifiability import THRESHOLDS, Trust, identifiability
 from services.optimizer.jobs.columns import EvaluationColumns
 from sim.variables import Variable
 

@@ -7,10 +7,10 @@ import threading
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.identifiability import Trust
+from services.optimizer.analysis.fits.identifiability import Trust
 from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.kinds.identification import IdentificationSpec
 from services.optimizer.jobs.spec import Judgement
 from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.service import JobService

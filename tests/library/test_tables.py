@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.tables import EvaluationTable, Table, encoded_table
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from sim.outcome import Status
 
 SPEC = JobSpec(controller="pi", scenarios=("normal-fast", "2"), preference="C")

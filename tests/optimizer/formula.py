@@ -10,8 +10,8 @@ import numpy as np
 
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.job import Job, JobState
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import JobProvenance, with_record
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from sim.case import Walk
 from sim.outcome import Outcome, Status

@@ -8,8 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from services.optimizer.jobs.documents import SPECS
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import create_optimizer
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.automatic import RULES, AutoSettings, Rule, chosen_method
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.registry import (

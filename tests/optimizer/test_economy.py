@@ -11,9 +11,9 @@ import pytest
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.iteration import Known
 from services.optimizer.jobs.job import Job, JobState
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.jobs.tournament import TournamentSpec
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.jobs.walk_keys import walk_keys
 from services.optimizer.run.economy import evaluate_unknown
 from services.optimizer.run.evaluator import EvaluationRequest

@@ -10,10 +10,10 @@ import pytest
 
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.estimate import MeasuredRates, estimate
-from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import Job, Progress
+from services.optimizer.jobs.kinds.identification import IdentificationSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.swarm.pso import PsoSettings
 from sim.identification.recorded_walk import RecordedWalk

@@ -14,7 +14,7 @@ import pytest
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
 from services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistory
 from services.optimizer.jobs.job import Job, JobState, time_left
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.service import JobService

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.optimizer.analysis.preference_winners import drawn_preferences, winners
+from services.optimizer.analysis.robustness.preference_winners import drawn_preferences, winners
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
 from services.optimizer.jobs.columns import EvaluationColumns
 from sim.outcome import Status

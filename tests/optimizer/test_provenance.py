@@ -12,23 +12,23 @@ from typing import Any
 import pytest
 
 from services.optimizer.errors import ProvenanceChanged
-from services.optimizer.jobs.calibration import CalibrationSpec
-from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.jobs.misfit import root_mean_square
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.identification import IdentificationSpec
+from services.optimizer.jobs.kinds.misfit import root_mean_square
+from services.optimizer.jobs.kinds.problem import FunctionProblem
+from services.optimizer.jobs.kinds.race_case import RaceCase
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.optimizer_choice import optimizer_settings
 from services.optimizer.jobs.preference import Preference
-from services.optimizer.jobs.problem import FunctionProblem
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance, optimizer_files
-from services.optimizer.jobs.race_case import RaceCase
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
-from services.optimizer.jobs.tournament import TournamentSpec
-from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
 from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
@@ -276,6 +276,6 @@ def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)
     runs = (FunctionProblem, RaceCase, TuningWorlds)
     files = {Path(inspect.getfile(thing)) for thing in (*used, *runs)}
-    for room in (Path(inspect.getfile(thing)).parent for thing in (create_search, race)):
+    for room in (Path(inspect.getfile(thing)).parent for thing in (JobSpec, create_search, race)):
         files |= set(room.rglob("*.py"))
     assert files == set(optimizer_files())

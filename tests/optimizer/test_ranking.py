@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from services.optimizer.analysis.ranking import best_so_far, rank
 from services.optimizer.analysis.utilities import fitness_of, log_utilities, utilities
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES, Preference, judge
-from services.optimizer.jobs.tuning import JobSpec
 from sim.outcome import Status
 from tests.optimizer.columns import columns_of, fitness_only
 

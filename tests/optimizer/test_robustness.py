@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.robustness import LocalSample, local_sample, robustness
+from services.optimizer.analysis.robustness.index import LocalSample, local_sample, robustness
 from sim.variables import Variable
 
 X = Variable(name="x", low=0.0, high=10.0)

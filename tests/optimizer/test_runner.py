@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Command, Job, JobState
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.coordinator import Backoff
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.runner import Runner, Surroundings, run_claim

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.scenario_families import Family, scenario_families
+from services.optimizer.analysis.robustness.scenario_families import Family, scenario_families
 
 
 def utilities(*rows: tuple[float, ...]) -> np.ndarray:

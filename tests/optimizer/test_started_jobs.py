@@ -13,7 +13,7 @@ from gaitswarm.errors import InvalidRequest
 from gaitswarm.specs import chosen_spec
 from gaitswarm.tables import encoded_table
 from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store

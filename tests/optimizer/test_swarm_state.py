@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import create_optimizer
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.optimizer import Optimizer
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from services.optimizer.analysis.certificate import conditional_value_at_risk
+from services.optimizer.analysis.robustness.certificate import conditional_value_at_risk
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.documents import SPECS
 from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import PREFERENCES, log_utilities
-from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
 from services.optimizer.store.base import Store

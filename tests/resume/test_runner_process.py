@@ -14,7 +14,7 @@ import pytest
 from cli.exit_codes import ExitCode
 from gaitswarm.jobs.open import open_jobs
 from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import COMMAND_LINE, eventually, start_python

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.search.swarm.pso import PsoSettings
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.controllers.base import LookupTable

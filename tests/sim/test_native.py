@@ -94,7 +94,7 @@ def test_without_a_compiler_single_precision_is_refused_rather_than_computed_in_
     tmp_path: Path,
 ) -> None:
     done = run_python(
-        "from services.optimizer.jobs.tuning import JobSpec\n"
+        "from services.optimizer.jobs.kinds.tuning import JobSpec\n"
         "from sim.errors import SimulationInputError\n"
         "from sim.simulate import prepare\n"
         "for asked in (lambda: prepare(precision='single'),\n"

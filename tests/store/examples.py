@@ -9,7 +9,7 @@ import numpy as np
 
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome, Status
 

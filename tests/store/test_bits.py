@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome
 from tests.store.examples import LEASE, spec

@@ -7,7 +7,7 @@ from typing import Any
 
 from sqlalchemy import Table, select, update
 
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from services.optimizer.store.tables import jobs, recordings

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.identification import IdentificationSpec
+from services.optimizer.jobs.kinds.identification import IdentificationSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from sim.identification.recorded_walk import RecordedWalk

@@ -8,9 +8,9 @@ import pytest
 from sqlalchemy import text
 
 from services.optimizer.errors import IdempotencyConflict
-from services.optimizer.jobs import tuning
+from services.optimizer.jobs.kinds import tuning
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore
 from sim.scenario import Scenario, find_scenario

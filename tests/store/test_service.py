@@ -11,7 +11,7 @@ import pytest
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import Job, JobState, Progress, TimeLeft, time_left
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 from tests.examples.walks import SHORT_WALK

@@ -10,8 +10,8 @@ import pytest
 from sqlalchemy import Text, cast, select, text
 
 from services.optimizer.errors import Conflict, IdempotencyConflict, Unreadable
-from services.optimizer.jobs.identification import IdentificationSpec
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from services.optimizer.jobs.kinds.identification import IdentificationSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore

@@ -8,7 +8,7 @@ import numpy as np
 
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.service import JobService
 from sim.outcome import Outcome, Status
 from tests.tournament.problems import tournament

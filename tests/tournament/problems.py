@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.search.space import Axis, Space
 from services.optimizer.tournament.race import Evaluate, Search
 

@@ -7,16 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.tournament import (
+from services.optimizer.analysis.ranks import average_ranks, spearman
+from services.optimizer.analysis.tournaments.tournament import (
     Runs,
-    average_ranks,
     data_profile,
     expected_running_time,
     mean_ranks,
     rank_correlation,
     ranks,
     running_time_interval,
-    spearman,
 )
 
 NAN = math.nan

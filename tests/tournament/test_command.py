@@ -15,8 +15,8 @@ import pytest
 
 from cli.tournament.plan import PRESETS, Size, tournament_jobs
 from cli.tournament.runs import read_runs
+from services.optimizer.jobs.kinds.problem import TuningProblem
 from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.jobs.problem import TuningProblem
 from tests.examples.commands import Result, run_command
 from tests.examples.processes import COMMAND_LINE, output, python, start_python
 

@@ -7,8 +7,8 @@ import pytest
 from gaitswarm.requests.tournament import run_problem, run_standings, run_tournaments
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from services.optimizer.jobs.job import Command
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from tests.tournament.examples import entrant, submitted

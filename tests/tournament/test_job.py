@@ -15,8 +15,8 @@ import pytest
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.race_case import RaceCase
-from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.race_case import RaceCase
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
@@ -139,7 +139,7 @@ def test_a_worker_with_other_search_code_runs_nothing() -> None:
 def test_a_run_that_breaks_fails_the_job_with_its_reason(
     store: Store, evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from services.optimizer.jobs import race_case as module
+    from services.optimizer.jobs.kinds import race_case as module
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("the simplex is flat")

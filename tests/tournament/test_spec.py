@@ -11,9 +11,9 @@ from pydantic import ValidationError
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.problem import TuningProblem
+from services.optimizer.jobs.kinds.problem import TuningProblem
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import create_optimizer
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.tournament.rivals import RIVALS, Rival
 from tests.examples.walks import SHORT_WALK
 from tests.tournament.problems import tournament

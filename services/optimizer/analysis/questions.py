@@ -13,12 +13,12 @@ from services.optimizer.analysis.distribution import (
     distribution,
     iteration_starts,
 )
-from services.optimizer.analysis.history import PIECE, HistoryCache, read_columns
-from services.optimizer.analysis.identifiability import (
+from services.optimizer.analysis.fits.identifiability import (
     Identifiability,
     check_comparable,
     identifiability,
 )
+from services.optimizer.analysis.history import PIECE, HistoryCache, read_columns
 from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Reevaluation

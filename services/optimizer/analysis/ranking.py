@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.analysis.ranks import spearman
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import Preference
-from services.optimizer.jobs.tuning import JobSpec
-from services.optimizer.jobs.tuning_worlds import TuningWorlds
 
 Floats = NDArray[np.float64]
 
@@ -171,11 +173,8 @@ def rank_correlation(now: Floats, before: Floats) -> float | None:
     Returns:
         The correlation [1]; None where it is undefined.
     """
-    # It takes most of a second to import, and few questions need it.
-    from scipy.stats import spearmanr  # noqa: PLC0415
-
     both = np.isfinite(now) & np.isfinite(before)
-    pair = now[both], before[both]
-    if not len(pair[0]) or any(np.ptp(values) == 0.0 for values in pair):
+    if not both.any():
         return None
-    return float(spearmanr(*pair).statistic)
+    correlation = spearman(now[both], before[both])
+    return None if math.isnan(correlation) else correlation

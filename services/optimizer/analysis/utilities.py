@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.tuning import JobSpec
 
 Floats = NDArray[np.float64]
 

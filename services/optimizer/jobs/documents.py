@@ -6,11 +6,11 @@ from typing import Annotated, Any, Final
 
 from pydantic import Discriminator, Tag, TypeAdapter
 
-from services.optimizer.jobs.calibration import CalibrationSpec
-from services.optimizer.jobs.certificate import CertificateSpec
-from services.optimizer.jobs.identification import IdentificationSpec
-from services.optimizer.jobs.tournament import TournamentSpec
-from services.optimizer.jobs.tuning import JobSpec
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.identification import IdentificationSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"

@@ -13,12 +13,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import Spec, create_optimizer
-from services.optimizer.jobs.tournament import TournamentSpec
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.random_stream import RandomNumbers
 from sim.case import Case, LongCase, Walk
 from sim.outcome import Status

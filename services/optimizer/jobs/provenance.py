@@ -16,22 +16,16 @@ from sim.provenance import Provenance, provenance_of, source_digest, version_cha
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
 _JUDGING: Final = (
-    "jobs/calibration.py",
-    "jobs/certificate.py",
     "jobs/design_space.py",
-    "jobs/identification.py",
-    "jobs/misfit.py",
     "jobs/optimizer_choice.py",
     "jobs/preference.py",
-    "jobs/problem.py",
-    "jobs/race_case.py",
     "jobs/spec.py",
     "jobs/start.py",
-    "jobs/tournament.py",
-    "jobs/tuning.py",
-    "jobs/tuning_worlds.py",
 )
-"""Files that judge designs."""
+"""Files that judge designs of all kinds of jobs."""
+
+_ROOMS: Final = ("jobs/kinds", "search", "tournament")
+"""Folders in which every file judges designs or asks for them."""
 
 
 class JobProvenance(BaseModel):
@@ -160,8 +154,8 @@ def with_record(
 
 def optimizer_files() -> tuple[Path, ...]:
     """The source files that judge designs and ask for them, in order."""
-    rooms = [sorted((_OPTIMIZER / room).rglob("*.py")) for room in ("search", "tournament")]
-    return (*(_OPTIMIZER / name for name in _JUDGING), *rooms[0], *rooms[1])
+    rooms = (file for room in _ROOMS for file in sorted((_OPTIMIZER / room).rglob("*.py")))
+    return (*(_OPTIMIZER / name for name in _JUDGING), *rooms)
 
 
 @lru_cache(maxsize=1)

@@ -151,7 +151,7 @@ def _variables(document: dict[str, Any], text: str) -> list[Any]:
     """Names, and variables with bounds or choices of the user's own."""
     from cli.spec_file import parse_spec
     from services.optimizer.errors import InvalidRequest
-    from services.optimizer.jobs.calibration import CalibrationSpec
+    from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
     entries = _entries(text)
     if not any("=" in entry for entry in entries):

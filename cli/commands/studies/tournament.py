@@ -12,8 +12,8 @@ from cli.options import Json, WorkerOptions, with_groups
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from services.optimizer.analysis.standings import Standings
-    from services.optimizer.jobs.tournament import TournamentSpec
+    from services.optimizer.analysis.tournaments.standings import Standings
+    from services.optimizer.jobs.kinds.tournament import TournamentSpec
 
 Preset = Annotated[
     Literal["thesis", "robot"],
@@ -104,7 +104,7 @@ def tournament(
     from cli.tournament.report import write_report
     from cli.tournament.runs import read_runs, results_of, run_jobs, write_runs
     from gaitswarm.views.tournament import StandingsView
-    from services.optimizer.analysis.standings import standings_of
+    from services.optimizer.analysis.tournaments.standings import standings_of
     from services.optimizer.errors import InvalidRequest
 
     known = PRESETS[preset]

@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.tournament import spearman
+from services.optimizer.analysis.ranks import spearman
 from services.optimizer.errors import Conflict
-from services.optimizer.jobs.certificate import CertificateSpec
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.preference import HEIGHT_LOSS
 from sim.outcome import Status
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cli.commands.study_controllers import controllers
-from cli.commands.study_precision import precision
+from cli.commands.studies.study_controllers import controllers
+from cli.commands.studies.study_precision import precision
 from cli.options import Json, RobotOption
 
 if TYPE_CHECKING:

@@ -61,7 +61,7 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     from cli.design_file import read_design
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.errors import InvalidRequest
-    from services.optimizer.jobs.tuning import JobSpec
+    from services.optimizer.jobs.kinds.tuning import JobSpec
     from sim.catalogue import design_numbers
     from sim.controllers import CONTROLLERS
     from sim.studies.drives import drive_of_design, find_drive

@@ -19,8 +19,8 @@ from pydantic import (
     model_validator,
 )
 
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import judge_outcomes
-from services.optimizer.jobs.tuning import JobSpec
 from services.optimizer.search.space import Axis, Space
 from services.optimizer.tournament.functions import ACCEPTANCE, FUNCTIONS, draw
 from sim.case import run_together

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from cli.commands.robustness import Radius, Samples, Seed
+from cli.commands.designs.robustness import Radius, Samples, Seed
 from cli.options import Db, JobId, Json, Precision, Server
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def preferences(
     They are ranked anew under many preferences, from what is stored; of the winners the robustness
     index is estimated, by walks.
     """
-    from cli.commands.robustness import shown_progress
+    from cli.commands.designs.robustness import shown_progress
     from cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
     from gaitswarm.preferences import robust_preferences

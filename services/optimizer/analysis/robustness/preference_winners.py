@@ -12,11 +12,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.robustness import NORMALISED_OBJECTIVES
+from services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import PREFERENCES, Preference
-from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from services.optimizer.search.random_stream import swarm_uniform
 
 Floats = NDArray[np.float64]

@@ -11,8 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.analysis.ranks import average_ranks, spearman
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.tournament import TournamentSpec
+from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.search.random_stream import RandomNumbers
 
 Floats = NDArray[np.float64]
@@ -262,37 +263,6 @@ def rank_correlation(one: Results, other: Results, methods: Sequence[str]) -> In
 
     samples = np.array([correlation(ranks) for ranks in _resampled_ranks()])
     return _bounded(correlation(_Field.ranks), samples)
-
-
-def spearman(one: Floats, other: Floats) -> float:
-    """Spearman's rank correlation, ties sharing their mean rank.
-
-    Args:
-        one: (M,) values.
-        other: (M,) values of the same things.
-
-    Returns:
-        -1 to 1; NaN where one of the two is constant.
-    """
-    a, b = (average_ranks(values) for values in (one, other))
-    a, b = a - a.mean(), b - b.mean()
-    scale = math.sqrt(float((a * a).sum()) * float((b * b).sum()))
-    return float((a * b).sum()) / scale if scale > 0.0 else math.nan
-
-
-def average_ranks(values: Floats) -> Floats:
-    """Ranks from 1, the least; equal values share their mean rank.
-
-    Args:
-        values: (n,), +inf allowed.
-
-    Returns:
-        (n,).
-    """
-    ordered = np.sort(values)
-    first: Floats = np.searchsorted(ordered, values, "left").astype(np.float64)
-    last: Floats = np.searchsorted(ordered, values, "right").astype(np.float64)
-    return 0.5 * (first + last + 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

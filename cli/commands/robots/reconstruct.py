@@ -10,8 +10,8 @@ import typer
 from cli.options import WorkerOptions, with_groups
 
 if TYPE_CHECKING:
-    from services.optimizer.jobs.calibration import CalibrationSpec
     from services.optimizer.jobs.columns import EvaluationColumns
+    from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
 
 def register(app: typer.Typer) -> None:

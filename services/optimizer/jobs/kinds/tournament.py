@@ -20,10 +20,10 @@ from pydantic import (
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.kinds.problem import ProblemChoice, TuningProblem
+from services.optimizer.jobs.kinds.race_case import SEED, RaceCase, settings_of_run
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
-from services.optimizer.jobs.problem import ProblemChoice, TuningProblem
 from services.optimizer.jobs.provenance import optimizer_digest
-from services.optimizer.jobs.race_case import SEED, RaceCase, settings_of_run
 from services.optimizer.jobs.spec import Judgement, Spec, create_optimizer
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_search import RandomSearchSettings

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.commands.robustness import (
+from cli.commands.designs.robustness import (
     DesignController,
     Radius,
     Samples,

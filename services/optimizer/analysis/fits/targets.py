@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.calibration import CalibrationSpec
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation
+from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from sim.calibration.targets import Target
 from sim.outcome import Status
 

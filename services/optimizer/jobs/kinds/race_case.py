@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.problem import FunctionProblem, TuningProblem
+from services.optimizer.jobs.kinds.problem import FunctionProblem, TuningProblem
 from services.optimizer.jobs.provenance import optimizer_digest
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.tournament.methods import drawn_settings, search_of

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import (
     PREFERENCES,
     Preference,
@@ -20,7 +21,6 @@ from services.optimizer.jobs.preference import (
     judge,
 )
 from services.optimizer.jobs.spec import Judgement, Spec
-from services.optimizer.jobs.tuning_worlds import TuningWorlds
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError

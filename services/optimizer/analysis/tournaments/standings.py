@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from services.optimizer.analysis.tournament import (
+from services.optimizer.analysis.tournaments.tournament import (
     Floats,
     Interval,
     Results,

@@ -1,0 +1,1 @@
+"""Commands about jobs, and the processes that run them."""

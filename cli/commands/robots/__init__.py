@@ -1,0 +1,1 @@
+"""Commands that bring a robot's model nearer to measured walks and printed tables."""

@@ -1,0 +1,1 @@
+"""Commands that compare: drives, search methods, machines."""

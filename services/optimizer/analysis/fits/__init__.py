@@ -1,0 +1,1 @@
+"""How far fitted parameters can be trusted."""

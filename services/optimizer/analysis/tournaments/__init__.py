@@ -1,0 +1,1 @@
+"""Which search method is better, from the runs of tournaments."""

@@ -1,0 +1,1 @@
+"""Kinds of jobs: what each varies, runs and minimizes."""

@@ -18,6 +18,7 @@ from services.optimizer.jobs.preference import (
     figure_of_merit,
     judge,
     log_utilities,
+    objective_vectors,
 )
 from sim.outcome import Outcome, Status
 
@@ -119,6 +120,33 @@ def test_a_design_that_fails_in_one_scenario_is_worth_nothing() -> None:
     fitness, utilities = worth([good, bad], PREFERENCES["A"])
     assert math.isfinite(fitness[0]) and math.isinf(fitness[1])
     assert np.isfinite(utilities[:, 0]).all() and math.isinf(utilities[1, 1])
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "chapter-3"])
+def test_fitness_is_the_product_of_the_powers_of_an_objective_vector(name: PreferenceName) -> None:
+    preference = PREFERENCES[name]
+    rng = np.random.default_rng(1)
+    objectives = rng.uniform(0.01, 50.0, (4, 3, 6))
+    objectives[:, :, 5] -= 25.0
+    failed = np.zeros((4, 3), dtype=bool)
+    vectors = objective_vectors(objectives, failed, preference.bias)
+    assert (vectors ** np.array(preference.exponent)).prod(axis=1) == pytest.approx(
+        judge(objectives, failed, preference).fitness
+    )
+
+
+def test_without_biases_an_objective_vector_is_of_plain_geometric_means_in_their_units() -> None:
+    objectives = np.array([[(1.0, 2.0, 3.0, 4.0, 5.0, 0.0), (4.0, 8.0, 12.0, 0.0, 5.0, 0.0)]])
+    (vector,) = objective_vectors(objectives, np.zeros((1, 2), dtype=bool))
+    assert vector == pytest.approx([2.0, 4.0, 6.0, 0.0, 5.0])
+
+
+def test_a_design_that_fails_anywhere_is_infinite_in_every_objective() -> None:
+    objectives = np.ones((3, 2, 6))
+    objectives[1, 0, 2] = np.nan
+    vectors = objective_vectors(objectives, np.array([[False, True], [False, False], [False] * 2]))
+    assert np.isposinf(vectors).all(axis=1).tolist() == [True, True, False]
+    assert not np.isposinf(vectors[2]).any()
 
 
 def test_a_failure_beats_a_perfect_scenario() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -159,6 +160,45 @@ def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
         math.inf if math.inf in row else math.fsum(row) / len(row) for row in log_utility.tolist()
     ]
     return np.array([exponential(mean) for mean in means], dtype=np.float64)
+
+
+def objective_vectors(
+    objectives: NDArray[np.float64],
+    failed: NDArray[np.bool_],
+    bias: Sequence[float] = (0.0,) * 5,
+) -> NDArray[np.float64]:
+    """What each design comes to in each objective, over all scenarios: what a Pareto front weighs.
+
+    Objective m of a design is the geometric mean over scenarios of b_m + f_m. Under any preference
+    with these biases, fitness is the product of these numbers, each to the power of its exponent
+    (eq. 4.1, 4.2); so whatever the exponents, the best design is one that no other dominates.
+
+    Args:
+        objectives: (n, K, 6) raw objectives of n designs in K scenarios, f1..f6 of table 4.1, in
+            their units.
+        failed: (n, K), true where a walk has no utility.
+        bias: M = 5 or 6 biases b_m >= 0 in the units of f_m; by default none.
+
+    Returns:
+        (n, M), each in its objective's unit, minimized; a row is +inf throughout where any walk of
+        the design failed or lacks an objective.
+    """
+    count = len(bias)
+    factors = objectives[:, :, :count].copy()
+    factors[:, :, HEIGHT_LOSS:] = np.abs(factors[:, :, HEIGHT_LOSS:])
+    factors += np.asarray(bias, dtype=np.float64)
+    bad = np.logical_or(failed.any(axis=1), ~np.isfinite(factors).all(axis=(1, 2)))
+    logarithms = [
+        [[math.log(f) if f > 0.0 else -math.inf for f in scenario] for scenario in design]
+        for design in np.where(bad[:, None, None], 1.0, factors).tolist()
+    ]
+    means = [
+        [exponential(math.fsum(column) / len(column)) for column in zip(*design, strict=True)]
+        for design in logarithms
+    ]
+    result = np.array(means, dtype=np.float64).reshape(len(objectives), count)
+    result[bad] = math.inf
+    return result
 
 
 def _log_product(row: list[float], preference: Preference) -> float:

@@ -16,9 +16,9 @@ from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
 from api.middleware import (
     BodyLimitMiddleware,
     RequestIdMiddleware,
-    SameSiteMiddleware,
     SecurityHeadersMiddleware,
 )
+from api.origin import HostMiddleware, SameOriginMiddleware, names_of_server
 from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
 from api.routes import (
@@ -102,7 +102,9 @@ def create_app(
     app.add_middleware(
         GZipMiddleware, minimum_size=1024, compresslevel=6, exclude_content_types=_UNCOMPRESSED
     )
-    app.add_middleware(SameSiteMiddleware)
+    allowed = settings.api_allowed_hosts
+    app.add_middleware(SameOriginMiddleware, allowed=allowed)
+    app.add_middleware(HostMiddleware, names=names_of_server(settings.api_host, allowed))
     app.add_middleware(RequestIdMiddleware)
     # The outermost: an answer to a bug has the headers too.
     app.add_middleware(SecurityHeadersMiddleware)

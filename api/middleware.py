@@ -1,6 +1,6 @@
 """What happens to every request: an id, a limit on its body, an answer even to a bug.
 
-And what a browser may do with the answers, and whose pages may ask for more than to read.
+And what a browser may do with the answers.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ _log = logging.getLogger("gaitswarm.api")
 
 REQUEST_ID: Final = "X-Request-ID"
 _ACCEPTABLE_ID: Final = re.compile(r"^[A-Za-z0-9_.-]{1,128}$")
-
-_READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 _DRAINED: Final = 32
 """Refused bodies are read up to this many times the limit, so that the client sees the answer:
@@ -151,25 +149,3 @@ class SecurityHeadersMiddleware:
             await send(message)
 
         await self.app(scope, receive, send_guarded)
-
-
-class SameSiteMiddleware:
-    """Refuses what a page of another site would change: nobody is asked who they are, so a page
-    that its user merely looks at must not submit or cancel jobs.
-
-    By the header Sec-Fetch-Site, which browsers send and scripts cannot forge; other programs send
-    none.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One ASGI exchange."""
-        asking = Headers(scope=scope) if scope["type"] == "http" else Headers()
-        if asking.get("sec-fetch-site") == "cross-site" and scope["method"] not in _READING:
-            detail = "a page of another site may not do this; use the page of this server"
-            response = problem(scope["path"], 403, "cross-site", detail)
-            await response(scope, receive, send)
-            return
-        await self.app(scope, receive, send)

@@ -5,12 +5,13 @@
 | RequestValidationError, body is not JSON      | 400    | malformed-json        |
 | RequestValidationError, InvalidRequest,       | 422    | invalid-request       |
 | SimulationInputError                          |        |                       |
-| to change something from another site's page  | 403    | cross-site            |
+| to change something from another's page       | 403    | cross-origin          |
 | NotFound; no such route                       | 404    | not-found             |
 | Conflict, LeaseLost                           | 409    | conflict              |
 | IdempotencyConflict                           | 409    | idempotency-conflict  |
 | Unreadable                                    | 409    | unreadable            |
 | a body over the limit                         | 413    | body-too-large        |
+| a name of the server that is not its own      | 421    | unknown-host          |
 | StoreUnavailable, EvaluatorUnavailable,       | 503    | unavailable           |
 | SimulationError, too many simulations         |        |                       |
 | anything else                                 | 500    | internal-error        |
@@ -56,13 +57,14 @@ _MOST_ERRORS: Final = 20
 _TITLES: Final = {
     "malformed-json": "The body is not JSON",
     "invalid-request": "The request is not valid",
-    "cross-site": "The request comes from another site",
+    "cross-origin": "The request comes from another origin",
     "not-found": "There is no such thing",
     "method-not-allowed": "The method is not allowed here",
     "conflict": "The present state does not allow it",
     "idempotency-conflict": "The idempotency key was used for another request",
     "unreadable": "This version cannot read the job",
     "body-too-large": "The body is too large",
+    "unknown-host": "The server does not go by this name",
     "unavailable": "The service cannot do it now",
     "internal-error": "Something went wrong on the server",
 }

@@ -7,12 +7,20 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from services.optimizer.errors import InvalidRequest, StoreUnavailable
 from services.worker import EvaluatorKind
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
+
+
+HostName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+(:[0-9]{1,5})?$")]
+
+
+def _parts(value: object) -> object:
+    """Of a list with commas, as an environment has it."""
+    return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
 
 
 class Settings(BaseSettings):
@@ -55,6 +63,10 @@ class Settings(BaseSettings):
     api_host: str = Field(default="127.0.0.1", description="Address to listen on.")
     api_port: int = Field(
         default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one."
+    )
+    api_allowed_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
+        default=(),
+        description="Names, with or without port, that the server is reached by, beside its own.",
     )
     api_max_body_bytes: int = Field(
         default=1 << 20, ge=1, description="Largest request body that is read [B]."

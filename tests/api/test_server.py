@@ -73,11 +73,12 @@ def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobSe
 
     # The connection waits in the listening socket until the server runs.
     with socket.create_connection((host, int(port)), timeout=10.0) as connection:
-        connection.sendall(b"GET /v1/healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        connection.sendall(b"GET /v1/healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
         thread.start()
-        assert connection.recv(64).startswith(b"HTTP/1.1 200")
+        answer = connection.recv(64)
     server.stop()
     thread.join(timeout=10.0)
+    assert answer.startswith(b"HTTP/1.1 200")
     assert not thread.is_alive()
 
 

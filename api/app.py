@@ -11,6 +11,7 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 
+from api.access import AccessMiddleware
 from api.dependencies import lifespan
 from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
 from api.middleware import (
@@ -31,6 +32,7 @@ from api.routes import (
     history,
     identification,
     jobs,
+    session,
     simulations,
     tournaments,
 )
@@ -91,6 +93,7 @@ def create_app(
         tournaments,
         simulations,
         catalogue,
+        session,
         health,
     ):
         app.include_router(module.router)
@@ -101,6 +104,9 @@ def create_app(
     app.add_middleware(BodyLimitMiddleware, max_bytes=settings.api_max_body_bytes)
     app.add_middleware(
         GZipMiddleware, minimum_size=1024, compresslevel=6, exclude_content_types=_UNCOMPRESSED
+    )
+    app.add_middleware(
+        AccessMiddleware, tokens=lambda: service.store.tokens, required=settings.tokens_required
     )
     allowed = settings.api_allowed_hosts
     app.add_middleware(SameOriginMiddleware, allowed=allowed)

@@ -47,6 +47,7 @@ TAGS: Final[list[dict[str, str]]] = [
     {"name": "recordings", "description": "Measured walks, to which a robot is fitted."},
     {"name": "simulations", "description": "One design walking on request, outside any job."},
     {"name": "catalogue", "description": "What there is to choose from."},
+    {"name": "session", "description": "Who is asking, for browsers."},
     {"name": "health", "description": "For load balancers and container engines."},
 ]
 
@@ -55,6 +56,8 @@ ASSETS: Final = "/docs-assets"
 
 _MEANING: Final = {
     400: "The body is not JSON.",
+    401: "A token is asked for, or the one that was sent is not valid.",
+    403: "The token does not allow this, or a page of another origin asks for it.",
     404: "No such job, or nothing of that kind in it yet.",
     409: "The job's state does not allow it, or the idempotency key belongs to another request.",
     413: "The body is too large.",
@@ -66,6 +69,13 @@ _MEANING: Final = {
 _HEADERS: Final = (ReplayHeaderView, ParticlesHeaderView)
 """What is JSON inside binary answers, which FastAPI does not see."""
 
+_BEARER: Final = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "A token of this server, as `gaitswarm token create` makes them, needed wherever"
+    " the server listens beyond its own machine. Browsers send it as a cookie (`/v1/session`).",
+}
+
 _SCHEMAS: Final = "#/components/schemas/"
 
 _INLINE_SCRIPT: Final = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
@@ -73,11 +83,12 @@ _INLINE_SCRIPT: Final = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 Responses = dict[int | str, dict[str, Any]]
 
 
-def problems(*statuses: int) -> Responses:
+def problems(*statuses: int, asks: bool = True) -> Responses:
     """Document a route's problems.
 
     Args:
         statuses: its HTTP statuses of problems; 500 and 503 go without saying.
+        asks: whether the route asks for a token where the server does, which can be 401.
 
     Returns:
         The route's `responses`.
@@ -86,7 +97,7 @@ def problems(*statuses: int) -> Responses:
     content = {MEDIA_TYPE: {"schema": {"$ref": f"{_SCHEMAS}{ProblemView.__name__}"}}}
     return {
         status: {"description": _MEANING[status], "content": content}
-        for status in (*statuses, 500, 503)
+        for status in (*statuses, *((401,) if asks else ()), 500, 503)
     }
 
 
@@ -118,6 +129,9 @@ def add_documentation(app: FastAPI) -> None:
         known = document["components"]["schemas"] | _schemas(ProblemView)
         known = dict(sorted(known.items()))
         document["components"]["schemas"] = _schemas(*_HEADERS) | known
+        document["components"]["securitySchemes"] = {"token": _BEARER}
+        # Or none: a server that listens to its own machine alone asks for no token.
+        document["security"] = [{"token": []}, {}]
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]

@@ -5,6 +5,8 @@
 | RequestValidationError, body is not JSON      | 400    | malformed-json        |
 | RequestValidationError, InvalidRequest,       | 422    | invalid-request       |
 | SimulationInputError                          |        |                       |
+| Unauthorized                                  | 401    | unauthorized          |
+| Forbidden                                     | 403    | forbidden             |
 | to change something from another's page       | 403    | cross-origin          |
 | NotFound; no such route                       | 404    | not-found             |
 | Conflict, LeaseLost                           | 409    | conflict              |
@@ -33,12 +35,14 @@ from gaitswarm.views import FieldErrorView, ProblemView, field_errors
 from services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,
+    Forbidden,
     GaitswarmError,
     IdempotencyConflict,
     InvalidRequest,
     LeaseLost,
     NotFound,
     StoreUnavailable,
+    Unauthorized,
     Unreadable,
 )
 from sim.errors import SimulationError, SimulationInputError
@@ -57,6 +61,8 @@ _MOST_ERRORS: Final = 20
 _TITLES: Final = {
     "malformed-json": "The body is not JSON",
     "invalid-request": "The request is not valid",
+    "unauthorized": "The server does not know who is asking",
+    "forbidden": "Whoever asks may not do that",
     "cross-origin": "The request comes from another origin",
     "not-found": "There is no such thing",
     "method-not-allowed": "The method is not allowed here",
@@ -72,6 +78,8 @@ _TITLES: Final = {
 _KINDS: Final[tuple[tuple[type[Exception], HTTPStatus, str], ...]] = (
     (InvalidRequest, HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request"),
     (NotFound, HTTPStatus.NOT_FOUND, "not-found"),
+    (Unauthorized, HTTPStatus.UNAUTHORIZED, "unauthorized"),
+    (Forbidden, HTTPStatus.FORBIDDEN, "forbidden"),
     (IdempotencyConflict, HTTPStatus.CONFLICT, "idempotency-conflict"),
     (Unreadable, HTTPStatus.CONFLICT, "unreadable"),
     (Conflict, HTTPStatus.CONFLICT, "conflict"),
@@ -126,6 +134,20 @@ def problem(
     return Response(body, status, dict(headers or {}), media_type=MEDIA_TYPE)
 
 
+def unauthorized(request_path: str, detail: str) -> Response:
+    """Answer whoever has to say first who they are.
+
+    Args:
+        request_path: path that was asked for.
+        detail: what went wrong and what to do about it.
+
+    Returns:
+        The response, with the header that RFC 9110 asks for.
+    """
+    status, headers = HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"}
+    return problem(request_path, status, "unauthorized", detail, headers=headers)
+
+
 def internal_error(request_path: str, request_id: str) -> Response:
     """Answer a bug: nothing of the inside is shown, but how to report it is.
 
@@ -172,6 +194,8 @@ async def _on_domain_error(request: Request, error: Exception) -> Response:
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
         _log.error("%s %s: %s", request.method, request.url.path, detail)
         return problem(request.url.path, status, name, detail, headers=_RETRY)
+    if status == HTTPStatus.UNAUTHORIZED:
+        return unauthorized(request.url.path, detail)
     return problem(request.url.path, status, name, detail, errors=errors)
 
 

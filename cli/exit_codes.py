@@ -6,6 +6,7 @@
 3    no such job, iteration, database or result
 4    the job's present state does not allow it
 5    server, database, workers, compiler, files or standard output cannot be reached or used now
+6    the server does not let whoever asks do that; the message says which token it takes
 70   a bug; the traceback says where
 130  interrupted
 """
@@ -26,6 +27,7 @@ class ExitCode(IntEnum):
     NOT_FOUND = 3
     CONFLICT = 4
     UNAVAILABLE = 5
+    FORBIDDEN = 6
     BUG = 70
     INTERRUPTED = 130
 
@@ -66,6 +68,7 @@ def exit_code(error: BaseException) -> ExitCode | None:
         (errors.NotFound, ExitCode.NOT_FOUND),
         (errors.Conflict, ExitCode.CONFLICT),
         (errors.LeaseLost, ExitCode.CONFLICT),
+        (errors.Forbidden, ExitCode.FORBIDDEN),
         (errors.EvaluatorUnavailable, ExitCode.UNAVAILABLE),
         (errors.StoreUnavailable, ExitCode.UNAVAILABLE),
         (SimulationError, ExitCode.UNAVAILABLE),

@@ -33,6 +33,7 @@ from cli.commands.jobs import (
     optimize,
     rank,
     serve,
+    token,
 )
 from cli.commands.robots import calibrate, identify, reconstruct, synthesize, validate
 from cli.commands.studies import bench, study, tournament
@@ -72,7 +73,7 @@ app = typer.Typer(
     help="Find robust drive controllers for walking robots.",
     epilog="Exit codes: 0 done, 1 job failed or cancelled, or a check failed, 2 bad input, 3 not"
     " found, 4 not possible in the job's state, 5 server, database, workers or output unavailable,"
-    " 70 a bug, 130 interrupted.",
+    " 6 not allowed, 70 a bug, 130 interrupted.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     # Rich takes longer to import than all the rest of a help text takes.
@@ -85,6 +86,7 @@ for _module in (
     lifecycle,
     fork,
     history,
+    token,
     simulate,
     compare,
     study,

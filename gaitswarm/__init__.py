@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gaitswarm.errors import (
         Conflict,
         EvaluatorUnavailable,
+        Forbidden,
         GaitswarmError,
         IdempotencyConflict,
         Interrupted,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
         NotFound,
         ProvenanceChanged,
         StoreUnavailable,
+        Unauthorized,
         Unavailable,
         Unreadable,
     )
@@ -140,6 +142,7 @@ __all__ = [
     "EvaluationView",
     "EvaluatorUnavailable",
     "FirmwareView",
+    "Forbidden",
     "GaSettings",
     "GaitswarmError",
     "GlobalBfgsSettings",
@@ -197,6 +200,7 @@ __all__ = [
     "TournamentStandingsView",
     "TournamentView",
     "TuningWorlds",
+    "Unauthorized",
     "Unavailable",
     "Unreadable",
     "Variable",
@@ -219,9 +223,9 @@ __all__ = [
 
 _MODULES: Final = {
     "gaitswarm.errors": (
-        "Conflict", "EvaluatorUnavailable", "GaitswarmError", "IdempotencyConflict", "Interrupted",
-        "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged",
-        "StoreUnavailable", "Unavailable", "Unreadable",
+        "Conflict", "EvaluatorUnavailable", "Forbidden", "GaitswarmError", "IdempotencyConflict",
+        "Interrupted", "InvalidRequest", "JobEnded", "LeaseLost", "NotFound", "ProvenanceChanged",
+        "StoreUnavailable", "Unauthorized", "Unavailable", "Unreadable",
     ),
     "gaitswarm.evidence.verify": ("verify",),
     "gaitswarm.firmware": ("write_firmware",),

@@ -7,6 +7,8 @@ GaitswarmError              everything that gaitswarm raises on purpose
 │   ├── ProvenanceChanged   its numbers would depend on something else than those it has
 │   ├── Unreadable          this version cannot read what is stored of the job; it stays as it is
 │   └── IdempotencyConflict the key was used before for another job
+├── Forbidden               the server does not let whoever asks do that
+│   └── Unauthorized        it asks for a token, or the one that was sent is not valid
 ├── JobEnded                the job that was waited for did not succeed; `job` says why
 ├── LeaseLost               another process, or a cancellation, has taken the job
 └── Unavailable             not possible now, whatever was asked; try again later
@@ -26,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 from services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,
+    Forbidden,
     GaitswarmError,
     IdempotencyConflict,
     InvalidRequest,
@@ -33,6 +36,7 @@ from services.optimizer.errors import (
     NotFound,
     ProvenanceChanged,
     StoreUnavailable,
+    Unauthorized,
     Unavailable,
     Unreadable,
 )
@@ -113,6 +117,7 @@ def simulation_errors(field: str) -> Iterator[None]:
 __all__ = [
     "Conflict",
     "EvaluatorUnavailable",
+    "Forbidden",
     "GaitswarmError",
     "IdempotencyConflict",
     "Interrupted",
@@ -122,6 +127,7 @@ __all__ = [
     "NotFound",
     "ProvenanceChanged",
     "StoreUnavailable",
+    "Unauthorized",
     "Unavailable",
     "Unreadable",
     "invalid_request",

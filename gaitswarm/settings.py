@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -37,6 +38,9 @@ class Settings(BaseSettings):
     server: str | None = Field(
         default=None, description="URL of a server that commands about jobs are sent to."
     )
+    token: str | None = Field(
+        default=None, description="Token that is sent to servers.", repr=False
+    )
     db: str | None = Field(
         default=None,
         description="Database of the jobs: a file name, sqlite:///FILE or"
@@ -63,6 +67,11 @@ class Settings(BaseSettings):
     api_host: str = Field(default="127.0.0.1", description="Address to listen on.")
     api_port: int = Field(
         default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one."
+    )
+    api_access: Literal["auto", "token"] = Field(
+        default="auto",
+        description="Whether requests need a token: always, or where the server listens beyond its"
+        " own machine.",
     )
     api_allowed_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=(),
@@ -94,6 +103,11 @@ class Settings(BaseSettings):
     api_shutdown_seconds: int = Field(
         default=5, ge=1, le=600, description="How long open requests may finish on shutdown [s]."
     )
+
+    @property
+    def tokens_required(self) -> bool:
+        """Whether the server answers only those who send a token."""
+        return self.api_access == "token" or not _is_loopback(self.api_host)
 
     @property
     def database(self) -> str:
@@ -144,6 +158,15 @@ def default_database() -> Path:
         raise StoreUnavailable(
             "there is no home directory to keep a database in; name one with --db or GAITSWARM_DB"
         ) from error
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _source(field: str, given: dict[str, Any]) -> str:

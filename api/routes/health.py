@@ -24,14 +24,19 @@ class HealthView(View):
 
 
 @router.get(
-    "/healthz", operation_id="healthz", summary="Is the server alive?", responses=problems()
+    "/healthz",
+    operation_id="healthz",
+    summary="Is the server alive?",
+    responses=problems(asks=False),
 )
 async def healthz() -> HealthView:
     """Answers as long as the process does; asks nothing else."""
     return HealthView()
 
 
-@router.get("/readyz", operation_id="readyz", summary="Can it work?", responses=problems())
+@router.get(
+    "/readyz", operation_id="readyz", summary="Can it work?", responses=problems(asks=False)
+)
 def readyz(service: Service, request: Request) -> HealthView:
     """Answers ok if the database does and has this version's schema, and a runner that was started
     with the server still claims jobs; else 503.

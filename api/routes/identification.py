@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Response, status
+from fastapi import APIRouter, Depends, Path, Query, Response, status
 
+from api.access import may_submit
 from api.dependencies import ExistingJob, JobIdText, Service
 from api.documentation import problems
 from gaitswarm.views import PREFIX
@@ -21,7 +22,8 @@ router = APIRouter(prefix=PREFIX)
     operation_id="add_recording",
     summary="Keep a recorded walk",
     status_code=status.HTTP_201_CREATED,
-    responses=problems(400, 413, 422),
+    dependencies=[Depends(may_submit)],
+    responses=problems(400, 403, 413, 422),
 )
 def add_recording(walk: RecordedWalk, service: Service, response: Response) -> RecordingView:
     """Motor currents of a measured walk, for jobs of kind `identification`.

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
+from api.access import Owner, may_command
 from api.dependencies import JobId, JobIdText, Service, Slots
 from api.documentation import problems
 from gaitswarm.views import (
@@ -59,13 +60,14 @@ async def request_document(request: Request) -> Any:
             "model": JobView,
             "description": "The key was used before for the same job: this is that job.",
         },
-        **problems(400, 409, 413, 422),
+        **problems(400, 403, 409, 413, 422),
     },
 )
 def submit_job(
     spec: AnySpec,
     service: Service,
     response: Response,
+    owner: Owner,
     sent: Annotated[Any, Depends(request_document)],
     idempotency_key: IdempotencyKey = None,
 ) -> JobView:
@@ -75,7 +77,7 @@ def submit_job(
     `Idempotency-Key` used before, the same body answers 200 with the job that it made, even if
     presets have changed since; a body that asks for another job answers 409.
     """
-    job, new = service.submit(spec, idempotency_key=idempotency_key, request=sent)
+    job, new = service.submit(spec, idempotency_key=idempotency_key, request=sent, owner=owner)
     if not new:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
@@ -93,7 +95,7 @@ def submit_job(
             "model": JobView,
             "description": "The key was used before for the same fork: this is that job.",
         },
-        **problems(400, 404, 409, 413, 422),
+        **problems(400, 403, 404, 409, 413, 422),
     },
 )
 def fork_job(
@@ -101,6 +103,7 @@ def fork_job(
     job_id: JobId,
     service: Service,
     response: Response,
+    owner: Owner,
     sent: Annotated[Any, Depends(request_document)],
     idempotency_key: IdempotencyKey = None,
 ) -> JobView:
@@ -112,7 +115,9 @@ def fork_job(
     fork's `lineage` says which, and why. 409 if the search cannot be taken over, or what its
     numbers depend on has changed and that is not accepted.
     """
-    job, new = service.fork(job_id, request, idempotency_key=idempotency_key, sent=sent)
+    job, new = service.fork(
+        job_id, request, idempotency_key=idempotency_key, sent=sent, owner=owner
+    )
     if not new:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
@@ -178,9 +183,10 @@ def get_job(job_id: JobId, service: Service) -> JobView:
 @router.post(
     "/jobs/{job_id}/pause",
     operation_id="pause_job",
+    dependencies=[Depends(may_command)],
     summary="Pause a job",
     status_code=status.HTTP_202_ACCEPTED,
-    responses=problems(404, 409, 422),
+    responses=problems(403, 404, 409, 422),
 )
 def pause_job(job_id: JobId, service: Service) -> JobView:
     """A running job ends and commits the iteration under way first (`pausing`), then is `paused`.
@@ -193,9 +199,10 @@ def pause_job(job_id: JobId, service: Service) -> JobView:
 @router.post(
     "/jobs/{job_id}/resume",
     operation_id="resume_job",
+    dependencies=[Depends(may_command)],
     summary="Resume a job",
     status_code=status.HTTP_202_ACCEPTED,
-    responses=problems(400, 404, 409, 413, 422),
+    responses=problems(400, 403, 404, 409, 413, 422),
 )
 def resume_job(
     job_id: JobId, service: Service, resumption: Annotated[ResumeRequest | None, Body()] = None
@@ -214,9 +221,10 @@ def resume_job(
 @router.post(
     "/jobs/{job_id}/extend",
     operation_id="extend_job",
+    dependencies=[Depends(may_command)],
     summary="Give a job another budget",
     status_code=status.HTTP_202_ACCEPTED,
-    responses=problems(400, 404, 409, 413, 422),
+    responses=problems(400, 403, 404, 409, 413, 422),
 )
 def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> JobView:
     """A job that has succeeded is queued again and goes on from its last iteration; any other goes
@@ -233,8 +241,9 @@ def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> 
 @router.post(
     "/jobs/{job_id}/cancel",
     operation_id="cancel_job",
+    dependencies=[Depends(may_command)],
     summary="Cancel a job",
-    responses=problems(404, 409, 422),
+    responses=problems(403, 404, 409, 422),
 )
 def cancel_job(job_id: JobId, service: Service) -> JobView:
     """End a job for good. What it has committed stays; the iteration under way is dropped.

@@ -17,11 +17,13 @@ from pydantic import ValidationError
 
 from gaitswarm.errors import (
     Conflict,
+    Forbidden,
     GaitswarmError,
     IdempotencyConflict,
     InvalidRequest,
     NotFound,
     StoreUnavailable,
+    Unauthorized,
     Unreadable,
 )
 from gaitswarm.jobs.call import Call
@@ -42,6 +44,8 @@ _TRANSIENT: Final = (httpx2.NetworkError, httpx2.ConnectTimeout, httpx2.RemotePr
 """The connection was not made, or broke."""
 
 _ERRORS: Final[Mapping[int, type[GaitswarmError]]] = {
+    HTTPStatus.UNAUTHORIZED: Unauthorized,
+    HTTPStatus.FORBIDDEN: Forbidden,
     HTTPStatus.NOT_FOUND: NotFound,
     HTTPStatus.CONFLICT: Conflict,
 }

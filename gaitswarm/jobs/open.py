@@ -78,6 +78,7 @@ def connect(
     timeout: float | None = None,
     backoff: Backoff | None = None,
     headers: Mapping[str, str] | None = None,
+    token: str | None = None,
 ) -> ServerJobs:
     """Reach the jobs of a server, such as `gaitswarm serve`.
 
@@ -87,6 +88,8 @@ def connect(
         backoff: How long to wait before which of the further attempts, where a connection breaks
             or the server is busy, and the request may safely be repeated.
         headers: Sent with every request, such as what a proxy asks for.
+        token: Of the server, where it asks for one. Default: that of the environment
+            (GAITSWARM_TOKEN).
 
     Returns:
         The server's jobs, as a context manager.
@@ -97,7 +100,8 @@ def connect(
     from gaitswarm.jobs.attempts import BACKOFF
     from gaitswarm.jobs.server import TIMEOUT, ServerJobs
 
-    return ServerJobs(url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=headers)
+    sent = _with_token(headers, token)
+    return ServerJobs(url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=sent)
 
 
 def connect_async(
@@ -106,6 +110,7 @@ def connect_async(
     timeout: float | None = None,
     backoff: Backoff | None = None,
     headers: Mapping[str, str] | None = None,
+    token: str | None = None,
 ) -> AsyncServerJobs:
     """Reach the jobs of a server, for a program with an event loop.
 
@@ -114,6 +119,8 @@ def connect_async(
         timeout: Longest silence of the server [s]; default 30.
         backoff: As for `connect`.
         headers: Sent with every request.
+        token: Of the server, where it asks for one. Default: that of the environment
+            (GAITSWARM_TOKEN).
 
     Returns:
         The server's jobs, as an asynchronous context manager.
@@ -125,8 +132,9 @@ def connect_async(
     from gaitswarm.jobs.attempts import BACKOFF
     from gaitswarm.jobs.server import TIMEOUT
 
+    sent = _with_token(headers, token)
     return AsyncServerJobs(
-        url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=headers
+        url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=sent
     )
 
 
@@ -180,6 +188,17 @@ def open_jobs(server: str | None, db: str | None, *, create: bool = False) -> Jo
         # Somebody waits in front of a terminal.
         return connect(settings.server, backoff=Backoff(first=0.25, longest=5.0, attempts=2))
     return open(db or None, create=create)
+
+
+def _with_token(headers: Mapping[str, str] | None, token: str | None) -> dict[str, str]:
+    """Headers with a token, unless they have an Authorization of their own."""
+    from gaitswarm.settings import read_settings
+
+    sent = dict(headers or {})
+    secret = token or read_settings().token
+    if secret and not any(name.lower() == "authorization" for name in sent):
+        sent["Authorization"] = f"Bearer {secret}"
+    return sent
 
 
 def _sqlite_file(url: str) -> Path | None:

@@ -161,6 +161,11 @@ class JobSummaryView(View):
         description="Of a job that was forked from another one: from which, and what it took over;"
         " null for any other. Forks of a job are listed by `/v1/jobs?parent=`.",
     )
+    owner: str | None = Field(
+        default=None,
+        description="Name of the token that it was submitted with; null for none.",
+        examples=["ci"],
+    )
     created_at: datetime = Field(description="When it was submitted, UTC.")
     updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
@@ -358,6 +363,7 @@ def _summary(job: Job) -> dict[str, object]:
         "simulations_per_second": rates.simulations_per_second,
         "eta_seconds": rates.eta_seconds,
         "lineage": job.lineage,
+        "owner": job.owner,
         "created_at": job.created_at,
         "updated_at": job.updated_at,
         "started_at": job.started_at,

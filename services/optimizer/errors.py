@@ -8,6 +8,8 @@ GaitswarmError
 │   ├── ProvenanceChanged   its numbers would depend on something else than those it has
 │   ├── IdempotencyConflict the key was used before with another body
 │   └── Unreadable          this version cannot read what is stored; it stays as it is
+├── Forbidden               not for whoever asks (HTTP 403)
+│   └── Unauthorized        the server knows nobody of that token, or asks for one (HTTP 401)
 ├── LeaseLost               another runner, or a cancellation, has taken the job
 └── Unavailable             not possible now, whatever was asked; try again later (HTTP 503)
     ├── EvaluatorUnavailable    the workers cannot be reached
@@ -54,6 +56,14 @@ class IdempotencyConflict(Conflict):
 
 class Unreadable(Conflict):
     """This version cannot read what is stored: it was written by another one, or damaged."""
+
+
+class Forbidden(GaitswarmError):
+    """Whoever asks may not do that."""
+
+
+class Unauthorized(Forbidden):
+    """The token is unknown or was revoked, or there is none where one is needed."""
 
 
 class LeaseLost(GaitswarmError):

@@ -45,7 +45,12 @@ class JobService(Questions):
         object.__setattr__(self, "_rates", MeasuredRates())
 
     def submit(
-        self, spec: Spec, *, idempotency_key: str | None = None, request: Any = None
+        self,
+        spec: Spec,
+        *,
+        idempotency_key: str | None = None,
+        request: Any = None,
+        owner: str | None = None,
     ) -> tuple[Job, bool]:
         """Check that the job can be simulated and queue it.
 
@@ -56,6 +61,7 @@ class JobService(Questions):
             idempotency_key: A key by which a repeated request is recognized.
             request: The JSON document that asked for the job, as it was sent; None: the fields
                 that were given to the spec.
+            owner: Name of the token that the request came with, if any.
 
         Returns:
             The job, and whether it is new.
@@ -73,6 +79,7 @@ class JobService(Questions):
             provenance=self.provenance(spec),
             idempotency_key=idempotency_key,
             request=request,
+            owner=owner,
         )
 
     def fork(
@@ -82,6 +89,7 @@ class JobService(Questions):
         *,
         idempotency_key: str | None = None,
         sent: Any = None,
+        owner: str | None = None,
     ) -> tuple[Job, bool]:
         """Queue a job that begins with iterations of another one.
 
@@ -91,6 +99,7 @@ class JobService(Questions):
             idempotency_key: a key by which a repeated request is recognized.
             sent: the JSON document that asked for the fork, as it was sent; None: the fields that
                 were given to the request.
+            owner: name of the token that the request came with, if any.
 
         Returns:
             The fork, whose `lineage` says what it took over, and whether it is new.
@@ -122,6 +131,7 @@ class JobService(Questions):
             idempotency_key=idempotency_key,
             request={"fork": job_id, "request": sent},
             fork=fork,
+            owner=owner,
         )
 
     def submit_embedded(self, spec: Spec) -> Claim:

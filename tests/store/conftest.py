@@ -53,7 +53,7 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     database = connect(parse_url(url))
     with database.transaction(write=True) as connection:
         connection.execute(
-            text("TRUNCATE jobs, iterations, evaluations, reevaluations, recordings")
+            text("TRUNCATE jobs, iterations, evaluations, reevaluations, recordings, tokens")
         )
     database.close()
     return url

@@ -7,6 +7,8 @@ import icon from './icon.svg'
 import { JobsPage } from './jobs/page'
 import { usePlace } from './router/navigation'
 import { type Route, routeOf } from './router/routes'
+import { useUnauthorized } from './session/session'
+import { SignIn } from './session/sign-in'
 import { toggleTheme, useTheme } from './theme'
 
 const NewJobPage = lazyPage('the form', () => import('./submission/page'))
@@ -35,6 +37,7 @@ const TITLES: Readonly<Record<Route['page'], string>> = {
 export function App() {
   const place = usePlace()
   const route = routeOf(place.path)
+  const unauthorized = useUnauthorized()
   const identity = 'id' in route ? `${route.page} ${route.id}` : route.page
   return (
     <>
@@ -60,7 +63,13 @@ export function App() {
         </nav>
         <ThemeToggle />
       </header>
-      <Main key={identity} route={route} />
+      {unauthorized ? (
+        <main id="main">
+          <SignIn />
+        </main>
+      ) : (
+        <Main key={identity} route={route} />
+      )}
     </>
   )
 }

@@ -79,6 +79,8 @@ def serve(
             if not is_built():
                 note("there is no page, only the API: in a checkout, `make page` builds the page")
             note(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
+            if settings.tokens_required:
+                _tell_of_tokens(opened.service.store.tokens.create_first(), server.url)
             starting.close()
             server.run()
 
@@ -113,6 +115,20 @@ def runner(options: RunnerOptions) -> None:
         log.info("ready: %d slots, %d jobs at once", slots, settings.concurrent_jobs)
         stop.wait()
         log.info("stopping: jobs under way go back to the queue")
+
+
+def _tell_of_tokens(secret: str | None, url: str) -> None:
+    from cli.output import note
+
+    if secret is None:
+        note("requests need a token: `gaitswarm token create NAME` makes one")
+        return
+    note(
+        "requests need a token; this one, `first`, may do everything, and is shown only now:\n"
+        f"  {secret}\n"
+        f"  the page with it: {url}/#token={secret}\n"
+        "`gaitswarm token create NAME` makes more, and `gaitswarm token revoke first` ends this one"
+    )
 
 
 @contextmanager

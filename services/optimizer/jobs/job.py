@@ -182,6 +182,7 @@ class Job:
         accepts_changes: whether its user has said that it may go on although that has changed;
             until it is claimed.
         lineage: where it comes from, if it was forked from another job.
+        owner: name of the token that it was submitted with, if any.
         submitted_iterations: budget that it was submitted with.
     """
 
@@ -197,6 +198,7 @@ class Job:
     provenance: ProvenanceRecords = ()
     accepts_changes: bool = False
     lineage: Lineage | None = None
+    owner: str | None = None
     submitted_iterations: int = 0
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from services.optimizer.access import Tokens
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
@@ -21,6 +22,10 @@ class Store(CommittedHistory, Protocol):
     LeaseLost, and change nothing, if the claim's token is no longer the job's.
     """
 
+    @property
+    def tokens(self) -> Tokens:
+        """Of those who ask over the network."""
+
     def create_job(
         self,
         spec: Spec,
@@ -29,6 +34,7 @@ class Store(CommittedHistory, Protocol):
         idempotency_key: str | None = None,
         request: Any = None,
         fork: Fork | None = None,
+        owner: str | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job of the resolved spec, or find the one that the same key made before.
 
@@ -41,6 +47,7 @@ class Store(CommittedHistory, Protocol):
                 that were given to the spec.
             fork: How the job is forked from another one. What it takes over is copied, so that it
                 stays when its parent goes; None for a job of its own.
+            owner: Name of the token that it comes with, if any.
 
         Returns:
             The job, and whether it is new.

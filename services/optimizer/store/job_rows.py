@@ -68,6 +68,7 @@ def to_job(row: Row) -> Job:
         provenance=provenance,
         accepts_changes=bool(row["accepts_changes"]),
         lineage=lineage,
+        owner=row["owner"],
         submitted_iterations=submitted_iterations,
     )
 

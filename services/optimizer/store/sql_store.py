@@ -65,6 +65,7 @@ from services.optimizer.store.records import (
 )
 from services.optimizer.store.submissions import Submission, insert_job, repeated_job
 from services.optimizer.store.tables import jobs
+from services.optimizer.store.tokens import SqlTokens
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _LONGEST_KEY: Final = 200
@@ -102,6 +103,7 @@ class SqlStore(SqlHistory):
     def __init__(self, database: Database, *, clock: Clock = database_time) -> None:
         super().__init__(database)
         self._clock = clock
+        self.tokens = SqlTokens(database, clock)
 
     # jobs, as their users see them
 
@@ -113,6 +115,7 @@ class SqlStore(SqlHistory):
         idempotency_key: str | None = None,
         request: Any = None,
         fork: Fork | None = None,
+        owner: str | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job, or find the one that the same key made before."""
         _check_key(idempotency_key)
@@ -120,7 +123,8 @@ class SqlStore(SqlHistory):
         if idempotency_key is not None:
             sent = spec.model_dump(mode="json", exclude_unset=True) if request is None else request
             digest = request_digest(sent)
-        asked = Submission(spec.resolved(), idempotency_key, digest, first_record(provenance), fork)
+        records = first_record(provenance)
+        asked = Submission(spec.resolved(), idempotency_key, digest, records, fork, owner)
         try:
             with self._database.transaction(write=True) as connection:
                 earlier = repeated_job(connection, asked)

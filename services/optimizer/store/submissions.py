@@ -40,6 +40,7 @@ class Submission:
         digest: Of the request, as `request_digest` has it; None without a key.
         provenance: What its numbers are to depend on; empty where its first claim says that.
         fork: How it is forked from another job; None for a job of its own.
+        owner: Name of the token that it comes with, if any.
     """
 
     spec: Spec
@@ -47,6 +48,7 @@ class Submission:
     digest: str | None = None
     provenance: ProvenanceRecords = ()
     fork: Fork | None = None
+    owner: str | None = None
 
     @property
     def lineage(self) -> Lineage | None:
@@ -107,6 +109,7 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
         "provenance": provenance_document(asked.provenance),
         "parent_id": None if asked.lineage is None else asked.lineage.parent,
         "lineage": lineage_document(asked.lineage),
+        "owner": asked.owner,
         "idempotency_key": asked.key,
         "request_digest": asked.digest,
         "created_at": now,

@@ -171,6 +171,8 @@ jobs: Final = Table(
     # Of a fork; no foreign key, for a fork outlives its parent. `Lineage` is the rest of it.
     Column("parent_id", Text),
     Column("lineage", Document(none_as_null=True)),
+    # Name of the token that it was submitted with; NULL for none.
+    Column("owner", Text),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),
@@ -244,4 +246,17 @@ recordings: Final = Table(
     Column("document", Document, nullable=False),
     Column("created_at", UtcDateTime, nullable=False),
     PrimaryKeyConstraint("id"),
+)
+
+tokens: Final = Table(
+    "tokens",
+    metadata,
+    Column("name", Text, nullable=False),
+    Column("scope", Text, nullable=False),
+    # Of the secret, which is stored nowhere.
+    Column("digest", Text, nullable=False),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("revoked_at", UtcDateTime),
+    PrimaryKeyConstraint("name"),
+    UniqueConstraint("digest"),
 )

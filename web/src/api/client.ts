@@ -114,6 +114,19 @@ async function send(target: string, init: RequestInit): Promise<Response> {
     if (error instanceof DOMException && error.name === 'AbortError') throw error
     throw new ApiProblem(0, 'the server cannot be reached; is `gaitswarm serve` still running?')
   }
-  if (!response.ok) throw await problemOf(response)
+  if (!response.ok) {
+    // A token that is refused by the sign-in form is the form's to tell.
+    if (response.status === 401 && target !== SESSION) for (const tell of unauthorized) tell()
+    throw await problemOf(response)
+  }
   return response
+}
+
+const SESSION = '/v1/session'
+const unauthorized = new Set<() => void>()
+
+/** Call back whenever the server asks for a token; returns what ends that. */
+export function onUnauthorized(tell: () => void): () => void {
+  unauthorized.add(tell)
+  return () => unauthorized.delete(tell)
 }

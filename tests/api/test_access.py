@@ -1,0 +1,203 @@
+"""Who is asking: tokens where they are needed, what their scopes allow, and browsers' cookies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi.routing import APIRoute
+
+import gaitswarm
+from api.access import COOKIE, may_command, may_submit
+from gaitswarm.settings import Settings
+from services.optimizer.access import Scope
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Serve
+from tests.examples.servers import Server
+
+Bearer = Callable[[Scope], dict[str, str]]
+
+QUESTIONS = {
+    *("rank_designs", "controller_surface", "estimate_job", "simulate", "estimate_robustness"),
+    *("replay", "begin_session", "end_session"),
+}
+"""Operations that are no GET, and yet change nothing that is stored."""
+
+
+@pytest.fixture
+def guarded(serve: Serve) -> httpx2.Client:
+    """A client of a server that asks for tokens."""
+    return serve(api_access="token").client
+
+
+@pytest.fixture
+def bearer(store: SqlStore) -> Bearer:
+    """Make a token named as its scope; its header."""
+
+    def make(scope: Scope) -> dict[str, str]:
+        return {"Authorization": f"Bearer {store.tokens.create(scope.value, scope)[1]}"}
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("host", "required"),
+    [
+        ("127.0.0.1", False),
+        ("127.8.0.1", False),
+        ("::1", False),
+        ("localhost", False),
+        ("0.0.0.0", True),  # noqa: S104
+        ("::", True),
+        ("192.0.2.7", True),
+        ("gait.example", True),
+    ],
+)
+def test_tokens_are_needed_beyond_the_machine_itself(host: str, *, required: bool) -> None:
+    assert Settings(api_host=host).tokens_required is required
+    assert Settings(api_host=host, api_access="token").tokens_required
+
+
+def test_without_a_token_nothing_is_told(guarded: httpx2.Client, job: Job) -> None:
+    for path in ("/v1/jobs", f"/v1/jobs/{job.id}", f"/v1/jobs/{job.id}/events", "/v1/robots"):
+        answer = guarded.get(path)
+        assert answer.status_code == 401, path
+        assert answer.headers["WWW-Authenticate"] == "Bearer"
+        assert answer.json()["type"] == "urn:gaitswarm:problem:unauthorized"
+        assert "GAITSWARM_TOKEN" in answer.json()["detail"]
+    assert guarded.post(f"/v1/jobs/{job.id}/cancel").status_code == 401
+
+
+@pytest.mark.parametrize("path", ["/v1/healthz", "/v1/readyz", "/healthz", "/docs", "/v1/session"])
+def test_probes_and_the_documentation_need_no_token(guarded: httpx2.Client, path: str) -> None:
+    assert guarded.get(path, follow_redirects=True).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/v1//jobs", "//v1/jobs", "/v1/healthz/../jobs", "/V1/jobs"])
+def test_no_spelling_of_a_path_goes_round_the_token(guarded: httpx2.Client, path: str) -> None:
+    request = httpx2.Request("GET", str(guarded.base_url).rstrip("/") + path)
+    assert guarded.send(request).status_code in (401, 404)
+
+
+def test_a_wrong_token_is_refused_even_where_none_is_needed(serve: Serve) -> None:
+    answer = serve().client.get("/v1/jobs", headers={"Authorization": "Bearer gaitswarm_guessed"})
+    assert answer.status_code == 401
+    assert "unknown or was revoked" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("value", ["Bearer", "Bearer x y", "Bearer \xff", "Basic Zm9vOmJhcg=="])
+def test_a_header_that_holds_no_token_opens_nothing(guarded: httpx2.Client, value: str) -> None:
+    headers = {b"Authorization": value.encode("latin-1")}
+    assert guarded.get("/v1/jobs", headers=headers).status_code == 401
+
+
+def test_a_token_to_read_reads_and_asks_but_submits_nothing(
+    guarded: httpx2.Client, bearer: Bearer, job: Job, spec: JobSpec
+) -> None:
+    guarded.headers.update(bearer(Scope.READ))
+    assert guarded.get(f"/v1/jobs/{job.id}").status_code == 200
+    document = spec.model_dump(mode="json")
+    assert guarded.post("/v1/estimates", json=document).status_code == 200
+    refused = guarded.post("/v1/jobs", json=document)
+    assert refused.status_code == 403
+    assert refused.json()["type"] == "urn:gaitswarm:problem:forbidden"
+    assert "`submit`" in refused.json()["detail"]
+    assert guarded.post(f"/v1/jobs/{job.id}/pause").status_code == 403
+    assert guarded.get(f"/v1/jobs/{job.id}").json()["state"] == "queued"
+
+
+def test_a_token_to_submit_commands_its_own_jobs_and_no_others(
+    guarded: httpx2.Client, bearer: Bearer, job: Job, spec: JobSpec
+) -> None:
+    guarded.headers.update(bearer(Scope.SUBMIT))
+    own = guarded.post("/v1/jobs", json=spec.model_dump(mode="json")).json()
+    assert own["owner"] == "submit"
+    assert guarded.post(f"/v1/jobs/{own['id']}/pause").status_code == 202
+    refused = guarded.post(f"/v1/jobs/{job.id}/pause")
+    assert refused.status_code == 403
+    assert "nobody's" in refused.json()["detail"]
+
+
+def test_a_token_of_all_rights_commands_every_job(
+    guarded: httpx2.Client, bearer: Bearer, store: SqlStore, spec: JobSpec
+) -> None:
+    job, _ = store.create_job(spec, owner="somebody")
+    answer = guarded.post(f"/v1/jobs/{job.id}/cancel", headers=bearer(Scope.ADMIN))
+    assert answer.status_code == 200
+
+
+def test_a_job_that_nobody_may_see_is_not_told_from_one_that_is_not_there(
+    guarded: httpx2.Client, job: Job
+) -> None:
+    there, gone = (guarded.post(f"/v1/jobs/{name}/cancel") for name in (job.id, "nosuchjob123"))
+    assert there.status_code == gone.status_code == 401
+
+
+def test_every_operation_that_changes_something_asks_who_may(serve: Serve) -> None:
+    server: Server = serve()
+    for route in server.app.routes:
+        if not isinstance(route, APIRoute) or not (route.methods or set()) - {"GET", "HEAD"}:
+            continue
+        asked = {dependency.call for dependency in route.dependant.dependencies}
+        assert bool(asked & {may_submit, may_command}) is (route.operation_id not in QUESTIONS), (
+            route.operation_id
+        )
+
+
+def test_a_revoked_token_is_refused_within_seconds(
+    guarded: httpx2.Client, bearer: Bearer, store: SqlStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("api.access.REMEMBERED_SECONDS", 0.0)
+    headers = bearer(Scope.READ)
+    assert guarded.get("/v1/jobs", headers=headers).status_code == 200
+    store.tokens.revoke("read")
+    assert guarded.get("/v1/jobs", headers=headers).status_code == 401
+
+
+def test_a_browser_asks_with_a_cookie_that_no_script_reads(
+    guarded: httpx2.Client, bearer: Bearer
+) -> None:
+    secret = bearer(Scope.READ)["Authorization"].removeprefix("Bearer ")
+    begun = guarded.post("/v1/session", json={"token": secret})
+    assert begun.json() == {"required": True, "name": "read", "scope": "read"}
+    cookie = begun.headers["Set-Cookie"].lower()
+    assert cookie.startswith(f"{COOKIE}={secret}".lower())
+    assert "httponly" in cookie and "samesite=strict" in cookie
+    assert guarded.get("/v1/jobs").status_code == 200
+    guarded.delete("/v1/session")
+    assert guarded.get("/v1/jobs").status_code == 401
+
+
+def test_a_session_begins_with_a_valid_token_only(guarded: httpx2.Client) -> None:
+    answer = guarded.post("/v1/session", json={"token": "guessed"})
+    assert answer.status_code == 401
+    assert "Set-Cookie" not in answer.headers
+    assert guarded.get("/v1/session").json() == {"required": True, "name": None, "scope": None}
+
+
+def test_a_program_sends_the_token_of_its_environment(
+    guarded: httpx2.Client, bearer: Bearer, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url = str(guarded.base_url)
+    with gaitswarm.connect(url) as jobs, pytest.raises(gaitswarm.Unauthorized, match="token"):
+        jobs.job(job.id)
+    secret = bearer(Scope.READ)["Authorization"].removeprefix("Bearer ")
+    with gaitswarm.connect(url, token=secret) as jobs:
+        assert jobs.job(job.id).id == job.id
+        with pytest.raises(gaitswarm.Forbidden, match="may not command"):
+            jobs.cancel(job.id)
+    monkeypatch.setenv("GAITSWARM_TOKEN", secret)
+    with gaitswarm.connect(url) as jobs:
+        assert jobs.job(job.id).id == job.id
+
+
+def test_the_document_says_that_a_token_may_be_needed(client: httpx2.Client) -> None:
+    document: dict[str, Any] = client.get("/openapi.json").json()
+    assert document["components"]["securitySchemes"]["token"]["scheme"] == "bearer"
+    assert document["security"] == [{"token": []}, {}]
+    assert "401" in document["paths"]["/v1/jobs"]["get"]["responses"]
+    assert "401" not in document["paths"]["/v1/healthz"]["get"]["responses"]

@@ -1,0 +1,53 @@
+"""Tokens on the command line, and a server that asks for them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.exit_codes import ExitCode
+from tests.cli.conftest import Gaitswarm
+from tests.examples.processes import COMMAND_LINE, line_with, start_python
+
+
+def test_a_token_is_made_listed_and_revoked(gaitswarm: Gaitswarm, db: Path) -> None:
+    made = gaitswarm("token", "create", "ci", "--scope", "read", "--db", db)
+    assert made.code == ExitCode.OK
+    assert made.out.startswith("gaitswarm_") and "shown only now" in made.err
+
+    (listed,) = gaitswarm("token", "list", "--db", db, "--json").json
+    assert (listed["name"], listed["scope"], listed["revoked_at"]) == ("ci", "read", None)
+    assert made.out.strip() not in json.dumps(listed)
+
+    assert gaitswarm("token", "revoke", "ci", "--db", db).code == ExitCode.OK
+    assert "revoked" in gaitswarm("token", "list", "--db", db).out
+
+
+def test_what_cannot_be_made_or_revoked_is_named(gaitswarm: Gaitswarm, db: Path) -> None:
+    gaitswarm("token", "create", "ci", "--db", db)
+    again = gaitswarm("token", "create", "ci", "--db", db)
+    assert again.code == ExitCode.BAD_INPUT and "'ci' already" in again.err
+    unknown = gaitswarm("token", "revoke", "nobody", "--db", db)
+    assert unknown.code == ExitCode.NOT_FOUND and "'nobody'" in unknown.err
+
+
+def test_beyond_this_machine_the_first_start_prints_a_token(
+    gaitswarm: Gaitswarm, db: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = ("--db", str(db), "--host", "0.0.0.0", "--port", "0", "--no-runner")  # noqa: S104
+    process = start_python(*COMMAND_LINE, "serve", *options, stdout=None)
+    try:
+        port = line_with(process.stderr, r"serves http://0\.0\.0\.0:(\d+) and")[1]
+        secret = line_with(process.stderr, r"^\s*(gaitswarm_\S+)$")[1]
+        server = f"http://127.0.0.1:{port}"
+        refused = gaitswarm("list", "--server", server)
+        assert refused.code == ExitCode.FORBIDDEN and "GAITSWARM_TOKEN" in refused.err
+        monkeypatch.setenv("GAITSWARM_TOKEN", secret)
+        allowed = gaitswarm("list", "--server", server, "--json")
+        assert allowed.code == ExitCode.OK, allowed.err
+        assert allowed.json == []
+    finally:
+        process.terminate()
+        process.communicate(timeout=30.0)

@@ -1,0 +1,63 @@
+"""A server that asks for a token: the form, and the link that `gaitswarm serve` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from services.optimizer.access import Scope
+from services.runtime import open_store
+from tests.examples.servers import ServerProcess
+from tests.web.visit import Visit
+
+REFUSED = r"401 \(Unauthorized\)"
+
+
+@pytest.fixture
+def secret(tmp_path: Path) -> str:
+    """Of a token in the database of `start_server`."""
+    store = open_store(str(tmp_path / "jobs.db"))
+    try:
+        return store.tokens.create("reader", Scope.READ)[1]
+    finally:
+        store.close()
+
+
+@pytest.fixture
+def guarded(
+    secret: str,
+    start_server: Callable[..., ServerProcess],
+    monkeypatch: pytest.MonkeyPatch,
+) -> ServerProcess:
+    monkeypatch.setenv("GAITSWARM_API_ACCESS", "token")
+    return start_server("--no-runner")
+
+
+def test_the_page_asks_for_a_token_and_goes_on_with_it(
+    guarded: ServerProcess, secret: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(guarded.url, allowed=REFUSED).go("/jobs")
+    expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+    page.get_by_label("Token").fill("guessed")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_role("alert")).to_contain_text("unknown or was revoked")
+    page.get_by_label("Token").fill(f" {secret} ")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_role("heading", name="Sign in")).to_be_hidden()
+    expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+    page.reload()
+    expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+
+
+def test_the_link_of_the_first_start_signs_in_and_leaves_no_trace(
+    guarded: ServerProcess, secret: str, visit: Callable[..., Visit]
+) -> None:
+    visited = visit(guarded.url)
+    page = visited.go(f"/#token={secret}")
+    expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+    assert secret not in page.url
+    assert not [url for url in visited.requested if secret in url]
+    assert secret not in page.evaluate("document.cookie")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.run.evaluator import Evaluator
@@ -84,6 +87,27 @@ def test_more_worlds_walk_only_what_no_job_has_walked(store: Store, evaluator: E
     longer = store.job(run(store, evaluator, small(worlds=9, preference="C", name="other")))
     assert longer.progress.evaluations == 10
     assert longer.progress.evaluations_saved == 6
+
+
+def test_a_fork_goes_on_with_the_same_worlds_and_another_preference(
+    store: Store, evaluator: Evaluator
+) -> None:
+    parent, service = run(store, evaluator, small()), JobService(store)
+    forked, _ = service.fork(parent, ForkRequest(from_iteration=2, preference="B"))
+    assert forked.lineage is not None and forked.lineage.carried == "search"
+    assert run_embedded(store, evaluator, forked.id).state is JobState.SUCCEEDED
+    whole = run(store, evaluator, small(preference="B"))
+    assert history(store, forked.id) == history(store, whole)
+
+
+@pytest.mark.parametrize("given", [{"scenarios": ("normal-slow",)}, {"robot": "szabadka2"}])
+def test_worlds_are_no_start_so_it_is_not_forked_into_other_walks(
+    store: Store, evaluator: Evaluator, given: dict[str, Any]
+) -> None:
+    parent = run(store, evaluator, small())
+    with pytest.raises(InvalidRequest, match="submit a new job in place of a fork"):
+        JobService(store).fork(parent, ForkRequest(from_iteration=2, **given))
+    assert [job.id for job in store.jobs().items] == [parent]
 
 
 def test_a_search_in_single_precision_walks_the_same_worlds(

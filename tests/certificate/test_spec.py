@@ -59,6 +59,25 @@ def test_iterations_follow_from_worlds_and_worlds_from_iterations() -> None:
     assert default.with_budget(40).worlds == 40 * 50 - 1
 
 
+@pytest.mark.parametrize("given", [{"worlds": 11.0}, {"worlds": "11"}, {"iterations": "3"}])
+def test_counts_that_are_written_otherwise_are_counts_too(given: dict[str, Any]) -> None:
+    document = {key: value for key, value in DOCUMENT.items() if key != "worlds"}
+    spec = SPECS.validate_python(document | given)
+    assert isinstance(spec, CertificateSpec)
+    assert (spec.worlds, spec.iterations) == (11, 3)
+    # What is stored of it can be read again.
+    assert SPECS.validate_json(spec.resolved().model_dump_json()) == spec.resolved()
+
+
+def test_a_single_iteration_of_the_nominal_world_becomes_the_least_certificate() -> None:
+    document = {key: value for key, value in DOCUMENT.items() if key != "worlds"}
+    spec = SPECS.validate_python(
+        document | {"iterations": 1, "optimizer": {"name": "random", "particles": 1}}
+    )
+    assert isinstance(spec, CertificateSpec)
+    assert (spec.worlds, spec.iterations) == (1, 2)
+
+
 def test_the_nominal_world_is_brought_into_ranges_that_leave_it_out() -> None:
     spec = small(variables=[{"name": "friction_factor", "low": 0.2, "high": 0.4}])
     assert asked(spec)[0][0].tolist() == [0.4]

@@ -14,9 +14,12 @@ from sqlalchemy import text
 
 from services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, NotFound
 from services.optimizer.jobs.job import Command, JobState
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.search.registry import OPTIMIZERS
 from services.optimizer.store import migrate
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.certificate.examples import small
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_job_states import in_state
 
@@ -44,6 +47,24 @@ def test_a_refused_extension_changes_nothing(store: SqlStore) -> None:
     with pytest.raises(NotFound):
         store.extend("bcdfghjkmnpq", 40)
     assert (store.job(cancelled), store.job(succeeded)) == before
+
+
+@pytest.mark.parametrize(
+    ("asked", "iterations", "words"),
+    [
+        (small(), 30_000, "worlds: Input should be less than or equal to 100000"),
+        (spec().model_copy(update={"optimizer": OPTIMIZERS["pso-ps"]}), 20_000, "is replayed"),
+    ],
+    ids=["certificate", "replayed"],
+)
+def test_no_job_gets_a_budget_that_it_could_not_be_submitted_with(
+    store: SqlStore, asked: Spec, iterations: int, words: str
+) -> None:
+    job, _ = store.create_job(asked)
+    with pytest.raises(InvalidRequest, match=words) as refused:
+        store.extend(job.id, iterations)
+    assert refused.value.field == "iterations"
+    assert store.job(job.id) == job
 
 
 def test_a_runner_under_an_older_budget_is_told_before_anything_is_stored(

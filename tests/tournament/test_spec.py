@@ -93,6 +93,13 @@ def test_noise_of_a_function_belongs_to_the_run_and_the_evaluation() -> None:
     assert values(1, 0) != values(2, 0)
 
 
+def test_a_budget_that_is_written_otherwise_has_checkpoints_too() -> None:
+    document = {k: v for k, v in tournament().model_dump().items() if k != "checkpoints"}
+    for budget in (625.0, "625"):
+        spec = SPECS.validate_python(document | {"evaluations": budget})
+        assert spec == SPECS.validate_python(document | {"evaluations": 625})
+
+
 def test_fitness_is_the_mean_of_the_best_of_all_problems() -> None:
     spec = tournament(checkpoints=[20, 40])
     # best_20, best_40, evaluations_to_best, evaluations_to_target

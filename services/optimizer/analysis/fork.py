@@ -4,8 +4,8 @@ what is different        outcomes hold   search                        the fork 
 nothing but the budget   yes             goes on where it was          the parent's iterations
 the preference           yes             the same, its memory judged   the parent's iterations,
                                          anew, if its method can       judged anew
-anything else            no, but for     a new one                     the best designs
-                         the optimizer
+anything else            no, but for     a new one                     the best designs, if
+                         the optimizer                                 it searches for any
 
 Where the search cannot be taken over under another preference, the fork begins with the best
 designs, too, as judged by that preference.
@@ -25,7 +25,7 @@ from services.optimizer.analysis.search_path import retraced
 from services.optimizer.analysis.start import best_designs
 from services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.documents import AnySpec, checked_spec
 from services.optimizer.jobs.fork import (
     Fork,
     ForkRequest,
@@ -161,7 +161,7 @@ def forked(
             _check_unchanged(parent, taken, provenance(spec))
             update = {"evaluations": len(fitness), "budgets": budgets_of(parent.job)}
             return spec, Fork(lineage.model_copy(update=update), taken)
-    return _started(parent, spec, fitness, request), Fork(
+    return _started(parent, spec, fitness, request, reason), Fork(
         lineage.model_copy(update={"carried": "designs", "reason": reason})
     )
 
@@ -228,8 +228,15 @@ def _check_unchanged(parent: Parent, taken: TakenHistory, now: JobProvenance) ->
         )
 
 
-def _started(parent: Parent, spec: AnySpec, fitness: Floats, request: ForkRequest) -> AnySpec:
+def _started(
+    parent: Parent, spec: AnySpec, fitness: Floats, request: ForkRequest, reason: str
+) -> AnySpec:
     """The spec that starts from the parent's best designs. Raises InvalidRequest, Conflict."""
+    if not spec.searches:
+        raise InvalidRequest(
+            f"{reason}, and a job of the kind {spec.kind} draws its designs, so that the best of"
+            " another one are no start; submit a new job in place of a fork"
+        )
     columns = replace(parent.columns, fitness=fitness)
     searched = tuple(variable.name for variable in spec.design_space().variables)
     count = min(request.start_count, spec.budget)
@@ -239,9 +246,7 @@ def _started(parent: Parent, spec: AnySpec, fitness: Floats, request: ForkReques
             f"job {parent.job.id} has no design in these iterations that has not failed, so there"
             " is nothing that a fork could start from"
         )
-    started = spec.model_copy(update={"start": designs})
     try:
-        started.start_positions()
-    except ValueError as error:
+        return checked_spec(spec, {"start": designs})
+    except InvalidRequest as error:
         raise InvalidRequest(f"of the parent's best designs: {error}") from error
-    return started

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
-from pydantic import Discriminator, Tag, TypeAdapter
+from pydantic import Discriminator, Tag, TypeAdapter, ValidationError
 
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.kinds.identification import IdentificationSpec
@@ -43,3 +45,42 @@ SPECS: Final[
     TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | TournamentSpec | CertificateSpec]
 ] = TypeAdapter(AnySpec)
 """Reads a document with a spec of any kind; raises ValidationError for what is none."""
+
+
+def checked_spec(spec: AnySpec, changes: Mapping[str, Any]) -> AnySpec:
+    """A spec with other values of some fields, so that what is stored of it can be read again.
+
+    Args:
+        spec: A valid one.
+        changes: Values by field.
+
+    Returns:
+        The spec with these values.
+
+    Raises:
+        InvalidRequest: They make no sense; names the field.
+    """
+    try:
+        return SPECS.validate_python({**spec.model_dump(), **changes})
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = [str(part) for part in first["loc"] if not str(part).startswith("<")]
+        message = first["msg"].removeprefix("Value error, ")
+        raise InvalidRequest(message, field=".".join(where)) from error
+
+
+def check_budget(spec: AnySpec, iterations: int) -> None:
+    """Check that a job can have another budget, as if it had been submitted with it.
+
+    Args:
+        spec: Of the job.
+        iterations: Of the budget, in all.
+
+    Raises:
+        InvalidRequest: It cannot; its field is `iterations`.
+    """
+    try:
+        checked_spec(spec.with_budget(iterations), {})
+    except InvalidRequest as error:
+        text = str(error).removeprefix("iterations: ")
+        raise InvalidRequest(text, field="iterations") from error

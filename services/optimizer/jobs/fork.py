@@ -7,10 +7,10 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.documents import AnySpec, checked_spec
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.jobs.preference import PreferenceChoice
 from services.optimizer.jobs.provenance import ProvenanceRecords
@@ -169,13 +169,7 @@ def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:
     for name in changes:
         if name not in type(parent).model_fields:
             raise InvalidRequest(f"a job of the kind {parent.kind} has none", field=name)
-    try:
-        return SPECS.validate_python(parent.model_dump() | changes).resolved()
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = [str(part) for part in first["loc"] if not str(part).startswith("<")]
-        message = first["msg"].removeprefix("Value error, ")
-        raise InvalidRequest(message, field=".".join(where)) from error
+    return checked_spec(parent, changes).resolved()
 
 
 def changed_fields(parent: AnySpec, fork: AnySpec) -> tuple[str, ...]:

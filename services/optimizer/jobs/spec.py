@@ -105,6 +105,10 @@ class Spec(BaseModel):
     """Fields on which no outcome of a given design depends. None: outcomes depend on more than
     what is simulated, and are not looked for elsewhere."""
 
+    searches: ClassVar[bool] = True
+    """Whether designs are searched for, so that the best ones of another job are a start. Else they
+    are drawn, and what is said of them holds for draws alone."""
+
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
     name: str = Field(default="", max_length=200, description="For people; need not be unique.")
     robot: RobotSource = Field(

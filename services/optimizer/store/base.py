@@ -154,7 +154,8 @@ class Store(CommittedHistory, Protocol):
 
         Raises:
             Conflict: The job was cancelled.
-            InvalidRequest: The budget is spent already, or beyond reason.
+            InvalidRequest: The budget is spent already, or a job of this kind and method cannot
+                have it.
             Unreadable: The job's spec cannot be read.
         """
 

@@ -11,6 +11,7 @@ from sqlalchemy import select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import InvalidRequest, Unreadable
+from services.optimizer.jobs.documents import check_budget
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, commanded, extended
@@ -221,7 +222,9 @@ class SqlStore(SqlHistory):
             row = job_row(connection, job_id, lock=True)
             require_readable(row)
             state = JobState(row["state"])
-            after = extended(state, to_job(row).spent, iterations)
+            job = to_job(row)
+            after = extended(state, job.spent, iterations)
+            check_budget(job.spec, iterations)
             # Whoever runs the job notices when it commits; until then nothing changes for it.
             changes = entering(after, self._clock(connection)) if after is not state else {}
             return to_job(update_job(connection, row, changes | {"budget": iterations}))

@@ -48,6 +48,7 @@ _MIRRORED: Final = ("turn-left-fast", "downhill-fast")
 """The held-out scenarios that come first: the turn and the slope of table 4.2, the other way."""
 
 _OPTIMIZER: Final[TypeAdapter[Any]] = TypeAdapter(OptimizerChoice)
+_COUNT: Final[TypeAdapter[int | None]] = TypeAdapter(int | None)
 
 
 def certificate_scenarios(tuned: Sequence[Scenario] = SCENARIOS) -> tuple[Scenario, ...]:
@@ -88,6 +89,8 @@ class CertificateSpec(Spec):
     )
 
     unwalked = (Spec.unwalked or frozenset()) | {"preference", "worlds"}
+
+    searches = False
 
     kind: Literal["certificate"] = Field(description="Put one design to the test in many worlds.")
     controller: ControllerName = Field(
@@ -133,14 +136,18 @@ class CertificateSpec(Spec):
         try:
             default = cls.model_fields["optimizer"].default
             batch = _OPTIMIZER.validate_python(document.get("optimizer", default)).particles
+            # Read as the fields read them: 1000.0 and "1000" are counts, too.
+            worlds = _COUNT.validate_python(document.get("worlds"))
+            iterations = _COUNT.validate_python(document.get("iterations"))
         except ValidationError:
             return document
-        worlds, iterations = document.get("worlds"), document.get("iterations")
-        if worlds is None and isinstance(iterations, int) and iterations > 0:
-            return {**document, "worlds": max(1, iterations * batch - 1)}
-        if worlds is None:
+        if iterations is not None and iterations < 1:
+            return document
+        if worlds is None and iterations is not None:
+            worlds, iterations = max(1, iterations * batch - 1), None
+        elif worlds is None:
             worlds = cls.model_fields["worlds"].default
-        if not isinstance(worlds, int) or worlds < 1:
+        if worlds < 1:
             return document
         needed = math.ceil((worlds + 1) / batch)
         if iterations not in (None, needed):
@@ -148,7 +155,7 @@ class CertificateSpec(Spec):
                 f"iterations: follow from worlds; {worlds} in batches of {batch} are {needed}"
                 " with the nominal one; leave them out"
             )
-        return {**document, "iterations": needed}
+        return {**document, "worlds": worlds, "iterations": needed}
 
     @model_validator(mode="after")
     def _can_be_run(self) -> Self:

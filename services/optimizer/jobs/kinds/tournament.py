@@ -15,6 +15,8 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
+    TypeAdapter,
+    ValidationError,
     model_validator,
 )
 
@@ -46,6 +48,8 @@ Floats = NDArray[np.float64]
 
 MOST_EVALUATIONS: Final = 100_000
 """Of one run."""
+
+_COUNT: Final = TypeAdapter(int)
 
 
 def _method_settings(choice: object) -> object:
@@ -109,6 +113,8 @@ class TournamentSpec(Spec):
     # A run depends on the code of searches, too.
     unwalked = None
 
+    searches = False
+
     kind: Literal["tournament"] = Field(description="Run a search method many times.")
     method: MethodChoice = Field(
         description="Search method and its settings, of the registry or of another library."
@@ -138,8 +144,13 @@ class TournamentSpec(Spec):
     def _write_out_checkpoints(cls, document: Any) -> Any:
         if not isinstance(document, dict) or document.get("checkpoints"):
             return document
-        budget = document.get("evaluations", cls.model_fields["evaluations"].default)
-        if not isinstance(budget, int) or not 1 <= budget <= MOST_EVALUATIONS:
+        try:
+            default = cls.model_fields["evaluations"].default
+            # Read as the field reads it: 625.0 is a count, too.
+            budget = _COUNT.validate_python(document.get("evaluations", default))
+        except ValidationError:
+            return document
+        if not 1 <= budget <= MOST_EVALUATIONS:
             return document
         return {**document, "checkpoints": default_checkpoints(budget)}
 

@@ -107,11 +107,14 @@ def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> d
 
 
 def _range(entry: str) -> tuple[str, dict[str, str]]:
+    """Name and variable of NAME=LOW:HIGH, of the perturbation's kind. Raises InvalidRequest."""
     name, value = _pair(entry, "range", "NAME=LOW:HIGH")
     low, colon, high = value.partition(":")
     if not colon:
         raise InvalidRequest(f"{entry!r} is not NAME=LOW:HIGH", field="range")
-    return name, {"name": name, "low": low, "high": high}
+    kinds = {variable.name: variable.kind for variable in PERTURBATIONS}
+    kind = kinds.get(name, "continuous")
+    return name, {"name": name, "low": low, "high": high, "kind": kind}
 
 
 def _pair(entry: str, option: str, form: str) -> tuple[str, str]:

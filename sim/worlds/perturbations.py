@@ -221,6 +221,9 @@ LIMITS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 """Least and largest value of each that can be simulated: others' bounds must lie within."""
 
 
+_WHOLE: Final = frozenset(v.name for v in PERTURBATIONS if v.kind == "integer")
+
+
 def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
     """Refuse worlds that cannot be simulated.
 
@@ -230,7 +233,7 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
 
     Raises:
         SimulationInputError: There is no such perturbation, or a value lies beyond what can be
-            simulated; names it.
+            simulated or is not whole where it must be; names it.
     """
     for name in variables:
         if name not in LIMITS:
@@ -246,6 +249,12 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
             world = int(np.argmax(outside))
             raise SimulationInputError(
                 f"{name}: {column[world]:g} in world {world}; it must lie in {low:g} to {high:g}"
+            )
+        broken = column != np.rint(column)
+        if name in _WHOLE and broken.any():
+            world = int(np.argmax(broken))
+            raise SimulationInputError(
+                f"{name}: {column[world]:g} in world {world} is no whole number"
             )
 
 

@@ -119,14 +119,17 @@ def test_the_best_of_a_job_is_certified_with_its_robot_and_preference(files: Pat
 
 def test_ranges_and_held_values_are_the_users_to_choose(files: Path) -> None:
     result = certify(
-        files, "--worlds", 6, "--range", "friction_factor=0.2:0.3", "--set", "slope_added=4",
-        "--most", 6, "--json",
+        files, "--worlds", 6, "--range", "friction_factor=0.2:0.3", "--range", "angle_delay=1:3",
+        "--set", "slope_added=4", "--most", 6, "--json",
     )  # fmt: skip
     assert result.code == 0, result.err
     for world in result.json["worst"]:
         assert 0.2 <= world["values"]["friction_factor"] <= 0.3
         assert world["values"]["slope_added"] == 4.0
-        assert set(world["values"]) == {"friction_factor", "efficiency_factor", "slope_added"}
+        assert world["values"]["angle_delay"] in (1.0, 2.0, 3.0)
+        assert set(world["values"]) == {
+            "friction_factor", "efficiency_factor", "angle_delay", "slope_added",
+        }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -139,6 +142,11 @@ def test_ranges_and_held_values_are_the_users_to_choose(files: Path) -> None:
         (("published:A", "--range", "friction_factor=1"), 2, "range: 'friction_factor=1' is not"),
         (("published:A", "--range", "hat=0:1"), 2, "variables: unknown variable 'hat'"),
         (("published:A", "--set", "slope_added=steep"), 2, "fixed: slope_added"),
+        (
+            ("published:A", "--set", "angle_delay=1.4"),
+            2,
+            "fixed: angle_delay: 1.4 in world 0 is no",
+        ),
         (("published:A", "--scenarios", "moon"), 2, "scenarios.0: unknown scenario 'moon'"),
         (("published:A", "--log", "walk.npz"), 2, "log: goes with --replay"),
         (("published:A", "--preference", "D"), 2, "preference: "),

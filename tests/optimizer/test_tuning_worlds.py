@@ -135,6 +135,14 @@ def test_one_nominal_world_is_the_model(store: Store, evaluator: Evaluator) -> N
     assert bits[0] == bits[1]
 
 
+def test_a_perturbation_of_whole_numbers_stays_one_within_bounds_of_ones_own() -> None:
+    spec = robust(count=100, ranges=[{"name": "angle_delay", "low": 1, "high": 2}]).resolved()
+    assert spec.worlds is not None
+    drawn = [dict(world)["angle_delay"] for world in spec.worlds.drawn()]
+    assert set(drawn) == {1.0, 2.0}
+    assert SPECS.validate_json(spec.model_dump_json()) == spec
+
+
 def test_worlds_are_all_perturbations_by_default_and_stored_with_their_bounds() -> None:
     spec = robust(ranges=None).resolved()
     assert spec.worlds is not None and spec.worlds.ranges == PERTURBATIONS
@@ -147,6 +155,14 @@ def test_worlds_are_all_perturbations_by_default_and_stored_with_their_bounds() 
     [
         ({"ranges": ["gravity"]}, "ranges: no perturbation 'gravity'; known are"),
         ({"ranges": ["friction_factor", "friction_factor"]}, "'friction_factor' is named twice"),
+        (
+            {"ranges": [{"name": "angle_delay", "low": 0.5, "high": 1.5}]},
+            "bounds of the integer variable angle_delay must be integers",
+        ),
+        (
+            {"ranges": [{"name": "friction_factor", "kind": "integer", "low": 1, "high": 2}]},
+            "friction_factor is continuous, not integer",
+        ),
         ({"aggregate": "median"}, "Input should be 'mean', 'quantile', 'worst' or 'cvar'"),
         ({"level": 1.0}, "less than 1"),
         ({"count": 0}, "greater than or equal to 1"),

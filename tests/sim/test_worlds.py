@@ -206,6 +206,7 @@ def test_a_gait_out_of_reach_is_so_in_every_world() -> None:
         ({"body_mass_factor": 0.0}, "body_mass_factor"),
         ({"load_added": math.nan}, "load_added"),
         ({"angle_delay": 16.0}, "angle_delay"),
+        ({"angle_delay": 1.4}, "angle_delay"),
         ({"moon": 1.0}, "moon"),
     ],
 )

@@ -9,7 +9,7 @@ from typing import Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from services.optimizer.jobs.preference import geometric_mean
 from services.optimizer.jobs.spec import Judgement
@@ -61,7 +61,8 @@ class TuningWorlds(BaseModel):
         """The perturbations that are drawn, with their bounds.
 
         Raises:
-            ValueError: One is unknown or named twice. A set that was validated raises nothing.
+            ValueError: One is unknown, named twice or cannot have its bounds. A set that was
+                validated raises nothing.
         """
         known = {variable.name: variable for variable in PERTURBATIONS}
         chosen = PERTURBATIONS if self.ranges is None else self.ranges
@@ -72,8 +73,7 @@ class TuningWorlds(BaseModel):
                 raise ValueError(f"ranges: no perturbation {name!r}; known are {', '.join(known)}")
             if name in found:
                 raise ValueError(f"ranges: {name!r} is named twice")
-            own = {} if isinstance(entry, str) else {"low": entry.low, "high": entry.high}
-            found[name] = known[name].model_copy(update=own)
+            found[name] = known[name] if isinstance(entry, str) else _bounded(known[name], entry)
         return tuple(found.values())
 
     def drawn(self) -> tuple[tuple[tuple[str, float], ...], ...]:
@@ -117,6 +117,20 @@ class TuningWorlds(BaseModel):
         if self.aggregate == "worst" or math.isinf(ordered[0]):
             return ordered[0]
         return _log_mean(ordered, self.count if self.aggregate == "mean" else max(1.0, tail))
+
+
+def _bounded(known: Variable, own: Variable) -> Variable:
+    """A perturbation with bounds of one's own, which keeps its kind and unit. Raises ValueError."""
+    if own.kind not in (known.kind, "continuous"):
+        raise ValueError(
+            f"ranges: {own.name} is {known.kind}, not {own.kind}; leave `kind` out, or set it so"
+        )
+    document = known.model_dump() | {"low": own.low, "high": own.high}
+    try:
+        return Variable.model_validate(document)
+    except ValidationError as error:
+        message = error.errors(include_url=False)[0]["msg"].removeprefix("Value error, ")
+        raise ValueError(f"ranges: {message}") from error
 
 
 def _log_mean(ordered: Sequence[float], size: float) -> float:

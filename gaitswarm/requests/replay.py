@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gaitswarm.requests.walk import WalkRequest, resolved
+from gaitswarm.requests.walk import WorldRequest, resolved
 from gaitswarm.views.replay import encoded_replay
 from sim.outcome import Status
 from sim.replay import CONTROL_RATE, replay
@@ -12,7 +12,7 @@ from sim.robot import load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES, ScenarioChoice, with_gait
 
 
-class ReplayRequest(WalkRequest):
+class ReplayRequest(WorldRequest):
     """One design and the walk in which to look at it."""
 
     scenario: ScenarioChoice = Field(

@@ -85,8 +85,8 @@ class RobustnessRequest(WalksRequest):
             The design and those around it.
 
         Raises:
-            InvalidRequest: A variable is unknown or not in the design, none can vary, or the
-                samples are too few; names the field.
+            InvalidRequest: A variable is unknown, named twice or not in the design, none can vary,
+                or the samples are too few; names the field.
         """
         try:
             return local_sample(
@@ -103,8 +103,12 @@ class RobustnessRequest(WalksRequest):
     def _resolved_variables(self) -> Iterator[Variable]:
         catalogue = design_catalogue(self.controller)
         own = CONTROLLERS[self.controller].variables
+        seen = set[str]()
         for index, entry in enumerate(own if self.variables is None else self.variables):
             name = entry if isinstance(entry, str) else entry.name
+            if name in seen:
+                raise ValueError(f"variables.{index}: {name!r} is named twice")
+            seen.add(name)
             if name not in catalogue:
                 known = ", ".join(catalogue)
                 raise ValueError(f"variables.{index}: unknown variable {name!r}; known are {known}")

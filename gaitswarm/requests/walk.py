@@ -45,24 +45,6 @@ class WalkRequest(BaseModel):
         " one takes a choice's name or index.",
         examples=[PUBLISHED_DESIGN],
     )
-    world: dict[VariableName, FiniteFloat] = Field(
-        default_factory=dict,
-        description="What is different from the model, as in a world of a certificate: values of"
-        " perturbations by name; those that are not named are nominal.",
-        examples=[{}, {"friction_factor": 0.75}],
-    )
-
-    @model_validator(mode="after")
-    def _world_can_be(self) -> Self:
-        try:
-            check_worlds(tuple(self.world), self._worlds)
-        except SimulationInputError as error:
-            raise ValueError(f"world.{error}") from error
-        return self
-
-    @property
-    def _worlds(self) -> NDArray[np.float64]:
-        return np.array([tuple(self.world.values())], dtype=np.float64)
 
     @model_validator(mode="after")
     def _design_fits(self) -> Self:
@@ -120,6 +102,63 @@ class WalkRequest(BaseModel):
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field=field) from error
 
+
+def check_names(controller: ControllerName, design: Mapping[str, float | str]) -> None:
+    """Check that a design has all variables of a controller, and beside them only optional ones.
+
+    Args:
+        controller: Name of the controller.
+        design: Values by variable.
+
+    Raises:
+        ValueError: A variable is unknown or missing; names it.
+    """
+    family = CONTROLLERS[controller]
+    needed = [variable.name for variable in family.variables]
+    optional = [*(variable.name for variable in family.conventions), *sorted(GAIT_VARIABLE_NAMES)]
+    for name in design:
+        if name not in needed and name not in optional:
+            known = ", ".join([*needed, *optional])
+            raise ValueError(f"design: unknown variable {name!r}; known are {known}")
+    missing = [name for name in needed if name not in design]
+    if missing:
+        raise ValueError(f"design: {', '.join(missing)} missing; {controller} needs it")
+
+
+def resolved(entry: str | Scenario) -> Scenario:
+    """A scenario in full.
+
+    Args:
+        entry: The scenario, or name or number of a preset.
+
+    Returns:
+        The scenario itself, a preset looked up.
+    """
+    return find_scenario(entry) if isinstance(entry, str) else entry
+
+
+class WorldRequest(WalkRequest):
+    """One design in a world, by default that of the model."""
+
+    world: dict[VariableName, FiniteFloat] = Field(
+        default_factory=dict,
+        description="What is different from the model, as in a world of a certificate: values of"
+        " perturbations by name; those that are not named are nominal.",
+        examples=[{}, {"friction_factor": 0.75}],
+    )
+
+    @model_validator(mode="after")
+    def _world_can_be(self) -> Self:
+        try:
+            check_worlds(tuple(self.world), self._worlds)
+        except SimulationInputError as error:
+            raise ValueError(f"world.{error}") from error
+        return self
+
+    @property
+    def _worlds(self) -> NDArray[np.float64]:
+        return np.array([tuple(self.world.values())], dtype=np.float64)
+
     def walk(
         self,
         scenario: Scenario,
@@ -155,40 +194,6 @@ class WalkRequest(BaseModel):
             backend=backend,
             precision=precision,
         )
-
-
-def check_names(controller: ControllerName, design: Mapping[str, float | str]) -> None:
-    """Check that a design has all variables of a controller, and beside them only optional ones.
-
-    Args:
-        controller: Name of the controller.
-        design: Values by variable.
-
-    Raises:
-        ValueError: A variable is unknown or missing; names it.
-    """
-    family = CONTROLLERS[controller]
-    needed = [variable.name for variable in family.variables]
-    optional = [*(variable.name for variable in family.conventions), *sorted(GAIT_VARIABLE_NAMES)]
-    for name in design:
-        if name not in needed and name not in optional:
-            known = ", ".join([*needed, *optional])
-            raise ValueError(f"design: unknown variable {name!r}; known are {known}")
-    missing = [name for name in needed if name not in design]
-    if missing:
-        raise ValueError(f"design: {', '.join(missing)} missing; {controller} needs it")
-
-
-def resolved(entry: str | Scenario) -> Scenario:
-    """A scenario in full.
-
-    Args:
-        entry: The scenario, or name or number of a preset.
-
-    Returns:
-        The scenario itself, a preset looked up.
-    """
-    return find_scenario(entry) if isinstance(entry, str) else entry
 
 
 class WalksRequest(WalkRequest):
@@ -236,7 +241,7 @@ class WalksRequest(WalkRequest):
             self.check_reach(scenario, field=f"scenarios.{index}")
 
 
-class SimulationRequest(WalksRequest):
+class SimulationRequest(WalksRequest, WorldRequest):
     """One design, the walks in which to try it, and how they are judged."""
 
     preference: PreferenceChoice = Field(

@@ -24,6 +24,33 @@ def design_catalogue(controller: str) -> dict[str, Variable]:
     return {variable.name: variable for variable in known}
 
 
+def check_design(controller: str, design: Mapping[str, float | str]) -> None:
+    """Check that a design gives all variables of a controller, and beside them only optional ones.
+
+    Args:
+        controller: Name of the controller.
+        design: Values by name.
+
+    Raises:
+        SimulationInputError: A variable is unknown or missing, or its value is none; the message
+            begins with `design`, or `design.` and the variable, and a colon.
+    """
+    known = design_catalogue(controller)
+    for name in design:
+        if name not in known:
+            raise SimulationInputError(
+                f"design: unknown variable {name!r}; known are {', '.join(known)}"
+            )
+    needed = [variable.name for variable in CONTROLLERS[controller].variables]  # type: ignore[index]
+    missing = [name for name in needed if name not in design]
+    if missing:
+        raise SimulationInputError(f"design: {', '.join(missing)} missing; {controller} needs it")
+    try:
+        design_numbers(controller, design)
+    except SimulationInputError as error:
+        raise SimulationInputError(f"design.{error}") from error
+
+
 def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[str, float]:
     """A design as the simulator takes it.
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gaitswarm.requests.walk import PUBLISHED_DESIGN, check_names
+from gaitswarm.requests.walk import PUBLISHED_DESIGN
 from gaitswarm.views.surface import SurfaceView
 from services.optimizer.errors import InvalidRequest
-from sim.catalogue import design_numbers
+from sim.catalogue import check_design, design_numbers
 from sim.controllers import CONTROLLERS, ControllerName, Inference
 from sim.controllers.surface import surface
 from sim.variables import VariableName, VariableValue
@@ -73,7 +73,7 @@ def _inferences(
     try:
         inferences = CONTROLLERS[controller].inferences(design_numbers(controller, design))
         if inferences:
-            check_names(controller, design)
+            check_design(controller, design)
     except ValueError as error:
         raise InvalidRequest(str(error).removeprefix("design: "), field="design") from error
     return inferences

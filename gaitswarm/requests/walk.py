@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -13,12 +13,12 @@ from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from sim.assembly import Backend, check_precision
-from sim.catalogue import design_numbers
+from sim.catalogue import check_design, design_numbers
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
-from sim.scenario import GAIT_VARIABLE_NAMES, SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
 from sim.simulate import Simulation, check_reach, simulate
 from sim.variables import VariableName, VariableValue
 from sim.worlds import WorldWalk, check_worlds
@@ -48,11 +48,7 @@ class WalkRequest(BaseModel):
 
     @model_validator(mode="after")
     def _design_fits(self) -> Self:
-        check_names(self.controller, self.design)
-        try:
-            design_numbers(self.controller, self.design)
-        except SimulationInputError as error:
-            raise ValueError(f"design.{error}") from error
+        check_design(self.controller, self.design)
         return self
 
     @property
@@ -101,28 +97,6 @@ class WalkRequest(BaseModel):
             check_reach(scenario, names, values, robot=self.robot)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field=field) from error
-
-
-def check_names(controller: ControllerName, design: Mapping[str, float | str]) -> None:
-    """Check that a design has all variables of a controller, and beside them only optional ones.
-
-    Args:
-        controller: Name of the controller.
-        design: Values by variable.
-
-    Raises:
-        ValueError: A variable is unknown or missing; names it.
-    """
-    family = CONTROLLERS[controller]
-    needed = [variable.name for variable in family.variables]
-    optional = [*(variable.name for variable in family.conventions), *sorted(GAIT_VARIABLE_NAMES)]
-    for name in design:
-        if name not in needed and name not in optional:
-            known = ", ".join([*needed, *optional])
-            raise ValueError(f"design: unknown variable {name!r}; known are {known}")
-    missing = [name for name in needed if name not in design]
-    if missing:
-        raise ValueError(f"design: {', '.join(missing)} missing; {controller} needs it")
 
 
 def resolved(entry: str | Scenario) -> Scenario:

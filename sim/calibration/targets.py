@@ -7,9 +7,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from sim.catalogue import design_catalogue, design_numbers
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import SimulationInputError
+from sim.catalogue import check_design, design_numbers
+from sim.controllers import ControllerName
 from sim.scenario import Scenario, ScenarioChoice, find_scenario
 from sim.variables import VariableName, VariableValue
 
@@ -101,18 +100,7 @@ class TargetWalk(BaseModel):
 
     @model_validator(mode="after")
     def _can_walk(self) -> TargetWalk:
-        known = design_catalogue(self.controller)
-        for name in self.design:
-            if name not in known:
-                raise ValueError(f"design: unknown variable {name!r}; known are {', '.join(known)}")
-        needed = [variable.name for variable in CONTROLLERS[self.controller].variables]
-        missing = [name for name in needed if name not in self.design]
-        if missing:
-            raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
-        try:
-            design_numbers(self.controller, self.design)
-        except SimulationInputError as error:
-            raise ValueError(f"design: {error}") from error
+        check_design(self.controller, self.design)
         names = [scenario.name for scenario in self.resolved_scenarios()]
         for name in names:
             if names.count(name) > 1:

@@ -1,11 +1,12 @@
 """What every job is asked to do, and what its designs are worth.
 
 Spec
-├── JobSpec              (kind `tuning`) a drive is tuned to walk well
+├── WalksSpec            designs walk through scenarios and are judged by a preference
+│   ├── JobSpec          (kind `tuning`) a drive is tuned to walk well
+│   └── CertificateSpec  (kind `certificate`) a design walks in many worlds that differ
 ├── IdentificationSpec   (kind `identification`) a robot's parameters are fitted to measured walks
 ├── CalibrationSpec      (kind `calibration`) robot and conventions are fitted to tables of results
-├── TournamentSpec       (kind `tournament`) a search method is run many times on several problems
-└── CertificateSpec      (kind `certificate`) a design walks in many worlds that differ
+└── TournamentSpec       (kind `tournament`) a search method is run many times on several problems
 """
 
 from __future__ import annotations

@@ -12,25 +12,18 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_vali
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.kinds.walks import WalksSpec
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
-from services.optimizer.jobs.preference import (
-    PREFERENCES,
-    Preference,
-    PreferenceChoice,
-    figure_of_merit,
-    judge,
-)
-from services.optimizer.jobs.spec import Judgement, Spec
+from services.optimizer.jobs.preference import PreferenceChoice
 from services.optimizer.search.enumeration import Enumeration
 from services.optimizer.search.optimizer import Optimizer
 from services.optimizer.search.random_search import RandomSearchSettings
 from sim.case import Case
-from sim.catalogue import design_catalogue, design_numbers, design_shown
+from sim.catalogue import check_design, design_numbers, design_shown
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import Recordings
-from sim.outcome import OBJECTIVES, Objective
-from sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice
 from sim.simulate import check_reach
 from sim.variables import VariableName, VariableValue
 from sim.worlds import PERTURBATIONS, WorldWalk, check_worlds, sample_worlds
@@ -66,7 +59,7 @@ def certificate_scenarios(tuned: Sequence[Scenario] = SCENARIOS) -> tuple[Scenar
     return (*tuned, *others[: max(len(_MIRRORED), CASES - len(tuned))])
 
 
-class CertificateSpec(Spec):
+class CertificateSpec(WalksSpec):
     """A certificate: one design, in worlds that differ in all that a model may get wrong.
 
     A design of the job is a world: a value of every perturbation. The first is the nominal world,
@@ -88,7 +81,7 @@ class CertificateSpec(Spec):
         },
     )
 
-    unwalked = (Spec.unwalked or frozenset()) | {"preference", "worlds"}
+    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference", "worlds"}
 
     searches = False
 
@@ -161,27 +154,9 @@ class CertificateSpec(Spec):
     def _can_be_run(self) -> Self:
         if self.optimizer.name != "random":
             raise ValueError("optimizer: worlds are drawn by random")
-        names = self.case_names
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"scenarios: {name!r} is named twice")
-        self._check_design()
+        check_design(self.controller, self.design)
         self.design_space()
         return self
-
-    def _check_design(self) -> None:
-        known = design_catalogue(self.controller)
-        for name in self.design:
-            if name not in known:
-                raise ValueError(f"design: unknown variable {name!r}; known are {', '.join(known)}")
-        needed = [variable.name for variable in CONTROLLERS[self.controller].variables]
-        missing = [name for name in needed if name not in self.design]
-        if missing:
-            raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
-        try:
-            design_numbers(self.controller, self.design)
-        except SimulationInputError as error:
-            raise ValueError(f"design.{error}") from error
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -204,16 +179,6 @@ class CertificateSpec(Spec):
         """
         worlds = iterations * self.optimizer.particles - 1
         return self.model_copy(update={"iterations": iterations, "worlds": worlds})
-
-    def resolved_scenarios(self) -> tuple[Scenario, ...]:
-        """The scenarios in full, presets looked up."""
-        return tuple(
-            find_scenario(entry) if isinstance(entry, str) else entry for entry in self.scenarios
-        )
-
-    def resolved_preference(self) -> Preference:
-        """The preference in full."""
-        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def design_space(self) -> DesignSpace:
         """The perturbations; what is neither drawn nor fixed is as the robot has it."""
@@ -280,16 +245,6 @@ class CertificateSpec(Spec):
         names = {scenario.name for scenario in HELD_OUT}
         return tuple(name for name in self.case_names if name in names)
 
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        """Raw objectives of a walk: f1..f6 of table 4.1."""
-        return OBJECTIVES
-
-    @property
-    def case_names(self) -> tuple[str, ...]:
-        """Names of the scenarios, in order."""
-        return tuple(scenario.name for scenario in self.resolved_scenarios())
-
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
         """The design's walk in each scenario, through worlds.
 
@@ -304,29 +259,6 @@ class CertificateSpec(Spec):
             WorldWalk(self.robot, self.controller, design, scenario, names, self.precision)
             for scenario in self.resolved_scenarios()
         )
-
-    def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge the design in worlds by the preference (eq. 3.8, 4.1, 4.2).
-
-        Args:
-            objectives: (n, K, 6) raw objectives, in their units.
-            failed: (n, K), true for a walk without a result.
-
-        Returns:
-            Fitness and utilities in the n worlds.
-        """
-        return judge(objectives, failed, self.resolved_preference())
-
-    def figure_of_merit(self, fitness: float) -> float | None:
-        """F of eq. 3.1, to be maximized.
-
-        Args:
-            fitness: In a world, by the job's preference.
-
-        Returns:
-            F if the preference is that of chapter 3, else None.
-        """
-        return figure_of_merit(fitness, self.resolved_preference())
 
     def resolved(self) -> Self:
         """The same job with scenarios, preference, design and perturbations written out."""

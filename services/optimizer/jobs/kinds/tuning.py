@@ -13,26 +13,18 @@ from pydantic import ConfigDict, Field, model_validator
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import (
-    PREFERENCES,
-    Preference,
-    PreferenceChoice,
-    figure_of_merit,
-    judge,
-)
-from services.optimizer.jobs.spec import Judgement, Spec
+from services.optimizer.jobs.kinds.walks import WalksSpec
+from services.optimizer.jobs.preference import PreferenceChoice
+from services.optimizer.jobs.spec import Judgement
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import Recordings
-from sim.outcome import OBJECTIVES, Objective
 from sim.scenario import (
     GAIT_VARIABLE_NAMES,
     GAIT_VARIABLES,
     SCENARIOS,
-    Scenario,
     ScenarioChoice,
-    find_scenario,
     with_gait,
 )
 from sim.simulate import check_reach
@@ -46,7 +38,7 @@ GAIT_OF_CHAPTER_3: Final = ("cycle_time", "stride", "height", "duty_factor", "fi
 """The gait variables that chapter 3 optimizes together with a controller's (table 3.2)."""
 
 
-class JobSpec(Spec):
+class JobSpec(WalksSpec):
     """Tuning of a drive: which variables, in which scenarios, by which measure, how long."""
 
     model_config = ConfigDict(
@@ -65,7 +57,7 @@ class JobSpec(Spec):
         },
     )
 
-    unwalked = (Spec.unwalked or frozenset()) | {"preference"}
+    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference"}
 
     kind: Literal["tuning"] = Field(default="tuning", description="Tune a drive to walk well.")
     controller: ControllerName = Field(
@@ -92,22 +84,8 @@ class JobSpec(Spec):
 
     @model_validator(mode="after")
     def _can_be_run(self) -> JobSpec:
-        names = [scenario.name for scenario in self.resolved_scenarios()]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"scenarios: {name!r} is named twice")
         self.design_space()
         return self
-
-    def resolved_scenarios(self) -> tuple[Scenario, ...]:
-        """The scenarios in full, presets looked up."""
-        return tuple(
-            find_scenario(entry) if isinstance(entry, str) else entry for entry in self.scenarios
-        )
-
-    def resolved_preference(self) -> Preference:
-        """The preference in full."""
-        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def design_space(self) -> DesignSpace:
         """The controller's variables, and any of its conventions and of the gait's."""
@@ -163,16 +141,11 @@ class JobSpec(Spec):
             raise InvalidRequest(str(error), field="worlds.ranges") from error
 
     @property
-    def objectives(self) -> tuple[Objective, ...]:
-        """Raw objectives of a walk: f1..f6 of table 4.1."""
-        return OBJECTIVES
-
-    @property
     def case_names(self) -> tuple[str, ...]:
         """Names of the scenarios, in order; with that of the world where there are worlds."""
-        names = [scenario.name for scenario in self.resolved_scenarios()]
+        names = super().case_names
         if self.worlds is None:
-            return tuple(names)
+            return names
         return tuple(f"{name}.world-{k}" for name in names for k in range(self.worlds.count))
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
@@ -208,19 +181,8 @@ class JobSpec(Spec):
         Returns:
             Fitness and utilities of the n designs.
         """
-        judged = judge(objectives, failed, self.resolved_preference())
+        judged = super().judge(objectives, failed)
         return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
-
-    def figure_of_merit(self, fitness: float) -> float | None:
-        """F of eq. 3.1, to be maximized.
-
-        Args:
-            fitness: of a design, by the job's preference.
-
-        Returns:
-            F if the preference is that of chapter 3, else None.
-        """
-        return figure_of_merit(fitness, self.resolved_preference())
 
     def resolved(self) -> JobSpec:
         """The same job with scenarios, preference, variables and optimizer written out."""

@@ -1,0 +1,81 @@
+"""What is common to jobs whose designs walk through scenarios and are judged by a preference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from services.optimizer.jobs.preference import (
+    PREFERENCES,
+    Preference,
+    PreferenceChoice,
+    figure_of_merit,
+    judge,
+)
+from services.optimizer.jobs.spec import Judgement, Spec
+from sim.outcome import OBJECTIVES, Objective
+from sim.scenario import Scenario, ScenarioChoice, find_scenario
+
+Floats = NDArray[np.float64]
+
+
+class WalksSpec(Spec):
+    """A job of one kind of walks; the fields are declared by the kinds, each with its defaults."""
+
+    if TYPE_CHECKING:
+        scenarios: tuple[ScenarioChoice, ...]
+        preference: PreferenceChoice
+
+    @model_validator(mode="after")
+    def _scenarios_differ(self) -> Self:
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"scenarios: {name!r} is named twice")
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios in full, presets looked up."""
+        return tuple(
+            find_scenario(entry) if isinstance(entry, str) else entry for entry in self.scenarios
+        )
+
+    def resolved_preference(self) -> Preference:
+        """The preference in full."""
+        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """Raw objectives of a walk: f1..f6 of table 4.1."""
+        return OBJECTIVES
+
+    @property
+    def case_names(self) -> tuple[str, ...]:
+        """Names of the scenarios, in order."""
+        return tuple(scenario.name for scenario in self.resolved_scenarios())
+
+    def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
+        """Judge designs by the preference (eq. 3.8, 4.1, 4.2).
+
+        Args:
+            objectives: (n, K, 6) raw objectives, in their units.
+            failed: (n, K), true for a walk without a result.
+
+        Returns:
+            Fitness and utilities of the n designs.
+        """
+        return judge(objectives, failed, self.resolved_preference())
+
+    def figure_of_merit(self, fitness: float) -> float | None:
+        """F of eq. 3.1, to be maximized.
+
+        Args:
+            fitness: Of a design, by the job's preference.
+
+        Returns:
+            F if the preference is that of chapter 3, else None.
+        """
+        return figure_of_merit(fitness, self.resolved_preference())

@@ -122,8 +122,7 @@ def check_hashes(members: Mapping[str, bytes]) -> list[str]:
     files = manifest.get("files")
     if not isinstance(files, dict):
         raise BadArchive(f"{MANIFEST} names no files")
-    found = [f"{name} is not in the manifest" for name in members if name not in files]
-    found.remove(f"{MANIFEST} is not in the manifest")
+    found = [f"{name} is not in the manifest" for name in members if name not in {*files, MANIFEST}]
     for name, expected in files.items():
         if name not in members:
             found.append(f"{name} is missing")

@@ -23,7 +23,7 @@ from services.optimizer.analysis.fork import budgets_of
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.iteration import Evaluation
+from services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
@@ -66,7 +66,11 @@ def evidence(service: JobService, job_id: str) -> bytes:
 
 def _members(service: JobService, job: Job) -> Iterator[tuple[str, bytes]]:
     spec, columns = job.spec, _committed(service.columns(job), job)
-    best = service.best(job.id)
+    anew = None
+    if spec.precision != "double":
+        anew = _reevaluated(service, job, columns)
+    # Not the store's: of a job that is running it may be of an iteration that is not in the file.
+    best = best_of(columns, anew)
     iterations = list(_iterations(service, job))
     view = None if best is None else BestView.from_evaluation(best, spec)
     documents: dict[str, Any] = {
@@ -79,9 +83,9 @@ def _members(service: JobService, job: Job) -> Iterator[tuple[str, bytes]]:
     files: dict[str, bytes] = {name: _json(document) for name, document in documents.items()}
     files[EVALUATIONS] = b"".join(encoded_table("parquet", spec, [columns]))
     files[ASKS] = _asks(spec, service.asked(job))
-    if spec.precision != "double":
-        anew = _reevaluated(service, job, columns)
-        files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), anew))
+    if anew is not None:
+        parts = [anew] if len(anew) else []
+        files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))
     for name in spec.recording_ids:
         files[f"recordings/{name}.json"] = service.recording(name).model_dump_json().encode()
     for number, robot in enumerate(spec.described):
@@ -110,6 +114,57 @@ def provenance_document(job: Job) -> dict[str, Any]:
         "written_by": here.model_dump(mode="json"),
         "kernels": kernels,
     }
+
+
+def best_of(columns: EvaluationColumns, anew: EvaluationColumns | None) -> Evaluation | None:
+    """Find the best design, as the store would.
+
+    Args:
+        columns: All evaluations.
+        anew: Those that were evaluated anew in double; None of a search in double.
+
+    Returns:
+        The earliest of least fitness in double precision; None while every design has failed.
+    """
+    judged = columns if anew is None else anew
+    row = best_particle(judged.fitness)
+    if row is None:
+        return None
+    if anew is None:
+        return _evaluation(columns, row)
+    best = _evaluation(anew, row)
+    searched = _evaluation(columns, row_of(columns, best.iteration, best.particle))
+    in_double = Reevaluation(best.particle, best.objectives, best.statuses, best.fitness)
+    return replace(searched, reevaluation=in_double)
+
+
+def row_of(columns: EvaluationColumns, iteration: int, particle: int) -> int:
+    """Find an evaluation.
+
+    Args:
+        columns: Evaluations.
+        iteration: Index of the iteration.
+        particle: Its place there.
+
+    Returns:
+        Its row.
+
+    Raises:
+        ValueError: There is none.
+    """
+    (row,) = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
+    return int(row)
+
+
+def _evaluation(columns: EvaluationColumns, row: int) -> Evaluation:
+    return Evaluation(
+        iteration=int(columns.iteration[row]),
+        particle=int(columns.particle[row]),
+        design=columns.designs[row],
+        objectives=columns.objectives[row],
+        statuses=columns.statuses[row],
+        fitness=float(columns.fitness[row]),
+    )
 
 
 def _committed(columns: EvaluationColumns, job: Job) -> EvaluationColumns:
@@ -169,17 +224,14 @@ def _asks(spec: AnySpec, asked: Sequence[NDArray[np.float64]]) -> bytes:
     return sink.getvalue()
 
 
-def _reevaluated(
-    service: JobService, job: Job, columns: EvaluationColumns
-) -> Iterator[EvaluationColumns]:
+def _reevaluated(service: JobService, job: Job, columns: EvaluationColumns) -> EvaluationColumns:
     """The designs that were evaluated anew in double, by what they came to there."""
     found = [(k, anew) for k, anew in service.reevaluations(job) if k < job.progress.iterations]
     if not found:
-        return
+        return columns.rows(slice(0))
     starts = np.searchsorted(columns.iteration, [k for k, _ in found])
-    rows = columns.rows(starts + np.array([anew.particle for _, anew in found]))
-    yield replace(
-        rows,
+    return replace(
+        columns.rows(starts + np.array([anew.particle for _, anew in found])),
         objectives=np.stack([anew.objectives for _, anew in found]),
         statuses=np.stack([anew.statuses for _, anew in found]),
         fitness=np.array([anew.fitness for _, anew in found]),

@@ -7,9 +7,9 @@ import json
 import os
 import secrets
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from gaitswarm.evidence.archive import (
     parsed_json,
     read_archive,
 )
-from gaitswarm.evidence.contents import BEST
+from gaitswarm.evidence.contents import BEST, best_of, row_of
 from gaitswarm.evidence.reading import Evidence, by_iteration, read_evidence
 from gaitswarm.evidence.replay import simulated_differences, why_no_replay
 from gaitswarm.views import BestView
@@ -30,7 +30,7 @@ from gaitswarm.views.verification import CheckView, DifferenceView, Verification
 from services.optimizer.analysis.search_path import retraced
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
+from services.optimizer.jobs.iteration import best_particle
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.search.registry import METHODS
 from sim.kernel.source import kernel_identity
@@ -76,7 +76,8 @@ def verify(
 
     Raises:
         NotFound: There is no such file.
-        InvalidRequest: `replay` or `seed` is negative.
+        NotFound: There is no such file.
+        InvalidRequest: The file cannot be opened, or `replay` or `seed` is negative.
         EvaluatorUnavailable: Walks cannot be run here.
     """
     for name, value in (("replay", replay), ("seed", seed or 0)):
@@ -107,6 +108,8 @@ def _content(path: Path) -> bytes:
             return file.read(LARGEST_ARCHIVE + 1)
     except FileNotFoundError as error:
         raise NotFound(f"there is no file {path}") from error
+    except OSError as error:
+        raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="evidence") from error
 
 
 def _check(content: bytes, found: _Found, replay: int, seed: int) -> None:
@@ -188,48 +191,20 @@ def _judged(spec: AnySpec, columns: EvaluationColumns) -> Floats:
 
 def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
     """The best is the earliest of least fitness, in double precision, and is shown as it is."""
-    row, columns = _best_row(evidence)
-    said = evidence.job.best
-    if row is None or said is None:
-        return row is None and said is None, "no design has walked in every case"
-    where = (int(columns.iteration[row]), int(columns.particle[row]))
-    fitness = float(columns.fitness[row])
+    best, said = best_of(evidence.columns, evidence.reevaluated), evidence.job.best
+    if best is None or said is None:
+        return best is None and said is None, "no design has walked in every case"
+    where = (best.iteration, best.particle)
+    fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
     if (said.iteration, said.particle, said.fitness) != (*where, fitness):
         return False, (
             f"particle {where[1]} of iteration {where[0]} is the best with {fitness!r}, not the one"
             " that is named"
         )
-    if parsed_json(members.get(BEST, b""), BEST) != _best_shown(evidence, row):
+    shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
+    if parsed_json(members.get(BEST, b""), BEST) != shown:
         return False, f"{BEST} does not show particle {where[1]} of iteration {where[0]}"
     return True, f"particle {where[1]} of iteration {where[0]}, {fitness!r}, is the least of all"
-
-
-def _best_shown(evidence: Evidence, row: int) -> Any:
-    """What `best.json` is to say; row: that of the best in the table judged in double."""
-    _, judged = _best_row(evidence)
-    best = _evaluation(judged, row)
-    if evidence.reevaluated is not None:
-        anew = Reevaluation(best.particle, best.objectives, best.statuses, best.fitness)
-        columns = evidence.columns
-        (ahead,) = np.flatnonzero(_at(columns, best.iteration, best.particle)).tolist()
-        best = replace(_evaluation(columns, ahead), reevaluation=anew)
-    return json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
-
-
-def _evaluation(columns: EvaluationColumns, row: int) -> Evaluation:
-    return Evaluation(
-        iteration=int(columns.iteration[row]),
-        particle=int(columns.particle[row]),
-        design=columns.designs[row],
-        objectives=columns.objectives[row],
-        statuses=columns.statuses[row],
-        fitness=float(columns.fitness[row]),
-    )
-
-
-def _at(columns: EvaluationColumns, iteration: int, particle: int) -> NDArray[np.bool_]:
-    """(r,) true for a particle of an iteration."""
-    return np.asarray((columns.iteration == iteration) & (columns.particle == particle))
 
 
 def _best_row(evidence: Evidence) -> tuple[int | None, EvaluationColumns]:
@@ -300,7 +275,7 @@ def _replay(evidence: Evidence, found: _Found, replay: int, seed: int) -> Answer
     best = drawn[:0]
     if row is not None:
         where = (int(judged.iteration[row]), int(judged.particle[row]))
-        best = np.flatnonzero(_at(columns, *where))
+        best = np.array([row_of(columns, *where)])
     rows = np.unique(np.concatenate([drawn, best]))
     tables = [(spec, columns.rows(rows))]
     if evidence.reevaluated is not None and row is not None:

@@ -9,6 +9,8 @@ import shutil
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -16,6 +18,11 @@ import pytest
 
 import gaitswarm
 from gaitswarm.evidence.archive import read_archive
+from gaitswarm.evidence.contents import evidence
+from services.optimizer.jobs.job import Job, JobState
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import open_store
+from sim.kernel.walk import Precision
 from tests.evidence.conftest import JOB, Proved
 from tests.examples.servers import Server
 
@@ -30,6 +37,30 @@ def test_the_same_job_has_the_same_evidence_wherever_its_database_is(
         assert jobs.evidence(proved.id) == proved.content
     with gaitswarm.connect(serve_database(copy)) as jobs:
         assert jobs.evidence(proved.id) == proved.content
+
+
+class Earlier(JobService):
+    """A service whose job was read before its last iterations were committed."""
+
+    def job(self, job_id: str) -> Job:
+        job = JobService.job(self, job_id)
+        committed = job.progress.best_iteration
+        assert committed, "the best design is of the first iteration: choose another seed"
+        rows = self.store.evaluations_between(job_id, 0, committed)
+        progress = replace(job.progress, iterations=committed, evaluations=len(rows))
+        return replace(job, state=JobState.RUNNING, progress=progress)
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_evidence_of_a_job_that_goes_on_meanwhile_is_of_what_was_committed(
+    precision: Precision, tmp_path: Path
+) -> None:
+    db = tmp_path / "jobs.db"
+    job_id = gaitswarm.optimize(db=db, precision=precision, **JOB).job.id
+    with closing(open_store(f"sqlite:///{db}")) as store:
+        content = evidence(Earlier(store), job_id)
+    found = gaitswarm.verify(content, replay=2)
+    assert found.verified, found.checks
 
 
 def test_every_file_but_the_manifest_has_its_hash_in_it(proved: Proved) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm.evidence.archive import MANIFEST, archived, read_archive
-from tests.evidence.conftest import EVALUATIONS, Proved, tampered
+from tests.evidence.conftest import EVALUATIONS, Proved, tampered, with_manifest
 
 pytestmark = pytest.mark.slow
 
@@ -110,6 +110,15 @@ def test_a_manifest_that_is_none_is_refused(proved: Proved) -> None:
         (json.dumps({"format": "gaitswarm-evidence", "version": 1}).encode(), "names no files"),
     ):
         assert why in refusal(zipped(members | {MANIFEST: document}))
+
+
+def test_a_manifest_cannot_vouch_for_itself(proved: Proved) -> None:
+    manifest = json.loads(read_archive(proved.content)[MANIFEST])
+    manifest["files"][MANIFEST] = {"sha256": "0" * 64, "bytes": 1}
+    found = gaitswarm.verify(with_manifest(proved.content, manifest), replay=0)
+    assert [check.detail for check in found.checks if check.passed is False] == [
+        f"{MANIFEST} has another SHA-256"
+    ]
 
 
 def parquet(table: pa.Table, **options: object) -> bytes:

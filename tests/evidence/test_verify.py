@@ -61,6 +61,13 @@ def changed(name: str, document: dict[str, Any]) -> dict[str, Change]:
     return {name: lambda content: json.dumps(json.loads(content) | document).encode()}
 
 
+def test_what_is_no_file_is_an_error_that_names_it(tmp_path: Path) -> None:
+    with pytest.raises(gaitswarm.NotFound, match=r"there is no file .*nowhere\.zip"):
+        gaitswarm.verify(tmp_path / "nowhere.zip")
+    with pytest.raises(gaitswarm.InvalidRequest, match=r"cannot read .*: Is a directory"):
+        gaitswarm.verify(tmp_path)
+
+
 def test_untouched_evidence_is_verified_in_all_it_says(proved: Proved) -> None:
     found = gaitswarm.verify(proved.content, replay=5, seed=3)
     assert found.verified

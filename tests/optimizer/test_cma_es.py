@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -77,6 +79,21 @@ def test_the_decomposition_is_that_of_lapack(dimension: int) -> None:
     np.testing.assert_allclose(np.sort(values), np.linalg.eigvalsh(symmetric), rtol=1e-9)
     np.testing.assert_allclose(product(vectors * values, vectors.T), symmetric, atol=1e-9)
     np.testing.assert_allclose(product(vectors.T, vectors), np.eye(dimension), atol=1e-12)
+
+
+@pytest.mark.parametrize("rows", [2, 71])
+def test_a_product_is_summed_in_order_and_little_of_it_is_held_at_once(rows: int) -> None:
+    draw = np.random.default_rng(rows)
+    left, right = draw.standard_normal((rows, 2_000)), draw.standard_normal((2_000, 200))
+    total = np.zeros((rows, 200))
+    for k in range(2_000):
+        total += left[:, k : k + 1] * right[k]
+    tracemalloc.start()
+    assert product(left, right).tobytes() == total.tobytes()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # All of its terms would be 227 MB.
+    assert peak < 50_000_000
 
 
 def test_integers_and_choices_are_found_with_the_rest() -> None:

@@ -82,7 +82,7 @@ class Runs:
     def quartiles(self) -> Floats:
         """(3, m) lower quartile, median and upper quartile of the best so far.
 
-        +inf where so many runs have none; values in between are interpolated.
+        Each is the value of a run, none is interpolated: +inf where so many runs have none.
         """
         filled = np.where(np.isnan(self.best), np.inf, self.best)
         rows: Floats = np.quantile(filled, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf")

@@ -169,8 +169,8 @@ class NormalDistribution:
         steady = self._adapt_sigma(product(self._better[np.newaxis], z)[0])
         moved = steady * self._scale * step
         squares = np.ascontiguousarray(np.square(z).T).sum(axis=0)
-        # Worse samples far away would take more variance than there is; those nearby need not count
-        # for more.
+        # Worse samples far away would take more variance than there is, so each counts as d / |z|^2
+        # (active CMA); one nearby that would count for more than four does for four.
         kept = np.minimum(4.0, self._space.dimension / np.maximum(squares, 1e-12))
         correlation = self._learned_correlation(moved, y, kept)
         change = self._learned_scale(moved, z, kept)

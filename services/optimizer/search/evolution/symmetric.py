@@ -13,6 +13,9 @@ Floats = NDArray[np.float64]
 _SWEEPS: Final = 30
 """More than any matrix needs: convergence is quadratic."""
 
+_MOST_TERMS: Final = 1 << 21
+"""Numbers in memory at once, but those of two rows of the result at least: 16 MiB."""
+
 _NEGLIGIBLE: Final = 1e-15
 """Share of the diagonal below which an element off it is as good as zero."""
 
@@ -27,6 +30,10 @@ def product(left: Floats, right: Floats) -> Floats:
     Returns:
         (n, m).
     """
+    rows = max(2, _MOST_TERMS // max(1, right.size))
+    if len(left) > rows:
+        blocks = [left[first : first + rows] for first in range(0, len(left), rows)]
+        return np.concatenate([product(block, right) for block in blocks])
     terms = left.T[:, :, np.newaxis] * right[:, np.newaxis, :]
     # Along its first axis, numpy adds one element after the other.
     total: Floats = np.ascontiguousarray(terms).sum(axis=0)
@@ -37,7 +44,7 @@ def eigen(symmetric: Floats) -> tuple[Floats, Floats]:
     """Decompose a symmetric matrix, by Jacobi's rotations (Golub and Van Loan, 8.5).
 
     Args:
-        symmetric: (d, d); what is above its diagonal counts.
+        symmetric: (d, d); of one that is so but for rounding, the mean with its transpose.
 
     Returns:
         (d,) eigenvalues in no order, and (d, d) their vectors as columns.

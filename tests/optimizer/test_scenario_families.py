@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -76,6 +77,17 @@ def test_the_interval_widens_where_the_answer_hangs_on_one_design() -> None:
     assert regret.low == 0.0
     assert regret.value == pytest.approx(0.5)
     assert regret.high == regret.value
+
+
+def test_a_long_history_is_judged_in_the_memory_of_its_own() -> None:
+    judged = np.random.default_rng(3).normal(size=(60_000, 6))
+    tracemalloc.start()
+    found = scenario_families(judged, tolerance=0.1)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert found.designs == 60_000
+    # Rows of all resamples would be eleven times as much, and again to draw and to sort them.
+    assert peak < 6 * judged.nbytes
 
 
 def test_the_job_itself_has_no_regret_and_a_single_scenario_no_family() -> None:

@@ -35,7 +35,10 @@ def average_ranks(values: Floats) -> Floats:
     Returns:
         (n,).
     """
-    ordered = np.sort(values)
-    first: Floats = np.searchsorted(ordered, values, "left").astype(np.float64)
-    last: Floats = np.searchsorted(ordered, values, "right").astype(np.float64)
-    return 0.5 * (first + last + 1.0)
+    order = np.argsort(values)
+    ordered = values[order]
+    begins = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))[: len(values)]
+    sizes = np.diff(begins, append=len(values))
+    ranks = np.empty(len(values))
+    ranks[order] = np.repeat(begins + 0.5 * (sizes + 1.0), sizes)
+    return ranks

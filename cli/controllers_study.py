@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from services.optimizer.analysis.ratio import Interval, median_interval, median_ratio
+from services.optimizer.analysis.ratio import MedianInterval, median_interval, median_ratio
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.optimizer_choice import with_settings
 from services.optimizer.jobs.preference import figure_of_merit
@@ -106,7 +106,7 @@ class Comparison:
     fuzzy: Runs
 
     @property
-    def ratio(self) -> Interval | None:
+    def ratio(self) -> MedianInterval | None:
         """How many times better the Fuzzy-PI is: fitness of the PI over its own, or F over F."""
         if not self.pi.fitness or not self.fuzzy.fitness:
             return None
@@ -221,7 +221,7 @@ def study_table(found: Sequence[Comparison]) -> Table:
     return table
 
 
-def _cells(interval: Interval | None, written: Callable[[float], str]) -> tuple[str, str]:
+def _cells(interval: MedianInterval | None, written: Callable[[float], str]) -> tuple[str, str]:
     """Median and interval; a dash for what there is not."""
     if interval is None:
         return "–", "–"

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cli.tournament.runs import Entry
-    from services.optimizer.analysis.tournaments.tournament import Interval
+    from services.optimizer.analysis.interval import Interval
 
 REPORT: Final = "report.html"
 

@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from gaitswarm.views.base import View, finite
+from services.optimizer.analysis.interval import Interval
 from services.optimizer.analysis.robustness.scenario_families import (
     Family,
     LeftOut,
-    Loss,
     ScenarioFamilies,
 )
 from services.optimizer.jobs.columns import EvaluationColumns
@@ -26,7 +26,7 @@ class LossView(View):
     high: float | None = Field(description="Upper end.", examples=[0.031])
 
     @classmethod
-    def from_loss(cls, loss: Loss) -> LossView:
+    def from_loss(cls, loss: Interval) -> LossView:
         """Make a view of a loss.
 
         Args:

@@ -10,9 +10,9 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ObjectiveView
+from services.optimizer.analysis.interval import Interval
 from services.optimizer.analysis.robustness.index import (
     NORMALISED_OBJECTIVES,
-    Interval,
     LocalSample,
     Robustness,
     Sensitivity,

@@ -8,9 +8,10 @@ from datetime import datetime
 from pydantic import Field
 
 from gaitswarm.views.base import View, finite
+from services.optimizer.analysis.interval import Interval
 from services.optimizer.analysis.tournaments.entrants import Entrant, Tournament
 from services.optimizer.analysis.tournaments.standings import Profile, Standing, Standings
-from services.optimizer.analysis.tournaments.tournament import Interval, Runs
+from services.optimizer.analysis.tournaments.tournament import Runs
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.race_case import SEED
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, mannwhitneyu
 
-from services.optimizer.analysis.ratio import Interval, median_interval, median_ratio
+from services.optimizer.analysis.ratio import MedianInterval, median_interval, median_ratio
 
 
 def test_the_interval_of_ten_runs_lies_between_the_second_and_the_ninth() -> None:
@@ -16,12 +16,12 @@ def test_the_interval_of_ten_runs_lies_between_the_second_and_the_ninth() -> Non
 
 
 def test_five_runs_have_a_median_but_no_interval() -> None:
-    assert median_interval([3.0, 1.0, 2.0, 5.0, 4.0]) == Interval(3.0, None, None, None)
+    assert median_interval([3.0, 1.0, 2.0, 5.0, 4.0]) == MedianInterval(3.0, None, None, None)
 
 
 def test_the_ratio_is_the_median_of_all_ratios() -> None:
     found = median_ratio([2.0, 6.0], [1.0, 2.0])
-    assert found == Interval(2.5, None, None, None)
+    assert found == MedianInterval(2.5, None, None, None)
 
 
 def test_the_interval_of_a_ratio_is_that_of_mann_and_whitney() -> None:

@@ -6,23 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import comb
-from typing import Final
 
 import numpy as np
 
-CONFIDENCE: Final = 0.95
-"""Least coverage of an interval; order statistics give the next that is possible above it."""
+from services.optimizer.analysis.interval import CONFIDENCE
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class MedianInterval:
     """A median with an interval that covers the true one, whatever the distribution.
 
     Attributes:
         median: of the values.
         low: lower end, None where there are too few runs for an interval.
         high: upper end, None with `low`.
-        coverage: probability that the interval covers, at least `CONFIDENCE`; None with `low`.
+        coverage: probability that the interval covers, of those that order statistics can have the
+            least that is at least `CONFIDENCE`; None with `low`.
     """
 
     median: float
@@ -31,7 +30,7 @@ class Interval:
     coverage: float | None
 
 
-def median_interval(values: Sequence[float]) -> Interval:
+def median_interval(values: Sequence[float]) -> MedianInterval:
     """Median of n runs, between two of their order statistics (binomial, exact).
 
     Args:
@@ -44,7 +43,7 @@ def median_interval(values: Sequence[float]) -> Interval:
     return _between(list(values), [comb(n, k) for k in range(n + 1)])
 
 
-def median_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Interval:
+def median_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> MedianInterval:
     """Median of all n m ratios of a run of one method to a run of the other.
 
     That is the estimate of Hodges and Lehmann for a shift of the logarithms. Its interval lies
@@ -62,7 +61,7 @@ def median_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> 
     return _between(ratios.tolist(), _counts_of_u(len(numerators), len(denominators)))
 
 
-def _between(values: list[float], counts: Sequence[int]) -> Interval:
+def _between(values: list[float], counts: Sequence[int]) -> MedianInterval:
     """counts: of equally likely cases in which 0, 1, ... of N sorted values lie below the true one.
 
     There are N + 1 of them, symmetric.
@@ -76,9 +75,9 @@ def _between(values: list[float], counts: Sequence[int]) -> Interval:
         outside += counts[left_out]
         left_out += 1
     if left_out == 0:
-        return Interval(median, None, None, None)
+        return MedianInterval(median, None, None, None)
     coverage = 1.0 - 2.0 * outside / total
-    return Interval(median, ordered[left_out - 1], ordered[-left_out], coverage)
+    return MedianInterval(median, ordered[left_out - 1], ordered[-left_out], coverage)
 
 
 @cache

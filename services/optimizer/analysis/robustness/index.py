@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.analysis.interval import CONFIDENCE, Interval
 from services.optimizer.search.random_stream import swarm_uniform
 from sim.outcome import OBJECTIVES
 from sim.variables import Variable
@@ -23,9 +24,6 @@ Floats = NDArray[np.float64]
 
 NORMALISED_OBJECTIVES: Final = OBJECTIVES[:5]
 """f1 to f5 of table 4.1, which preferences of chapter 4 weigh; f6 changes its sign."""
-
-CONFIDENCE: Final = 0.95
-"""Of all intervals."""
 
 _RESAMPLES: Final = 400
 _SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075
@@ -52,21 +50,6 @@ class LocalSample:
     designs: Floats
     shift: Floats
     radius: float
-
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """An estimate.
-
-    Attributes:
-        value: the estimate.
-        low: lower end of its interval at `CONFIDENCE`.
-        high: upper end.
-    """
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,13 +16,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.analysis.interval import Interval, percentile_interval
 from services.optimizer.analysis.ranking import rank_correlation
 from services.optimizer.search.random_stream import RandomNumbers, uniform
 
 Floats = NDArray[np.float64]
-
-CONFIDENCE: Final = 0.95
-"""Of all intervals."""
 
 _RESAMPLES: Final = 400
 _LEAST_RESAMPLES: Final = 40
@@ -40,21 +38,6 @@ _RESAMPLE, _DRAW = 0xFA71, 0xFA72
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
-    """By how much a design is worse than another, as a share of the other's worth.
-
-    Attributes:
-        value: +inf for a design that fails.
-        low: lower end of its interval at `CONFIDENCE`.
-        high: upper end.
-    """
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, slots=True)
 class Family:
     """Some of a job's scenarios, at least one.
 
@@ -63,13 +46,14 @@ class Family:
         correlation: Spearman's, of the fitness over them and over all, among designs that walk in
             all; None where it is undefined.
         winner: row of the design that is best by them.
-        regret: by how much the winner is worse than the job's best in the fitness over all.
+        regret: by how much the winner is worse than the job's best in the fitness over all, as a
+            share of it; +inf for a winner that fails.
     """
 
     scenarios: tuple[int, ...]
     correlation: float | None
     winner: int
-    regret: Loss
+    regret: Interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +64,7 @@ class LeftOut:
         scenario: index of the one.
         family: the others.
         loss: by how much the family's winner is worse than the job's best in the scenario that was
-            left out; less than 0 if it is better.
+            left out, as a share; less than 0 if it is better.
         similar: index of the scenario whose utilities are most like it in rank; None if there is
             no other, or the correlations are undefined.
         similarity: Spearman's correlation of the two.
@@ -88,7 +72,7 @@ class LeftOut:
 
     scenario: int
     family: Family
-    loss: Loss
+    loss: Interval
     similar: int | None
     similarity: float | None
 
@@ -251,14 +235,14 @@ def _best_first(fitness: Floats, most: int) -> NDArray[np.intp]:
     return rows[np.argsort(fitness[rows], kind="stable")]
 
 
-def _loss(own: Floats, best: Floats) -> Loss:
-    """own, best: (1 + B,) logarithms, of the designs themselves and of each resample."""
+def _loss(own: Floats, best: Floats) -> Interval:
+    """By how much designs are worse than others, as a share of what those are worth.
+
+    own, best: (1 + B,) logarithms, of the designs themselves and of each resample.
+    """
     # A resample may hold no design that walks in all scenarios.
     known = np.isfinite(best)
     with np.errstate(over="ignore"):
         losses = np.expm1(own[known] - best[known])
-    tail = (1.0 - CONFIDENCE) / 2.0
-    # Of ordered values, so that an infinite one is not interpolated.
-    low, high = np.quantile(losses, [tail, 1.0 - tail], method="inverted_cdf").tolist()
-    value = float(losses[0])
-    return Loss(value, min(low, value), max(high, value))
+    found = percentile_interval(float(losses[0]), losses)
+    return Interval(found.value, min(found.low, found.value), max(found.high, found.value))

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from services.optimizer.analysis.interval import Interval
 from services.optimizer.analysis.tournaments.tournament import (
     Floats,
-    Interval,
     Results,
     Runs,
     data_profile,

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.analysis.interval import Interval, percentile_interval
 from services.optimizer.analysis.ranks import average_ranks, spearman
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.kinds.tournament import TournamentSpec
@@ -20,8 +21,6 @@ Floats = NDArray[np.float64]
 
 RESAMPLES: Final = 500
 """Bootstrap samples of an interval."""
-
-CONFIDENCE: Final = 0.95
 
 _BOOTSTRAP: Final = 2_000
 """Purpose of random streams: the same runs give the same intervals."""
@@ -134,21 +133,6 @@ def runs_of(
     }
 
 
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """An estimate with a bootstrap interval of 95 %.
-
-    Attributes:
-        value: Of all runs.
-        low: Quantile 0.025 over resampled runs.
-        high: Quantile 0.975.
-    """
-
-    value: float
-    low: float
-    high: float
-
-
 def expected_running_time(to_target: Floats, budget: int) -> float:
     """Evaluations until the target is reached, if runs are repeated until one is successful.
 
@@ -176,7 +160,9 @@ def running_time_interval(runs: Runs) -> Interval:
         The estimate; a bound is +inf where so many resamples have no successful run.
     """
     value = expected_running_time(runs.to_target, runs.budget)
-    return _bounded(value, _running_times(runs.to_target[_picks(len(runs))], runs.budget))
+    return percentile_interval(
+        value, _running_times(runs.to_target[_picks(len(runs))], runs.budget)
+    )
 
 
 def data_profile(
@@ -241,7 +227,9 @@ def mean_ranks(results: Results, methods: Sequence[str]) -> dict[str, Interval]:
     fields = _fields(results, methods)
     value = _mean_ranks(fields, _Field.ranks)
     samples = np.array([_mean_ranks(fields, ranks) for ranks in _resampled_ranks()])
-    return {name: _bounded(float(value[k]), samples[:, k]) for k, name in enumerate(methods)}
+    return {
+        name: percentile_interval(float(value[k]), samples[:, k]) for k, name in enumerate(methods)
+    }
 
 
 def rank_correlation(one: Results, other: Results, methods: Sequence[str]) -> Interval:
@@ -262,7 +250,7 @@ def rank_correlation(one: Results, other: Results, methods: Sequence[str]) -> In
         return spearman(*(_mean_ranks(problems, ranks) for problems in fields))
 
     samples = np.array([correlation(ranks) for ranks in _resampled_ranks()])
-    return _bounded(correlation(_Field.ranks), samples)
+    return percentile_interval(correlation(_Field.ranks), samples)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -345,12 +333,3 @@ def _running_times(to_target: Floats, budget: int) -> Floats:
     spent = np.where(solved, to_target, budget).sum(axis=1)
     count = solved.sum(axis=1)
     return np.where(count > 0, spent / np.maximum(count, 1), math.inf)
-
-
-def _bounded(value: float, samples: Floats) -> Interval:
-    known = samples[~np.isnan(samples)]
-    if not len(known):
-        return Interval(value, math.nan, math.nan)
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low, high = np.quantile(known, (tail, 1.0 - tail), method="inverted_cdf")
-    return Interval(value, float(low), float(high))

@@ -1,0 +1,47 @@
+"""An estimate, and the interval that resampled data give it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+CONFIDENCE: Final = 0.95
+"""Of all intervals."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """An estimate with its interval at `CONFIDENCE`.
+
+    Attributes:
+        value: The estimate.
+        low: Lower end of the interval.
+        high: Upper end.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+def percentile_interval(value: float, resampled: NDArray[np.float64]) -> Interval:
+    """Interval between two quantiles of what resamples come to (Efron 1979).
+
+    Args:
+        value: The estimate.
+        resampled: (B,) the same of each resample, NaN for one that has none; +-inf allowed.
+
+    Returns:
+        The estimate with its interval; the ends are NaN if no resample has a value.
+    """
+    known = resampled[~np.isnan(resampled)]
+    if not len(known):
+        return Interval(value, math.nan, math.nan)
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    # Of ordered values, so that an infinite one is not interpolated.
+    low, high = np.quantile(known, (tail, 1.0 - tail), method="inverted_cdf")
+    return Interval(value, float(low), float(high))

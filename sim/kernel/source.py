@@ -88,6 +88,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             control_tick(),
             _own_file("sensors.c"),
             _own_file("control.c"),
+            _own_file("pool.c"),
             _own_file("driver.c"),
         ]
     )

@@ -101,14 +101,15 @@ def _control_log(
     states = split_states(robot, result.states[:walked])
     desired = setup.desired[:walked].astype(np.int64)
     angle = coding.angle_codes(encoder_angles(robot, states))
+    current = coding.current_codes(states.sensed_current)
     joints = robot.joint_names
     status, objectives = judge(setup, result, coding.substeps, timestep)
     return ControlLog(
         scenario=scenario,
         status=status,
-        desired=in_16_bits(desired, f"{scenario.name}: the desired angle", joints),
-        angle=in_16_bits(angle, f"{scenario.name}: the angle", joints),
-        current=coding.current_codes(states.sensed_current).astype(np.uint16),
+        desired=in_16_bits(desired, np.int16, f"{scenario.name}: the desired angle", joints),
+        angle=in_16_bits(angle, np.int16, f"{scenario.name}: the angle", joints),
+        current=in_16_bits(current, np.uint16, f"{scenario.name}: the current", joints),
         pwm=coding.pwm_codes(states.duty).astype(np.int16),
         objectives=objectives,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from sim.errors import SimulationInputError
 from sim.kernel.walk import CODE_LIMIT, Coding, check_gains
 
 _INT32: Final = (1 << 31) - 1
+
+Narrow = TypeVar("Narrow", np.int16, np.uint16)
 
 _NARROW: Final = 32
 _WIDE: Final = 64
@@ -133,11 +135,14 @@ def as_table(response: Response | None) -> LookupTable | None:
     raise SimulationInputError("firmware looks up tables; an inference has none")
 
 
-def in_16_bits(codes: NDArray[np.int64], what: str, joints: Sequence[str]) -> NDArray[np.int16]:
-    """Codes of angles as the robot has them: half a turn in either direction.
+def in_16_bits(
+    codes: NDArray[np.int64], kind: type[Narrow], what: str, joints: Sequence[str]
+) -> NDArray[Narrow]:
+    """Codes as the robot has them: angles of half a turn in either direction, absolute currents.
 
     Args:
         codes: (T, J) [counts].
+        kind: Of the robot's integers.
         what: They are, for messages.
         joints: J names.
 
@@ -147,7 +152,7 @@ def in_16_bits(codes: NDArray[np.int64], what: str, joints: Sequence[str]) -> ND
     Raises:
         SimulationInputError: One does not fit; names the joint.
     """
-    limits = np.iinfo(np.int16)
+    limits = np.iinfo(kind)
     beyond = (codes < limits.min) | (codes > limits.max)
     if beyond.any():
         tick, joint = (int(index) for index in np.argwhere(beyond)[0])
@@ -155,7 +160,7 @@ def in_16_bits(codes: NDArray[np.int64], what: str, joints: Sequence[str]) -> ND
             f"{what} of {joints[joint]} is {int(codes[tick, joint])} counts after {tick} ticks,"
             " which the 16 bits of firmware do not hold; leave this scenario out"
         )
-    return codes.astype(np.int16)
+    return codes.astype(kind)
 
 
 def _largest_product(table: LookupTable) -> int:

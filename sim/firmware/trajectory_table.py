@@ -86,7 +86,7 @@ def _codes(robot: Robot, scenario: Scenario, cycles: float) -> NDArray[np.int16]
     """(T, J) [counts of angle]."""
     planned = desired_angles(robot, scenario.model_copy(update={"cycles": cycles}))
     codes = planned.codes(robot.description.sensors.angle_counts).astype(np.int64)
-    return in_16_bits(codes, f"{scenario.name}: the desired angle", robot.joint_names)
+    return in_16_bits(codes, np.int16, f"{scenario.name}: the desired angle", robot.joint_names)
 
 
 def _table(name: str, codes: NDArray[np.int16], repeats_from: int) -> TrajectoryTable:

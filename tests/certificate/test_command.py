@@ -149,6 +149,7 @@ def test_ranges_and_held_values_are_the_users_to_choose(files: Path) -> None:
         ),
         (("published:A", "--scenarios", "moon"), 2, "scenarios.0: unknown scenario 'moon'"),
         (("published:A", "--log", "walk.npz"), 2, "log: goes with --replay"),
+        (("published:A", "--replay", 100_000), 2, "99999"),
         (("published:A", "--preference", "D"), 2, "preference: "),
     ],
 )

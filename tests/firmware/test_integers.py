@@ -79,9 +79,19 @@ def test_gains_beyond_the_simulators_integers_are_refused() -> None:
 
 def test_an_angle_of_more_than_half_a_turn_is_refused_by_name() -> None:
     codes = np.array([[0, 32767], [-32768, 32768]], dtype=np.int64)
-    assert in_16_bits(codes[:1], "x: the angle", ["coxa", "femur"]).tolist() == [[0, 32767]]
+    assert in_16_bits(codes[:1], np.int16, "x: the angle", ["coxa", "femur"]).tolist() == [
+        [0, 32767]
+    ]
     with pytest.raises(SimulationInputError, match="x: the angle of femur is 32768 counts after 1"):
-        in_16_bits(codes, "x: the angle", ["coxa", "femur"])
+        in_16_bits(codes, np.int16, "x: the angle", ["coxa", "femur"])
+
+
+def test_a_current_beyond_its_converter_is_refused_by_name() -> None:
+    # Full scale, rounded to steps of 16 counts.
+    codes = CODING.current_codes(np.array([[1.0, 1e6]]))
+    assert codes[0, 1] == 65536
+    with pytest.raises(SimulationInputError, match="x: the current of femur is 65536 counts"):
+        in_16_bits(codes, np.uint16, "x: the current", ["coxa", "femur"])
 
 
 def played(table: TrajectoryTable, ticks: int) -> np.ndarray:

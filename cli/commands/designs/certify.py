@@ -76,6 +76,7 @@ def certify(
         typer.Option(
             metavar="K",
             min=0,
+            max=99_999,
             help="Run no certificate: let the design walk in world K again, and show its results.",
         ),
     ] = None,

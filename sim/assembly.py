@@ -197,8 +197,8 @@ def plan_walk(
     internal_state = np.zeros(internal_state_size(robot))
     if robot.has_backlash:
         internal_state[:n_joints] = joints
-    shove = round(scenario.shove_at * ticks)
-    shove_ticks = (shove, min(shove + _SHOVE_TICKS, ticks)) if scenario.shove else (0, 0)
+    shove = min(round(scenario.shove_at * ticks), ticks - _SHOVE_TICKS)
+    shove_ticks = (shove, shove + _SHOVE_TICKS) if scenario.shove else (0, 0)
     displaced = noise is not None and noise.kind == "angle"
     start = np.concatenate([base, joints])
     parameters = pack_parameters(robot, scenario, timestep, start=joints, displaced=displaced)

@@ -162,7 +162,11 @@ class Scenario(BaseModel):
         " [deg].",
     )
     shove_at: float = Field(
-        default=0.5, ge=0.0, lt=1.0, description="Share of the walk at which the shove begins [1]."
+        default=0.5,
+        ge=0.0,
+        lt=1.0,
+        description="Share of the walk at which the shove begins, 0.1 s before its end at the"
+        " latest [1].",
     )
 
     @model_validator(mode="before")

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, Phase, settings
 from schemathesis.checks import not_a_server_error
 from schemathesis.core.parameters import ParameterLocation
 from schemathesis.generation.meta import CoveragePhaseData
+from schemathesis.schemas import APIOperation
 from schemathesis.specs.openapi.checks import (
     content_type_conformance,
     response_headers_conformance,
@@ -40,7 +41,8 @@ CHECKS = [
 _APP = create_app(cast(JobService, None), settings=Settings())
 
 # Streams end with their jobs only, and are tested apart.
-schema = schemathesis.openapi.from_dict(_APP.openapi()).exclude(operation_id="stream_events")
+_DOCUMENT = _APP.openapi()
+schema = schemathesis.openapi.from_dict(_DOCUMENT).exclude(operation_id="stream_events")
 
 _NAMES = re.compile(r"Object with valid '(\w+)' value: ")
 _seen: set[object] = set()
@@ -60,8 +62,7 @@ def filter_case(_: schemathesis.HookContext, case: schemathesis.Case[Any]) -> bo
     if coverage.parameter_location is not ParameterLocation.BODY:
         return True
     if coverage.location is not None:
-        # The end of a place in the schema: a model's number, its property and a keyword.
-        place: object = tuple(coverage.location.split("/")[-5:])
+        place: object = _within_model(case.operation, coverage.location)
     else:
         *names, value = _NAMES.split(coverage.description)
         place = (*names[-1:], value, _properties_beside(case.body, names[1::2]))
@@ -69,6 +70,23 @@ def filter_case(_: schemathesis.HookContext, case: schemathesis.Case[Any]) -> bo
     new = key not in _seen
     _seen.add(key)
     return new
+
+
+def _within_model(operation: APIOperation[Any, Any, Any, Any], location: str) -> tuple[str, ...]:
+    """A place in a body's schema: the innermost model that it is in, and the way on from there."""
+    body = _DOCUMENT["paths"][operation.path][operation.method]["requestBody"]["content"]
+    node: Any = body["application/json"]["schema"]
+    place: tuple[str, ...] = ()
+    for step in location.split("/")[1:]:
+        while isinstance(node, dict) and "$ref" in node:
+            name = node["$ref"].rpartition("/")[2]
+            node, place = _DOCUMENT["components"]["schemas"][name], (name,)
+        place = (*place, step)
+        if isinstance(node, list):
+            node = node[int(step)] if step.isdigit() else None
+        else:
+            node = node.get(step) if isinstance(node, dict) else None
+    return place
 
 
 def _properties_beside(body: Any, names: Sequence[str]) -> tuple[str, ...]:

@@ -61,6 +61,14 @@ def test_a_shove_acts_for_a_tenth_of_a_second_in_mid_walk() -> None:
     assert moved[end:].min() > 0.0
 
 
+@pytest.mark.parametrize(("share", "begin"), [(0.0, 0), (0.5, 250), (0.999, 450)])
+def test_a_shove_is_whole_wherever_it_begins(robot: Robot, share: float, begin: int) -> None:
+    scenario = short_walk(cycle_time=1.0, shove=1.0, shove_at=share)
+    plan = plan_walk(robot, scenario, control_steps(robot)[1])
+    assert plan is not None
+    assert plan(control_law("pi", tuple(PI.items()))).shove_ticks == (begin, begin + 50)
+
+
 def test_a_log_has_the_push_in_the_ticks_of_the_shove_alone() -> None:
     scenario = short_walk(shove=30.0, drop=0.3, shove_at=0.02)
     log = logged_walk(scenario, PI, "pi")

@@ -2,32 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
+from gaitswarm.requests.targets import Histories
 from gaitswarm.views.certificate import CertificateView
 from services.optimizer.analysis.robustness.certificate import certificate
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
-
-
-class Histories(Protocol):
-    """Where jobs and their evaluations are."""
-
-    def job(self, job_id: str) -> Job:
-        """A job.
-
-        Args:
-            job_id: identifier of the job.
-        """
-
-    def columns(self, job: Job) -> EvaluationColumns:
-        """All evaluations of a job.
-
-        Args:
-            job: as it was read.
-        """
 
 
 def run_certificate(

@@ -243,5 +243,5 @@ def _rows(values: NDArray[np.integer]) -> Iterable[str]:
 
 
 def _remark(text: str) -> str:
-    """What cannot end a remark."""
-    return text.replace("*/", "* /").replace("\n", " ")
+    """What neither ends a remark nor begins another one."""
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")

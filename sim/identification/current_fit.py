@@ -14,7 +14,7 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.electrical import supply_voltage
-from sim.kernel.observation import sensed_currents
+from sim.kernel.observation import sensed_currents, split_states
 from sim.kernel.walk import Precision
 from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
@@ -119,13 +119,11 @@ def recorded_currents(robot: Robot, states: Floats) -> Floats:
     Returns:
         Absolute, behind the current sensors' low-pass, at every control tick, (T, J) [A].
     """
-    n = robot.n_joints
-    duty = states[:, -n:]
-    # Behind backlash the motors have angles and rates of their own, first in the internal state.
-    first = 7 + n + 6
-    rates = states[:, first : first + n]
+    kept, n = split_states(robot, states), robot.n_joints
+    duty, rates = kept.duty, kept.joint_velocity
     if robot.has_backlash:
-        rates = states[:, first + 2 * n : first + 3 * n]
+        # The motors have angles and rates of their own, first in the internal state.
+        rates = kept.internal_state[:, n : 2 * n]
     actuators, supply = robot.actuators(), robot.description.supply
     conductance = 1.0 / actuators.resistance
     battery = supply_voltage(

@@ -149,6 +149,15 @@ def test_integers_that_are_too_narrow_do_not_compile(tmp_path: Path) -> None:
     assert "the direct part needs wider integers" in tested.err
 
 
+def test_whatever_a_design_is_called_its_firmware_compiles(tmp_path: Path) -> None:
+    folder = tmp_path / "firmware"
+    gait = short_walk(cycle_time=0.5, stride=0.04)
+    label = "*/ #error /* $P ${I} \\\n */*/ \u00fc"
+    write_firmware({"P": 0.25, "I": 0.0}, folder, controller="pi", scenarios=gait, label=label)
+    tested = make(folder, "test")
+    assert tested.code == 0, tested.out + tested.err
+
+
 def test_simulator_and_firmware_compile_one_text(published_a: Path) -> None:
     text = (published_a / "tick.c").read_text(encoding="utf-8")
     assert text == (ROOT / "sim" / "kernel" / "tick.c").read_text(encoding="utf-8")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
+import pytest
 
 from services.optimizer.analysis.robustness.preference_winners import drawn_preferences, winners
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
@@ -60,6 +63,18 @@ def test_a_design_that_fails_never_wins() -> None:
     columns = columns_of(TRADE_OFF, failed=(2,))
     found = winners(columns, drawn_preferences(columns, count=200, seed=1))
     assert {winner.row for winner in found} == {0, 1}
+
+
+def test_many_preferences_take_no_memory_for_each_design() -> None:
+    columns = columns_of(np.random.default_rng(1).uniform(1.0, 2.0, size=(20_000, 5)))
+    drawn = drawn_preferences(columns, count=100, seed=1)
+    tracemalloc.start()
+    found = winners(columns, drawn)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert sum(winner.share for winner in found) == pytest.approx(1.0)
+    # A number for each design and preference would be 16 MB.
+    assert peak < 8_000_000
 
 
 def test_preferences_are_drawn_alike_for_a_seed_and_biases_are_of_the_objectives_size() -> None:

@@ -92,14 +92,14 @@ def winners(
     """
     preferences = [*NAMED.values(), *drawn]
     names = [*NAMED, *("" for _ in drawn)]
-    judged = np.stack([_log_fitness(columns, preference, worlds) for preference in preferences])
-    best = judged.argmin(axis=1)
-    rows = sorted(set(best.tolist()))
+    best = np.array([_log_fitness(columns, p, worlds).argmin() for p in preferences])
+    rows = np.unique(best)
     # How far each winner leads the others, under every preference.
-    rivals = np.sort(judged[:, rows], axis=1)
+    winning = columns.rows(rows)
+    rivals = np.sort([_log_fitness(winning, p, worlds) for p in preferences], axis=1)
     lead = rivals[:, 1] - rivals[:, 0] if len(rows) > 1 else np.zeros(len(preferences))
     found = []
-    for row in rows:
+    for row in rows.tolist():
         won = np.flatnonzero(best == row)
         named = tuple(names[index] for index in won if names[index])
         chosen = won[0] if named else won[lead[won].argmax()]

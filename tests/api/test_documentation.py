@@ -66,6 +66,9 @@ def test_the_routes_are_these(document: Document) -> None:
         "get /v1/optimizers",
         "get /v1/controllers",
         "post /v1/controllers/{controller}/surface",
+        "get /v1/session",
+        "post /v1/session",
+        "delete /v1/session",
         "get /v1/healthz",
         "get /v1/readyz",
     }

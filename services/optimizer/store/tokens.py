@@ -32,7 +32,18 @@ class SqlTokens:
         self._clock = clock
 
     def create(self, name: str, scope: Scope) -> tuple[Token, str]:
-        """Make a token."""
+        """Make a token; see `Tokens`.
+
+        Args:
+            name: of no other token.
+            scope: what it is to allow.
+
+        Returns:
+            The token and its secret.
+
+        Raises:
+            InvalidRequest: the name cannot be one, or is taken.
+        """
         if not _NAME.fullmatch(name):
             raise InvalidRequest("must be 1 to 64 letters, digits, '_', '.' and '-'", field="name")
         try:
@@ -46,7 +57,11 @@ class SqlTokens:
             ) from None
 
     def create_first(self) -> str | None:
-        """Make a token that allows everything, if there has never been any token."""
+        """Make a token that allows everything, if there has never been any token.
+
+        Returns:
+            Its secret; None if there was a token before.
+        """
         try:
             with self._database.transaction(write=True) as connection:
                 if connection.execute(select(func.count()).select_from(tokens)).scalar_one():
@@ -57,13 +72,27 @@ class SqlTokens:
             return None
 
     def all(self) -> tuple[Token, ...]:
-        """Read all tokens, the oldest first."""
+        """Read all tokens, the oldest first.
+
+        Returns:
+            Valid and revoked ones.
+        """
         query = select(tokens).order_by(tokens.c.created_at, tokens.c.name)
         with self._database.transaction(write=False) as connection:
             return tuple(map(_token, connection.execute(query).mappings()))
 
     def revoke(self, name: str) -> Token:
-        """Let a token allow nothing from now on."""
+        """Let a token allow nothing from now on.
+
+        Args:
+            name: of the token.
+
+        Returns:
+            The token as it is then.
+
+        Raises:
+            NotFound: there is none of that name.
+        """
         with self._database.transaction(write=True) as connection:
             valid = (tokens.c.name == name, tokens.c.revoked_at.is_(None))
             now = self._clock(connection)
@@ -75,7 +104,14 @@ class SqlTokens:
         return _token(row)
 
     def find(self, secret: str) -> Token | None:
-        """Find the valid token of a secret."""
+        """Find the valid token of a secret.
+
+        Args:
+            secret: as whoever asks gave it.
+
+        Returns:
+            The token; None where there is none, or it was revoked.
+        """
         query = select(tokens).where(
             tokens.c.digest == secret_digest(secret), tokens.c.revoked_at.is_(None)
         )

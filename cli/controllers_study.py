@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -203,7 +203,7 @@ def study_table(found: Sequence[Comparison]) -> Table:
     """
     from rich.table import Table
 
-    from cli.tables import number
+    from cli.tables import interval_cells, number, relative_change
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     for column in ("chapter", "robot", "controller"):
@@ -214,21 +214,10 @@ def study_table(found: Sequence[Comparison]) -> Table:
         place = (f"{comparison.chapter} ({comparison.pi.quantity})", comparison.robot)
         for runs in (comparison.pi, comparison.fuzzy):
             interval = median_interval(runs.values) if runs.values else None
-            cells = _cells(interval, number)
+            cells = interval_cells(interval, number)
             table.add_row(*place, runs.controller, str(len(runs.values)), *cells)
             place = ("", "")
-        table.add_row(*place, "gain", "", *_cells(comparison.ratio, _percent), style="bold")
+        table.add_row(
+            *place, "gain", "", *interval_cells(comparison.ratio, relative_change), style="bold"
+        )
     return table
-
-
-def _cells(interval: MedianInterval | None, written: Callable[[float], str]) -> tuple[str, str]:
-    """Median and interval; a dash for what there is not."""
-    if interval is None:
-        return "–", "–"
-    if interval.low is None or interval.high is None:
-        return written(interval.median), "–"
-    return written(interval.median), f"{written(interval.low)} to {written(interval.high)}"
-
-
-def _percent(ratio: float) -> str:
-    return f"{100.0 * (ratio - 1.0):+.1f} %"

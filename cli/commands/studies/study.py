@@ -1,4 +1,4 @@
-"""`gaitswarm study`: what simplifications cost, and what a controller gains."""
+"""`gaitswarm study`: what simplifications cost; what controllers and searches in worlds gain."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import typer
 
 from cli.commands.studies.study_controllers import controllers
 from cli.commands.studies.study_precision import precision
+from cli.commands.studies.study_worlds import worlds
 from cli.options import Json, RobotOption
 
 if TYPE_CHECKING:
@@ -27,13 +28,15 @@ Scenario = Annotated[str, typer.Option(help="Name or number, several separated b
 def register(app: typer.Typer) -> None:
     """Add the group of commands."""
     studies = typer.Typer(
-        help="Measure what tables, steps, noise, precision and the controller do to the objectives."
+        help="Measure what tables, steps, noise, precision and the controller do to the objectives,"
+        " and what a search in worlds gains."
     )
     studies.command()(tables)
     studies.command()(steps)
     studies.command()(noise)
     studies.command()(precision)
     studies.command()(controllers)
+    studies.command()(worlds)
     app.add_typer(studies, name="study")
 
 

@@ -70,24 +70,13 @@ def controllers(
 
 def _run(planned: list[Comparison], workers: WorkerOptions) -> list[Comparison]:
     """Run what has not been run before. Raises JobEnded, and KeyboardInterrupt if interrupted."""
-    from contextlib import closing
-    from dataclasses import asdict, replace
+    from dataclasses import replace
 
-    from cli.embedded import Embedded, job_run
-    from gaitswarm.jobs.database import DatabaseJobs
-    from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.settings import read_settings
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
+    from cli.embedded import study_jobs
 
-    settings = read_settings(**asdict(workers))
-    url = database_to_write(settings)
-    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
-        jobs = DatabaseJobs(JobService(store), url)
+    with study_jobs(workers) as (_, run):
 
-        def run(runs: Runs) -> Runs:
-            return replace(
-                runs, jobs=tuple(job_run(spec, store, jobs, embedded) for spec in runs.specs)
-            )
+        def with_jobs(runs: Runs) -> Runs:
+            return replace(runs, jobs=tuple(run(spec) for spec in runs.specs))
 
-        return [replace(c, pi=run(c.pi), fuzzy=run(c.fuzzy)) for c in planned]
+        return [replace(c, pi=with_jobs(c.pi), fuzzy=with_jobs(c.fuzzy)) for c in planned]

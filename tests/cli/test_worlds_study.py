@@ -1,0 +1,174 @@
+"""Searches with and without worlds, judged in worlds that none of them has seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cli.worlds_study import (
+    Contestant,
+    HeldOut,
+    Run,
+    contestants,
+    runs_table,
+    study_document,
+    study_table,
+)
+from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView
+from services.optimizer.analysis.robustness.certificate import QUANTILES, Proportion, Spread
+from services.optimizer.jobs.preference import PREFERENCES
+from tests.cli.conftest import Gaitswarm
+
+TINY = ("--particles", "4", "--iterations", "1", "--worlds", "2", "--held-out", "3")
+HERE = ("--evaluator", "in-process")
+COMMON = {
+    "robot": "szabadka2",
+    "preference": "A",
+    "optimizer": "cma-es",
+    "particles": 4,
+    "iterations": 1,
+    "precision": "single",
+}
+
+
+def planned(**changes: Any) -> list[Contestant]:
+    options: dict[str, Any] = {"counts": [2], "aggregates": ["cvar"], "level": 0.75, "seeds": 2}
+    return contestants(COMMON, **(options | changes))
+
+
+def judged(nominal: float, *, failed: int = 0) -> CertificateView:
+    """A certificate of 1 000 worlds whose median is twice, and whose CVaR thrice the nominal."""
+    spread = Spread((nominal,) * 2 + (2 * nominal,) * 3, 0.0, 3 * nominal, failed / 50, nominal)
+    chance = ProportionView.from_proportion(Proportion(failed, 1000, 0.0, 0.1))
+    return CertificateView(
+        job="",
+        robot="szabadka2",
+        controller="pi",
+        design={},
+        preference=PREFERENCES["A"],
+        seed=0,
+        worlds=1000,
+        worlds_planned=1000,
+        quantiles=list(QUANTILES),
+        fitness=SpreadView.from_spread(spread),
+        fell=chance,
+        failed=chance,
+        scenarios={},
+        worst=[],
+        influences=[],
+    )
+
+
+def with_runs(contestant: Contestant, *views: CertificateView) -> Contestant:
+    runs = tuple(Run(seed, "", view) for seed, view in enumerate(views, start=1))
+    return Contestant(contestant.title, contestant.worlds, contestant.specs, runs)
+
+
+def test_each_search_has_the_same_budget_and_each_seed_worlds_of_its_own() -> None:
+    plain, *others = planned(counts=[2, 4], aggregates=["mean", "cvar"])
+    assert [c.title for c in (plain, *others)] == [
+        "without worlds",
+        "mean of 2",
+        "cvar of 2",
+        "mean of 4",
+        "cvar of 4",
+    ]
+    assert [spec.worlds for spec in plain.specs] == [None, None]
+    for contestant in others:
+        assert [spec.worlds and spec.worlds.seed for spec in contestant.specs] == [1, 2]
+    names = {"worlds", "name"}
+    for seed in (0, 1):
+        assert len({c.specs[seed].model_dump_json(exclude=names) for c in (plain, *others)}) == 1
+
+
+def test_quantities_are_medians_over_runs_beside_the_search_without_worlds() -> None:
+    plain, cvar = planned()
+    found = [
+        with_runs(plain, *map(judged, (10.0, 12.0, 11.0, 13.0))),
+        with_runs(cvar, *map(judged, (20.0, 24.0, 22.0, 26.0))),
+    ]
+    searches = study_document(found, HeldOut(1000, 0))["searches"]
+    medians = [
+        {name: values["of_runs"]["median"] for name, values in search["quantities"].items()}
+        for search in searches
+    ]
+    assert medians == [
+        {"nominal": 11.5, "median": 23.0, "cvar": 34.5, "failed": 0.0, "fell": 0.0},
+        {"nominal": 23.0, "median": 46.0, "cvar": 69.0, "failed": 0.0, "fell": 0.0},
+    ]
+    ratio = searches[1]["quantities"]["cvar"]["ratio"]
+    assert ratio["median"] == pytest.approx(2.0)
+    assert ratio["low"] < 2.0 < ratio["high"]
+    assert searches[0]["quantities"]["cvar"]["ratio"] is None
+
+
+def test_a_quantity_that_a_run_lacks_is_left_out() -> None:
+    plain, cvar = planned()
+    found = [
+        with_runs(plain, judged(10.0), judged(float("nan"))),
+        with_runs(cvar, judged(20.0), judged(22.0)),
+    ]
+    first, second = study_document(found, HeldOut(1000, 0))["searches"]
+    assert first["quantities"]["nominal"]["of_runs"] is None
+    assert second["quantities"]["nominal"]["of_runs"]["median"] == 21.0
+    assert second["quantities"]["nominal"]["ratio"] is None
+    _, _, median, *_ = study_table(found).columns
+    assert next(iter(median.cells)) == "–"
+
+
+def test_without_a_design_that_walks_there_is_nothing_to_compare() -> None:
+    for search in study_document(planned(), HeldOut(1000, 0))["searches"]:
+        assert search["runs"] == []
+        assert {values["of_runs"] for values in search["quantities"].values()} == {None}
+    _, _, median, _, change, _ = study_table(planned()).columns
+    assert {*median.cells, *change.cells} == {"–"}
+
+
+def test_a_tail_that_failed_in_part_is_a_lower_bound() -> None:
+    plain, cvar = planned()
+    found = [with_runs(plain, judged(10.0, failed=7)), with_runs(cvar, judged(20.0))]
+    cells = [list(column.cells) for column in runs_table(found).columns]
+    assert cells[4] == ["> 30", "60"]
+    assert [str(cell).split()[0] for cell in cells[5]] == ["7", "0"]
+    _, quantity, median, *_ = (list(column.cells) for column in study_table(found).columns)
+    assert median[quantity.index("CVaR 95 %")] == "> 30"
+
+
+@pytest.mark.slow
+def test_searches_are_judged_in_the_same_held_out_worlds(gaitswarm: Gaitswarm, db: Path) -> None:
+    asked = ("study", "worlds", *TINY, "--seeds", "1", "--db", db, *HERE)
+    done = gaitswarm(*asked, "--json")
+    assert done.code == 0, done.err
+    for search in done.json["searches"]:
+        (run,) = search["runs"]
+        best = gaitswarm("best", run["job"], "--db", db, "--json").json
+        spec = gaitswarm("status", run["certificate"], "--db", db, "--json").json["spec"]
+        assert spec["design"] == best["design"]
+        assert (spec["worlds"], spec["seed"], spec["precision"]) == (3, 0, "double")
+    shown = gaitswarm(*asked)
+    assert shown.code == 0, shown.err
+    assert "job " not in shown.err, "a job was run again"
+    assert "cvar of 2" in shown.out
+    assert "…" not in shown.out, "a table is wider than a terminal"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--held-out-seed", "2"), "held-out-seed: 2 is the seed of a search's worlds"),
+        (("--worlds", "8,many"), "worlds: '8,many' are no whole numbers"),
+        (("--worlds", "0"), "worlds.count"),
+        (("--aggregate", "median"), "worlds.aggregate"),
+        (("--preference", "D"), "preference"),
+        (("--optimizer", "annealer"), "unknown optimizer 'annealer'"),
+    ],
+)
+def test_a_study_that_makes_no_sense_is_refused_by_name(
+    gaitswarm: Gaitswarm, db: Path, options: tuple[str, ...], said: str
+) -> None:
+    refused = gaitswarm("study", "worlds", *options, "--db", db)
+    assert refused.code == 2
+    assert said in refused.err
+    assert not db.exists()

@@ -6,15 +6,19 @@ say what they mean, in which unit, and what is refused.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sim import former_names
 from sim.former_names import current_names
+from sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName
 
 JOINTS_PER_LEG = 3
 """Coxa, femur, tibia."""
+
+MOST_COUNTS: Final = 10**8
+"""Counts of a unit, at most: codes of some units then fit into 32 bits."""
 
 
 class _Data(BaseModel):
@@ -24,21 +28,23 @@ class _Data(BaseModel):
 class Motor(_Data):
     """A DC motor (thesis 2.2.5)."""
 
-    torque_constant: float = Field(gt=0.0, description="K_M [N m/A]; also the back-EMF's [V s/rad]")
-    resistance: float = Field(gt=0.0, description="R [ohm]")
-    inductance: float = Field(gt=0.0, description="L [H]")
-    rotor_inertia: float = Field(gt=0.0, description="J_M [kg m2]")
-    viscous_friction: float = Field(ge=0.0, description="B_M [N m s/rad], motor side")
+    torque_constant: Number = Field(
+        gt=0.0, description="K_M [N m/A]; also the back-EMF's [V s/rad]"
+    )
+    resistance: Number = Field(gt=0.0, description="R [ohm]")
+    inductance: Number = Field(gt=0.0, description="L [H]")
+    rotor_inertia: Number = Field(gt=0.0, description="J_M [kg m2]")
+    viscous_friction: Number = Field(ge=0.0, description="B_M [N m s/rad], motor side")
 
 
 class Gearhead(_Data):
     """A planetary gearhead; its losses are viscous and static friction on the output side."""
 
-    ratio: float = Field(gt=0.0, description="r_G [1]")
-    nominal_torque: float = Field(gt=0.0, description="M_NG [N m]")
-    nominal_speed: float = Field(gt=0.0, description="omega_NG [rad/s], motor side")
-    efficiency: float = Field(gt=0.0, le=1.0, description="eta at the nominal point [1]")
-    static_friction: float = Field(
+    ratio: Number = Field(gt=0.0, description="r_G [1]")
+    nominal_torque: Number = Field(gt=0.0, description="M_NG [N m]")
+    nominal_speed: Number = Field(gt=0.0, description="omega_NG [rad/s], motor side")
+    efficiency: Number = Field(gt=0.0, le=1.0, description="eta at the nominal point [1]")
+    static_friction: Number = Field(
         default=0.0,
         ge=0.0,
         description="against the motion at the output, whatever its speed [N m]",
@@ -48,21 +54,21 @@ class Gearhead(_Data):
 class Actuator(_Data):
     """Motor, gearhead and bevel gear of one joint, by the names of its parts."""
 
-    motor: str
-    gearhead: str
-    bevel: float = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
-    backlash: float = Field(
+    motor: PartName
+    gearhead: PartName
+    bevel: Number = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
+    backlash: Number = Field(
         default=0.0,
         ge=0.0,
         le=0.5,
         description="play between gearhead and link, end to end, the thesis's gearlash [rad]",
     )
-    shaft_stiffness: float = Field(
+    shaft_stiffness: Number = Field(
         default=500.0,
         gt=0.0,
         description="of the closed play, only with backlash [N m/rad]",
     )
-    shaft_damping: float = Field(
+    shaft_damping: Number = Field(
         default=0.5,
         ge=0.0,
         description="of the closed play, only with backlash [N m s/rad]",
@@ -82,9 +88,9 @@ where it is positive, so that what braking gives back is lost; or its absolute v
 class Supply(_Data):
     """One battery for all motors."""
 
-    voltage: float = Field(gt=0.0, description="open-circuit voltage [V]")
-    resistance: float = Field(ge=0.0, description="internal resistance [ohm]")
-    nominal_voltage: float = Field(
+    voltage: Number = Field(gt=0.0, description="open-circuit voltage [V]")
+    resistance: Number = Field(ge=0.0, description="internal resistance [ohm]")
+    nominal_voltage: Number = Field(
         gt=0.0, description="supply at which the PWM's full scale is given [V]"
     )
     energy: EnergyConvention = Field(
@@ -98,18 +104,26 @@ class Pwm(_Data):
     """Coded control signal: integer counts, full scale at the nominal supply."""
 
     counts: int = Field(gt=0, le=32767, description="full scale [counts]")
-    full_scale: float = Field(gt=0.0, description="motor voltage at full scale [V]")
-    step: int = Field(default=1, ge=1, description="resolution [counts]")
+    full_scale: Number = Field(gt=0.0, description="motor voltage at full scale [V]")
+    step: int = Field(default=1, ge=1, le=32767, description="resolution [counts]")
 
 
 class Sensors(_Data):
     """Coded readings (thesis table 4.4): integers, in steps of the converter's resolution."""
 
-    angle_counts: float = Field(gt=0.0, description="code of one radian [counts/rad]")
-    angle_step: int = Field(default=1, ge=1, description="encoder resolution [counts]")
-    current_counts: float = Field(gt=0.0, description="code of one ampere [counts/A]")
-    current_step: int = Field(default=16, ge=1, description="resolution of the ADC [counts]")
-    current_filter: float = Field(
+    angle_counts: Number = Field(
+        gt=0.0, le=MOST_COUNTS, description="code of one radian [counts/rad]"
+    )
+    angle_step: int = Field(
+        default=1, ge=1, le=MOST_COUNTS, description="encoder resolution [counts]"
+    )
+    current_counts: Number = Field(
+        gt=0.0, le=MOST_COUNTS, description="code of one ampere [counts/A]"
+    )
+    current_step: int = Field(
+        default=16, ge=1, le=MOST_COUNTS, description="resolution of the ADC [counts]"
+    )
+    current_filter: Number = Field(
         default=0.0,
         ge=0.0,
         le=1.0,
@@ -129,20 +143,20 @@ PlannedSoles = Literal["nominal", "own"]
 class Contact(_Data):
     """Sole on ground (thesis 2.2.6): spring and damper, and parameters of the friction laws."""
 
-    stiffness: float = Field(gt=0.0, description="k [N/m]")
-    damping: float = Field(ge=0.0, description="c [N s/m]")
-    sole: float = Field(ge=0.0, description="length of the sole's spring below the tibia [m]")
-    friction: float = Field(ge=0.0, description="mu [1]")
-    slip_velocity: float = Field(
+    stiffness: Number = Field(gt=0.0, description="k [N/m]")
+    damping: Number = Field(ge=0.0, description="c [N s/m]")
+    sole: Number = Field(ge=0.0, description="length of the sole's spring below the tibia [m]")
+    friction: Number = Field(ge=0.0, description="mu [1]")
+    slip_velocity: Number = Field(
         gt=0.0, description="linear_zone, dead_zone: v_lin, full friction from here on [m/s]"
     )
-    stick_velocity: float = Field(
+    stick_velocity: Number = Field(
         default=0.005, gt=0.0, description="karnopp, dead_zone: v_d, no friction below [m/s]"
     )
-    stick_stiffness: float = Field(
+    stick_stiffness: Number = Field(
         default=10000.0, gt=0.0, description="stick: of the sole along the ground [N/m]"
     )
-    stick_damping: float = Field(
+    stick_damping: Number = Field(
         default=100.0, ge=0.0, description="stick: of the sole along the ground [N s/m]"
     )
 
@@ -150,9 +164,11 @@ class Contact(_Data):
 class Leg(_Data):
     """One leg: joints `<name>_coxa`, `_femur`, `_tibia` and frame `<name>_foot` of the URDF."""
 
-    name: str
-    phase: float = Field(ge=0.0, lt=1.0, description="start of support, share of the cycle [1]")
-    actuators: tuple[str, str, str] = Field(description="actuators of coxa, femur, tibia")
+    name: Annotated[PartName, Field(max_length=LONGEST_LEG_NAME)]
+    phase: Number = Field(ge=0.0, lt=1.0, description="start of support, share of the cycle [1]")
+    actuators: tuple[PartName, PartName, PartName] = Field(
+        description="actuators of coxa, femur, tibia"
+    )
     contact: Contact | None = Field(default=None, description="this foot's own contact")
 
     @model_validator(mode="before")
@@ -174,16 +190,16 @@ class Leg(_Data):
 class RobotDescription(_Data):
     """All of a robot that its URDF does not say."""
 
-    name: str
-    description: str = ""
-    load_height: float = Field(description="height of a load over the body's centre [m]")
+    name: PartName
+    description: str = Field(default="", max_length=2000)
+    load_height: Number = Field(description="height of a load over the body's centre [m]")
     contact_law: ContactLaw = Field(default="linear_zone", description="friction of all feet")
     planned_soles: PlannedSoles = Field(
         default="nominal",
         description="soles that the gait is planned for: nominal, the common contact's, since a"
         " controller does not know them better; or own, each leg's",
     )
-    body_mass: float | None = Field(
+    body_mass: Number | None = Field(
         default=None,
         gt=0.0,
         description="body's mass in place of the URDF's, its inertia scaled alike [kg]",
@@ -192,14 +208,14 @@ class RobotDescription(_Data):
         default=False,
         description="whether shafts that yield join motors and links, also where there is no play",
     )
-    motors: dict[str, Motor]
-    gearheads: dict[str, Gearhead]
-    actuators: dict[str, Actuator]
+    motors: dict[PartName, Motor]
+    gearheads: dict[PartName, Gearhead]
+    actuators: dict[PartName, Actuator]
     supply: Supply
     pwm: Pwm
     sensors: Sensors
     contact: Contact
-    legs: tuple[Leg, ...] = Field(min_length=3)
+    legs: tuple[Leg, ...] = Field(min_length=3, max_length=MOST_LEGS)
 
     @model_validator(mode="before")
     @classmethod
@@ -215,7 +231,10 @@ class RobotDescription(_Data):
                 )
             if actuator.gearhead not in self.gearheads:
                 raise ValueError(f"actuators.{name}.gearhead: no gearhead {actuator.gearhead!r}")
+        names = [leg.name for leg in self.legs]
         for k, leg in enumerate(self.legs):
+            if leg.name in names[:k]:
+                raise ValueError(f"legs.{k}.name: {leg.name!r} is the name of another leg")
             for actuator_name in leg.actuators:
                 if actuator_name not in self.actuators:
                     raise ValueError(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from sim.errors import RobotFileError
+from sim.robot.bounds import check_toml
 from sim.robot.description import JOINTS_PER_LEG, Contact, RobotDescription
 from sim.robot.inertia import BodyInertia
 from sim.robot.toml_errors import first_problem
@@ -86,11 +87,14 @@ class Robot:
         description: its robot.toml.
         urdf: its robot.urdf.
         legs: geometry of the description's legs, in its order.
+        ships: whether its kinematic tree ships with gaitswarm; that of another robot may come from
+            anybody.
     """
 
     description: RobotDescription
     urdf: Urdf
     legs: tuple[LegGeometry, ...]
+    ships: bool = False
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -205,11 +209,13 @@ def parse_robot(toml: str, urdf: str) -> Robot:
         The robot.
 
     Raises:
-        RobotFileError: A file cannot be used; names file and field.
+        RobotFileError: A file breaks a bound of `sim.robot.bounds` or cannot be used; names file
+            and field.
     """
+    check_toml(toml)
     try:
         document = tomllib.loads(toml)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # no TOML, or an integer of thousands of digits
         raise RobotFileError(f"robot.toml: {error}") from error
     try:
         description = RobotDescription.model_validate(document)
@@ -240,4 +246,6 @@ def _geometry(leg: str, joints: Mapping[str, Joint]) -> LegGeometry:
     coxa, femur, tibia = (
         math.hypot(*joints[names[end]].origin.xyz.tolist()) for end in ("femur", "tibia", "foot")
     )
+    if not (femur and tibia):
+        raise RobotFileError(f"robot.urdf: leg {leg!r}: femur and tibia need a length")
     return LegGeometry(leg, (x, y, z), math.copysign(1.0, y), coxa, femur, tibia)

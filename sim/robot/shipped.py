@@ -42,10 +42,11 @@ def shipped_robot(name: str) -> Robot:
     folder = resources.files("sim.robot") / name
     parameters = folder / "parameters.toml"
     if not parameters.is_file():
-        return parse_robot(
+        robot = parse_robot(
             (folder / "robot.toml").read_text(encoding="utf-8"),
             (folder / "robot.urdf").read_text(encoding="utf-8"),
         )
+        return replace(robot, ships=True)
     document = tomllib.loads(parameters.read_text(encoding="utf-8"))
     robot = with_parameters(shipped_robot(document["base"]), document["parameters"])
     said = {field: document[field] for field in ("name", "description")}

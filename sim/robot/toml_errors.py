@@ -9,6 +9,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from sim.former_names import as_written
+from sim.robot.bounds import shortened
 from sim.robot.description import (
     Actuator,
     Contact,
@@ -21,8 +22,9 @@ from sim.robot.description import (
     Supply,
 )
 
-_TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
-_KEY: Final = re.compile(r"^\s*([^=#\[\]\s][^=]*?)\s*=")
+_TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
+_KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")
+"""Of a line without blanks around it. Possessive: no line takes longer than its length asks for."""
 
 _PARTS: Final[tuple[type[BaseModel], ...]] = (
     RobotDescription,
@@ -50,7 +52,7 @@ def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]
     """
     first = error.errors()[0]
     location = as_written(document, first["loc"])
-    where = ".".join(str(part) for part in location)
+    where = shortened(".".join(str(part) for part in location))
     line = line_of(text, [part for part in location if not _is_class(part)])
     message = first["msg"].removeprefix("Value error, ")
     meaning = _meaning(str(first["loc"][-1])) if first["loc"] else None
@@ -80,13 +82,13 @@ def line_of(text: str, path: Sequence[str | int]) -> int | None:
     found, depth = None, 0
     table: list[str | int] = []
     counts: dict[str, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        if match := _TABLE.match(line):
-            names = _split(match[2])
-            table = list(names)
+    for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
+        if match := _TABLE.fullmatch(line):
+            name = match[2].strip()
+            table = list(_split(name))
             if match[1] == "[[":
-                index = counts.get(match[2], -1) + 1
-                counts[match[2]] = index
+                index = counts.get(name, -1) + 1
+                counts[name] = index
                 table.append(index)
             here = table
         elif match := _KEY.match(line):

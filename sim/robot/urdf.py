@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
+from sim.robot.bounds import LARGEST, check_urdf, shortened
 from sim.robot.inertia import NO_INERTIA, BodyInertia
 
 if TYPE_CHECKING:
@@ -203,17 +204,18 @@ def parse_urdf(text: str) -> Urdf:
     """Read a URDF.
 
     Args:
-        text: Text of the file. It may come over the network: entities from outside are never
-            fetched, and entities that multiply are refused.
+        text: Text of the file, by anybody.
 
     Returns:
         What it says.
 
     Raises:
-        RobotFileError: It is no XML, a number cannot be read, or its links are not one tree.
+        RobotFileError: It breaks a bound of `sim.robot.bounds`, is no XML, a number cannot be
+            read, or its links are not one tree.
     """
+    check_urdf(text)
     try:
-        root = ET.fromstring(text)  # noqa: S314  see above
+        root = ET.fromstring(text)  # noqa: S314 - it has no entities of its own
     except ET.ParseError as error:
         raise RobotFileError(f"robot.urdf: {error}") from error
     joints = tuple(_joint(element) for element in root.findall("joint"))
@@ -246,7 +248,8 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
     if len(generation) != 1:
         raise RobotFileError(
             "robot.urdf: one link, the body, must hang on no joint; these do:"
-            f" {', '.join(map(repr, generation)) or 'none'}"
+            f" {', '.join(map(repr, generation[:5])) or 'none'}"
+            + (f" and {len(generation) - 5} more" if len(generation) > 5 else "")
         )
     place = {name: k for k, name in enumerate(links)}
     left = set(links)
@@ -313,7 +316,10 @@ def _inertia(link: ET.Element, whose: str) -> BodyInertia:
     origin = _origin(inertial, whose)
     turn = origin.matrix()
     rotational = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
-    return BodyInertia(float(_numbers(mass, "value", whose)[0]), origin.xyz, rotational)
+    kilograms = float(_numbers(mass, "value", whose)[0])
+    if kilograms < 0.0:
+        raise RobotFileError(f"robot.urdf: {whose}: a mass must not be less than 0")
+    return BodyInertia(kilograms, origin.xyz, rotational)
 
 
 def _origin(element: ET.Element, whose: str) -> Origin:
@@ -332,9 +338,9 @@ def _numbers(element: ET.Element, attribute: str, whose: str, default: str = "")
         values = np.array([float(part) for part in text.split()])
     except ValueError:
         values = np.empty(0)
-    if len(values) != count or not np.isfinite(values).all():
+    if len(values) != count or not (np.abs(values) <= LARGEST).all():
         raise RobotFileError(
-            f"robot.urdf: {whose}: {attribute}={text!r} of <{element.tag}> is not"
-            f" {'three numbers' if count == 3 else 'a number'}"
+            f"robot.urdf: {whose}: {attribute}={shortened(text)!r} of <{element.tag}> is not"
+            f" {'three numbers' if count == 3 else 'a number'} of {LARGEST:g} at most"
         )
     return values

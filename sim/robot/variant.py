@@ -12,6 +12,15 @@ from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 from sim import former_names
 from sim.choice import NAME, alternatives
 from sim.former_names import current_names
+from sim.robot.bounds import (
+    DEEPEST,
+    LONGEST_TOML,
+    LONGEST_URDF,
+    MOST_ELEMENTS,
+    MOST_LEGS,
+    MOST_LINKS,
+    MOST_VALUES,
+)
 from sim.robot.description import Actuator, ContactLaw, Leg, PlannedSoles
 from sim.robot.robot import Robot, parse_robot
 from sim.robot.shipped import DEFAULT_ROBOT, RobotName, shipped_robot
@@ -54,9 +63,15 @@ class RobotFiles(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     toml: str = Field(
-        max_length=200_000, description="robot.toml: legs, actuators, contact, supply."
+        max_length=LONGEST_TOML,
+        description=f"robot.toml: legs ({MOST_LEGS} at most), actuators, contact, supply;"
+        f" {MOST_VALUES} values at most, nested {DEEPEST} deep at most.",
     )
-    urdf: str = Field(max_length=800_000, description="robot.urdf: kinematic tree and inertias.")
+    urdf: str = Field(
+        max_length=LONGEST_URDF,
+        description=f"robot.urdf: kinematic tree and inertias; {MOST_LINKS} links and as many"
+        f" joints at most, {MOST_ELEMENTS} elements at most, no document type.",
+    )
 
     @model_validator(mode="after")
     def _is_a_robot(self) -> RobotFiles:

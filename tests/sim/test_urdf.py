@@ -141,22 +141,17 @@ def test_what_is_no_xml_is_told_by_line_and_column() -> None:
         parse_urdf("<robot><link>\n</robot>")
 
 
-def test_an_entity_from_outside_is_not_fetched() -> None:
-    document = (
-        '<!DOCTYPE robot [<!ENTITY secret SYSTEM "file:///etc/hostname">]>'
-        "<robot><link name='a'/>&secret;</robot>"
-    )
-    with pytest.raises(RobotFileError, match="undefined entity"):
-        parse_urdf(document)
-
-
-def test_entities_that_multiply_are_refused() -> None:
-    entities = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 10))
-    document = (
-        f'<!DOCTYPE robot [<!ENTITY e0 "{"x" * 1000}">{entities}]>'
-        "<robot><link name='a'/>&e9;</robot>"
-    )
-    with pytest.raises(RobotFileError, match="amplification"):
+@pytest.mark.parametrize(
+    "entities",
+    [
+        '<!ENTITY secret SYSTEM "file:///etc/hostname">',
+        "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 10)),
+        "",
+    ],
+)
+def test_a_document_type_is_refused_and_with_it_every_entity(entities: str) -> None:
+    document = f"<!DOCTYPE robot [{entities}]><robot><link name='a'/>&secret;&e9;</robot>"
+    with pytest.raises(RobotFileError, match="line 1: declares a document type"):
         parse_urdf(document)
 
 

@@ -1,0 +1,195 @@
+"""Bounds on the text of a robot's files, checked before anything is made of it.
+
+The text may come from anybody. Each check reads it once, in time proportional to its length, so
+that what is costly or dangerous later (nesting, long chains, entities that multiply) never begins.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Final
+from xml.parsers import expat
+
+from pydantic import AfterValidator, Field
+
+from sim.errors import RobotFileError
+
+LONGEST_TOML: Final = 200_000
+"""Characters of a robot.toml."""
+
+LONGEST_URDF: Final = 800_000
+"""Characters of a robot.urdf."""
+
+MOST_LEGS: Final = 32
+
+MOST_LINKS: Final = 256
+"""Links of a URDF, and likewise its joints."""
+
+LONGEST_NAME: Final = 100
+"""Characters of a part's name."""
+
+LONGEST_LEG_NAME: Final = 60
+"""Characters of a leg's name, as scenarios may have it."""
+
+DEEPEST: Final = 16
+"""Arrays, tables or elements within each other, and parts of a dotted key."""
+
+MOST_VALUES: Final = 5000
+"""Values of a robot.toml."""
+
+MOST_ELEMENTS: Final = 10_000
+"""Elements of a robot.urdf."""
+
+LONGEST_ATTRIBUTE: Final = 1000
+"""Characters of an attribute of a URDF."""
+
+SMALLEST, LARGEST = 1e-15, 1e9
+"""Size of a number that is not 0, in the units of its field."""
+
+_TOML: Final = re.compile(
+    r"""
+      \#[^\n]*+
+    | "{3}(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5}|\\?\Z)
+    | '{3}(?:[^']|'(?!''))*+(?:'{3,5}|\Z)
+    | "(?:[^"\\\n]|\\.)*+"?
+    | '[^'\n]*+'?
+    | (?P<open>[\[{])
+    | (?P<close>[\]}])
+    | (?P<value>[=,])
+    | (?P<dot>\.)
+    | (?P<line>\n\s*+)
+    """,
+    re.DOTALL | re.VERBOSE,
+)
+"""What of TOML can nest or repeat. Comments and strings are passed over; every alternative matches
+wherever it begins, so that no character is looked at twice."""
+
+
+def _in_size(value: float) -> float:
+    if value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
+        raise ValueError(f"must be 0 or from {SMALLEST:g} to {LARGEST:g} in size")
+    return value
+
+
+def _printable(name: str) -> str:
+    if not name.isprintable():
+        raise ValueError("must be of printable characters")
+    return name
+
+
+Number = Annotated[float, AfterValidator(_in_size)]
+"""A number of a robot.toml, of a size that formulas can take."""
+
+PartName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_printable)]
+"""Name of a part of a robot."""
+
+
+def check_toml(text: str) -> None:
+    """Check the size of a robot.toml.
+
+    Args:
+        text: Of the file.
+
+    Raises:
+        RobotFileError: It is too long, too deep, or has too many values; names line and bound.
+    """
+    _check_text("robot.toml", text, LONGEST_TOML)
+    depth, parts, values = 0, 1, 0
+    for token in _TOML.finditer(text):
+        kind = token.lastgroup
+        if kind == "dot":
+            parts += 1
+        elif kind is not None:
+            parts = 1
+            depth = max(0, depth + (kind == "open") - (kind == "close"))
+            values += kind == "value"
+        if depth > DEEPEST or parts > DEEPEST:
+            problem = f"nested too deep; {DEEPEST} tables, arrays or parts of a key are the most"
+        elif values > MOST_VALUES:
+            problem = f"has more than {MOST_VALUES} values"
+        else:
+            continue
+        line = 1 + text.count("\n", 0, token.start())
+        raise RobotFileError(f"robot.toml, line {line}: {problem}")
+
+
+def check_urdf(text: str) -> None:
+    """Check the size of a robot.urdf, and that it declares no document type, so no entities.
+
+    Args:
+        text: Of the file.
+
+    Raises:
+        RobotFileError: It is no XML, or breaks a bound; names line and bound.
+    """
+    _check_text("robot.urdf", text, LONGEST_URDF)
+    parser = expat.ParserCreate()
+    scan = _UrdfScan(parser)
+    parser.StartElementHandler = scan.start
+    parser.EndElementHandler = scan.end
+    parser.StartDoctypeDeclHandler = scan.doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise RobotFileError(f"robot.urdf: {error}") from error
+
+
+class _UrdfScan:
+    """Counts what a parser meets, and breaks off where a bound is passed."""
+
+    def __init__(self, parser: expat.XMLParserType) -> None:
+        self._parser = parser
+        self._depth = 0
+        self._elements = 0
+        self._parts = {"link": 0, "joint": 0}
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self._depth += 1
+        self._elements += 1
+        if self._depth > DEEPEST:
+            raise self._error(f"nested too deep; {DEEPEST} elements within each other are the most")
+        if self._elements > MOST_ELEMENTS:
+            raise self._error(f"has more than {MOST_ELEMENTS} elements")
+        for name, value in attributes.items():
+            longest = LONGEST_NAME if name == "name" else LONGEST_ATTRIBUTE
+            if len(value) > longest:
+                raise self._error(
+                    f"{shortened(name)} of <{shortened(tag)}> is longer than {longest} characters"
+                )
+        if not attributes.get("name", "").isprintable():
+            raise self._error(f"name of <{shortened(tag)}> must be of printable characters")
+        if self._depth == 2 and tag in self._parts:
+            self._parts[tag] += 1
+            if self._parts[tag] > MOST_LINKS:
+                raise self._error(f"has more than {MOST_LINKS} {tag}s")
+
+    def end(self, _tag: str) -> None:
+        self._depth -= 1
+
+    def doctype(self, *_: object) -> None:
+        raise self._error("declares a document type; a URDF needs none, leave it out")
+
+    def _error(self, problem: str) -> RobotFileError:
+        return RobotFileError(f"robot.urdf, line {self._parser.CurrentLineNumber}: {problem}")
+
+
+def shortened(text: str, longest: int = LONGEST_NAME) -> str:
+    """A text of any length, to be quoted in a message.
+
+    Args:
+        text: The text.
+        longest: Characters to keep.
+
+    Returns:
+        The text, or its beginning and an ellipsis.
+    """
+    return text if len(text) <= longest else f"{text[:longest]}..."
+
+
+def _check_text(file: str, text: str, longest: int) -> None:
+    if len(text) > longest:
+        raise RobotFileError(f"{file}: is longer than {longest} characters")
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise RobotFileError(f"{file}: character {error.start} is no Unicode character") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -125,6 +126,32 @@ def test_a_stride_that_a_turn_lengthens_out_of_reach_names_scenario_leg_and_mill
     both = turn.model_copy(update={"turn_mode": "both"})
     with pytest.raises(UnreachablePose, match=r"turn-right-fast.*left_\w+.* mm"):
         require_reachable(robot, both)
+
+
+@given(st.sampled_from(SCENARIOS), st.floats(0.01, 0.3), st.floats(1.0, 6.0))
+def test_a_walk_can_be_begun_if_all_of_its_angles_can_be_reached(
+    walk: Scenario, stride: float, cycles: float
+) -> None:
+    robot = load_robot("szabadka2")
+    longer = walk.model_copy(update={"stride": stride, "cycles": cycles})
+    miss = desired_angles(robot, longer).miss.max()
+    if miss > 0.0:
+        with pytest.raises(UnreachablePose) as refused:
+            require_reachable(robot, longer)
+        assert refused.value.miss == miss
+    else:
+        require_reachable(robot, longer)
+
+
+def test_reach_is_checked_in_no_time_however_long_walk_and_filter_are(robot: Robot) -> None:
+    longest = SCENARIOS[0].model_copy(
+        update={"cycle_time": 10.0, "cycles": 100.0, "fir_ms": 1000, "fir_window": "hamming"}
+    )
+    begun = time.process_time()
+    for k in range(32):
+        require_reachable(robot, longest.model_copy(update={"hip_height": 0.15 + 1e-4 * k}))
+    # Filtered to its end, one of them takes a minute.
+    assert time.process_time() - begun < 10.0
 
 
 def test_a_share_of_swing_is_the_rest_of_one_of_support(robot: Robot) -> None:

@@ -24,7 +24,20 @@ from sim.errors import KernelBuildError
 KEPT_UNUSED_DAYS: Final = 90
 """A library that was not loaded for so long is removed when another one is built."""
 
+SIZE_VARIABLE: Final = "GAITSWARM_KERNEL_CACHE_BYTES"
+"""Environment variable: libraries may take so much together; beyond it, those that were loaded
+longest ago are removed when another one is built."""
+
+DEFAULT_SIZE: Final = 1 << 30
+
 _DAY: Final = 86400.0
+
+_NOTED_AFTER: Final = 60.0
+"""Seconds after which a use is noted again: order of use need not be finer."""
+
+_in_use: Final[set[Path]] = set()
+"""Libraries that this process has found or built, and so may have loaded: it never removes them."""
+
 _OWN_FILE: Final = re.compile(r"(?P<stem>.+-[0-9a-f]{24})(-.+\.(so|sha256|tmp)|\.lock)")
 
 
@@ -46,6 +59,7 @@ def find(pattern: str, directory: Path | None = None) -> tuple[Path | None, tupl
             continue
         for library in candidates:
             if is_intact(library):
+                _in_use.add(library)
                 _mark_used(library)
                 return library, tuple(damaged)
             damaged.append(library)
@@ -88,8 +102,10 @@ def build(
         written in the private one.
 
     Raises:
-        KernelBuildError: No directory can be written, or the disk is full; and what `make` raises.
+        KernelBuildError: No directory can be written, the disk is full, or `SIZE_VARIABLE` is no
+            number; and what `make` raises.
     """
+    size = _size_limit()
     place = directory or _writable_directory()
     library = place / file
     try:
@@ -107,8 +123,9 @@ def build(
             f"{library} cannot be stored: {error}; set XDG_CACHE_HOME to a directory for compiled"
             " kernels"
         ) from error
+    _in_use.add(library)
     if directory is None:
-        _sweep(place)
+        _sweep(place, size)
     return library
 
 
@@ -140,7 +157,7 @@ def _checksum_of(library: Path) -> Path:
 def _mark_used(library: Path) -> None:
     """So that `_sweep` keeps it; a time of modification is kept by every file system."""
     with contextlib.suppress(OSError):  # shipped in an image, perhaps, where nothing is swept
-        if library.stat().st_mtime < time.time() - _DAY:
+        if library.stat().st_mtime < time.time() - _NOTED_AFTER:
             os.utime(library)
 
 
@@ -231,27 +248,52 @@ def _is_at(descriptor: int, path: Path) -> bool:
         return False
 
 
-def _sweep(directory: Path) -> None:
-    """Remove what dead processes left behind, and libraries that nobody has used for long.
+def _size_limit() -> int:
+    text = os.environ.get(SIZE_VARIABLE) or str(DEFAULT_SIZE)
+    if not (text.isascii() and text.isdecimal()):
+        raise KernelBuildError(f"{SIZE_VARIABLE}: {text!r} is not a number of bytes")
+    return int(text)
 
-    Whoever builds a library holds its lock, so what lies beside a lock that is free is of no use.
+
+def _sweep(directory: Path, size: int) -> None:
+    """Remove what dead processes left behind, and libraries that were not used for long.
+
+    What other processes have loaded stays in their memory, whatever becomes of the file; who has
+    only found it builds it again.
     """
     oldest = time.time() - KEPT_UNUSED_DAYS * _DAY
     with contextlib.suppress(OSError):
         for path in sorted(directory.iterdir()):
             own = _OWN_FILE.fullmatch(path.name)
             if own and _is_leftover(path, oldest):
-                with (
-                    contextlib.suppress(OSError),
-                    _locked(directory / f"{own['stem']}.lock", wait=False) as held,
-                ):
-                    if held:
-                        _remove(path)
+                _remove_unlocked(path, own["stem"])
+        kept = [
+            (path.stat().st_mtime, path.stat().st_size, path, own["stem"])
+            for path in directory.glob("*.so")
+            if (own := _OWN_FILE.fullmatch(path.name))
+        ]
+        taken = sum(bytes_ for _, bytes_, _, _ in kept)
+        for _, bytes_, path, stem in sorted(kept):
+            if taken <= size:
+                break
+            if path not in _in_use:
+                _remove_unlocked(path, stem)
+                taken -= bytes_
+
+
+def _remove_unlocked(path: Path, stem: str) -> None:
+    """Remove a file that nobody is building: whoever builds a library holds its lock."""
+    with (
+        contextlib.suppress(OSError),
+        _locked(path.with_name(f"{stem}.lock"), wait=False) as held,
+    ):
+        if held:
+            _remove(path)
 
 
 def _is_leftover(path: Path, oldest: float) -> bool:
     if path.suffix == ".so":
-        return path.stat().st_mtime < oldest
+        return path not in _in_use and path.stat().st_mtime < oldest
     if path.suffix == ".sha256":
         return not path.with_suffix("").exists()
     return True

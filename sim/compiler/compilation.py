@@ -32,6 +32,9 @@ from sim.errors import KernelBuildError
 TIME_LIMIT: Final = 300.0
 """Seconds that a compiler may take; a kernel takes one some five."""
 
+_ATTEMPTS: Final = 3
+"""To load a library that other processes remove."""
+
 PREBUILT: Final = Path(__file__).with_name("prebuilt")
 """Where `python -m scripts.prebuilt` puts libraries, for a wheel to bring them."""
 
@@ -72,18 +75,25 @@ def load_library(
     Raises:
         KernelBuildError: As for `build_library`, or the library cannot be loaded.
     """
-    library = build_library(
-        name, identity, source, wanted=wanted, extra_flags=extra_flags, time_limit=time_limit
+    for _ in range(_ATTEMPTS):
+        library = build_library(
+            name, identity, source, wanted=wanted, extra_flags=extra_flags, time_limit=time_limit
+        )
+        if library is None:
+            return None
+        try:
+            return ctypes.CDLL(str(library))
+        except OSError as error:
+            # Between finding and loading it, another process may have removed it.
+            if library.exists():
+                raise KernelBuildError(
+                    f"{library} cannot be loaded: {error}; set XDG_CACHE_HOME to a directory whose"
+                    " files may be executed"
+                ) from error
+    raise KernelBuildError(
+        f"{name} was removed {_ATTEMPTS} times before it could be loaded; set {cache.SIZE_VARIABLE}"
+        " to more bytes"
     )
-    if library is None:
-        return None
-    try:
-        return ctypes.CDLL(str(library))
-    except OSError as error:
-        raise KernelBuildError(
-            f"{library} cannot be loaded: {error}; set XDG_CACHE_HOME to a directory whose files"
-            " may be executed"
-        ) from error
 
 
 def build_library(

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.compiler.cache import KEPT_UNUSED_DAYS
+from sim.compiler.cache import KEPT_UNUSED_DAYS, SIZE_VARIABLE
 from sim.compiler.compilation import load_library
 from sim.errors import KernelBuildError
 from tests.sim.processes import run_python
@@ -217,6 +217,97 @@ def test_a_library_in_use_stays_however_old_it_is(cache: Path) -> None:
     assert load_library("answer", b"", lambda: SOURCE) is not None
     built(cache, "another")
     assert library.exists()
+
+
+def stored(cache: Path, name: str, megabytes: int, *, hours_ago: float) -> Path:
+    """A library that another process built and used so long ago."""
+    cache.mkdir(exist_ok=True)
+    library = cache / f"kernel-{name}-{'0' * 24}-abcdef01.so"
+    library.write_bytes(b"")
+    os.truncate(library, megabytes << 20)
+    library.with_name(f"{library.name}.sha256").touch()
+    then = time.time() - 3600.0 * hours_ago
+    os.utime(library, (then, then))
+    return library
+
+
+def test_beyond_its_size_a_cache_loses_the_libraries_that_were_used_longest_ago(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(SIZE_VARIABLE, str(8 << 20))
+    oldest, old, young = (
+        stored(cache, name, 4, hours_ago=hours)
+        for name, hours in (("oldest", 72.0), ("old", 48.0), ("young", 1.0))
+    )
+    library = built(cache)
+    assert not oldest.exists()
+    assert not oldest.with_name(f"{oldest.name}.sha256").exists()
+    assert not old.exists(), "what was just built counts as well"
+    assert young.exists()
+    assert library.exists()
+
+
+def test_a_library_that_is_used_counts_as_young(cache: Path) -> None:
+    library = built(cache)
+    two_hours_ago = time.time() - 7200.0
+    os.utime(library, (two_hours_ago, two_hours_ago))
+    # Another process uses it, and a third one makes room.
+    assert run_python(ASK, XDG_CACHE_HOME=str(cache.parent)).returncode == 0
+    unused = stored(cache, "unused", 4, hours_ago=1.0)
+    ask = ASK.replace('"answer", b""', '"other", b"other"')
+    environment = {"XDG_CACHE_HOME": str(cache.parent), SIZE_VARIABLE: str(1 << 20)}
+    assert run_python(ask, **environment).returncode == 0
+    assert not unused.exists()
+    assert library.exists()
+
+
+def test_a_process_removes_nothing_that_it_uses_itself(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(SIZE_VARIABLE, "0")
+    first = built(cache)
+    foreign = stored(cache, "foreign", 1, hours_ago=0.0)
+    second = built(cache, "another")
+    assert first.exists()
+    assert second.exists()
+    assert not foreign.exists()
+
+
+def test_a_library_that_another_process_is_building_is_not_removed(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(SIZE_VARIABLE, "0")
+    foreign = stored(cache, "foreign", 1, hours_ago=1.0)
+    with (cache / f"kernel-foreign-{'0' * 24}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        built(cache)
+    assert foreign.exists()
+
+
+def test_a_library_that_is_removed_before_it_is_loaded_is_built_again(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load = ctypes.CDLL
+    met: list[str] = []
+
+    def too_late(path: str) -> ctypes.CDLL:
+        if not met:
+            Path(path).unlink()
+        met.append(path)
+        return load(path)
+
+    monkeypatch.setattr(ctypes, "CDLL", too_late)
+    assert built(cache).exists()
+    assert len(met) == 2
+
+
+@pytest.mark.parametrize("size", ["much", "-1", "1e9", "1GB"])
+def test_a_size_that_is_no_number_of_bytes_is_named_by_its_variable(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, size: str
+) -> None:
+    monkeypatch.setenv(SIZE_VARIABLE, size)
+    with pytest.raises(KernelBuildError, match=f"{SIZE_VARIABLE}: '{size}' is not a number"):
+        load_library("answer", b"", lambda: SOURCE)
 
 
 def open_to_all(private: Path) -> None:

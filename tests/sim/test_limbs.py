@@ -18,7 +18,9 @@ from sim.outcome import Status
 from sim.robot import SHIPPED, Robot, RobotFiles, load_robot
 from sim.robot.inertia import BodyInertia
 from sim.robot.limbs import Placement, limb_of, limbs_of
+from sim.robot.robot import parse_robot
 from sim.robot.urdf import parse_urdf
+from tests.examples.paths import QUADRUPED
 from tests.examples.walks import short_walk, walk
 from tests.sim.pinocchio_oracle import Oracle, robot_named
 
@@ -107,6 +109,17 @@ def test_robots_with_limbs_of_one_kind_share_a_library_and_walk_by_their_own_con
         np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
         objectives.append(fast.outcome.objectives[0, :5])
     assert (np.abs(objectives[1] / objectives[0] - 1.0) > 1e-3).all()
+
+
+def test_comments_blanks_and_names_in_a_robots_files_make_no_other_kernel() -> None:
+    toml, urdf = ((QUADRUPED / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
+    robot = parse_robot(toml, urdf)
+    rewritten = parse_robot(
+        "# Rewritten.\n" + toml.replace("left_", "port_").replace(" = ", "="),
+        urdf.replace("left_", "port_").replace("<link", "<!-- A link. -->\n\n   <link"),
+    )
+    assert kernel_identity(rewritten) == kernel_identity(robot)
+    assert rewritten.joint_names != robot.joint_names
 
 
 def test_limbs_about_other_axes_are_of_another_kind() -> None:

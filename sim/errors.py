@@ -5,6 +5,7 @@ SimulationError
 │   ├── UnreachablePose     a foot target outside the leg's reach; names scenario, leg, miss in mm
 │   ├── MeasuredLogError    a log that cannot be read; names line, column and unit
 │   └── RobotFileError      a robot description that cannot be used; names file and field
+├── ProcessEnded            work in a process of its own took too much, or ended it
 └── KernelBuildError        a kernel cannot be compiled, stored or loaded on this machine
 
 What a walk may legitimately end in (divergence, a fall) is a `sim.outcome.Status`, never one of
@@ -64,6 +65,10 @@ class MeasuredLogError(SimulationInputError):
 
 class RobotFileError(SimulationInputError):
     """A robot description that cannot be used."""
+
+
+class ProcessEnded(SimulationError):
+    """Work in a process of its own came to no end; says why, as the rest of a sentence."""
 
 
 class KernelBuildError(SimulationError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import math
 import os
 import platform
 import shlex
@@ -42,6 +43,21 @@ SCHEDULING: Final = ("-fschedule-insns", "-fsched-pressure")
 
 _PROBE_LIMIT: Final = 30.0
 """Seconds that a compiler may take to say its version."""
+
+COMPILER_MEMORY: Final = 8 << 30
+"""Data that a process of a compiler may have [B]; a kernel takes one a fortieth of that."""
+
+# Limits are set in the process that becomes the compiler, and are those of all that it starts.
+_LIMITED: Final = """
+import os, sys
+try:
+    import resource
+    for kind, value in ((resource.RLIMIT_DATA, sys.argv[1]), (resource.RLIMIT_CPU, sys.argv[2])):
+        resource.setrlimit(kind, (int(value), resource.getrlimit(kind)[1]))
+except (ImportError, ValueError, OSError):
+    pass
+os.execvp(sys.argv[3], sys.argv[3:])
+"""
 
 _ADVICE: Final[Mapping[str, str]] = {
     "Windows": "kernels are compiled on Linux and macOS only; run gaitswarm in WSL",
@@ -124,7 +140,8 @@ def run_compiler(
         arguments: Its command line.
         scratch: A directory for what it keeps for itself meanwhile.
         purpose: What it is to do, for messages; follows "did not".
-        time_limit: Seconds that it may take. It is ended then, with all that it started.
+        time_limit: Seconds that it may take. It is ended then, with all that it started. No process
+            of it may take more of a processor, nor more than `COMPILER_MEMORY`.
 
     Raises:
         KernelBuildError: It cannot be run, takes too long or refuses; with what it says.
@@ -132,8 +149,10 @@ def run_compiler(
     command = shlex.join(compiler.command)
     # What the compiler keeps for itself goes with the directory, even if it is killed.
     environment = {**os.environ, "TMPDIR": str(scratch)}
+    limits = [str(COMPILER_MEMORY), str(math.ceil(time_limit))]
+    limited = [sys.executable, "-I", "-S", "-c", _LIMITED, *limits]
     try:
-        done = _run([*compiler.command, *arguments], time_limit, environment)
+        done = _run([*limited, *compiler.command, *arguments], time_limit, environment)
     except subprocess.TimeoutExpired as error:
         raise KernelBuildError(
             f"{command} did not {purpose} within {time_limit:g} s, and was ended"

@@ -18,11 +18,12 @@ from sim.compiler.compilation import load_library
 from sim.compiler.target import Target
 from sim.controllers.base import ControlLaw, LookupTable, Response
 from sim.errors import KernelBuildError, SimulationInputError
+from sim.kernel.derivation import derived_source
 from sim.kernel.kinds import robot_constants
 from sim.kernel.lanes import plan_lanes
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.sharing import STRUCTURES, Pool
-from sim.kernel.source import kernel_identity, kernel_source
+from sim.kernel.source import kernel_identity
 from sim.kernel.walk import (
     Coding,
     LaneUse,
@@ -386,7 +387,7 @@ def _load(
     return load_library(
         "kernel" if precision == "double" else "kernel-single",
         kernel_identity(robot, precision),
-        lambda: kernel_source(robot, precision),
+        lambda: derived_source(robot, precision),
         wanted=wanted,
         extra_flags=extra_flags,
     )

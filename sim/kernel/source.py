@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _NOT_IN_THE_SOURCE: Final = (
     "batch.py",
+    "derivation.py",
     "lanes.py",
     "native.py",
     "observation.py",

@@ -221,6 +221,22 @@ def parse_robot(toml: str, urdf: str) -> Robot:
         description = RobotDescription.model_validate(document)
     except ValidationError as error:
         raise RobotFileError(first_problem(error, toml, document)) from error
+    return assembled(description, urdf)
+
+
+def assembled(description: RobotDescription, urdf: str) -> Robot:
+    """A robot from its description and the text of its URDF.
+
+    Args:
+        description: What robot.toml says.
+        urdf: Text of robot.urdf.
+
+    Returns:
+        The robot.
+
+    Raises:
+        RobotFileError: The URDF cannot be used, or has not the description's legs.
+    """
     tree = parse_urdf(urdf)
     for joint in tree.joints:
         if not joint.fixed and joint.origin.rpy.any():

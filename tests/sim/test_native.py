@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from sim.compiler.compilation import build_library, load_library, vector_header
+from sim.compiler.toolchain import COMPILER_MEMORY
 from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.kinds import robot_constants
 from sim.kernel.native import NativeKernel, native_kernel, text_size
@@ -167,6 +168,17 @@ def test_a_compiler_that_takes_too_long_is_ended_with_all_that_it_started(tmp_pa
     assert "did not compile slow" in done.stderr
     assert "within 3 s" in done.stderr
     assert list((cache / "gaitswarm").iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other system has these limits for sure")
+def test_a_compiler_has_limits_of_memory_and_of_a_processors_time(tmp_path: Path) -> None:
+    tells = _compiler_that(tmp_path, "echo limits $(ulimit -d) $(ulimit -t) >&2; exit 1")
+    code = (
+        "from sim.compiler.compilation import load_library\n"
+        "load_library('limited', b'', lambda: '', time_limit=7.5)"
+    )
+    done = run_python(code, CC=tells, XDG_CACHE_HOME=str(tmp_path / "cache"))
+    assert f"limits {COMPILER_MEMORY >> 10} 8" in done.stderr
 
 
 LOAD_QUADRUPED = """

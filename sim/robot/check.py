@@ -1,0 +1,98 @@
+"""Whether a robot by anybody can be used, tried in a process that may be ended."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from typing import Final
+
+from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
+from sim.limited_process import Document, LimitedProcesses, serve
+from sim.robot import bounds
+from sim.robot.limbs import limbs_of
+from sim.robot.robot import parse_robot
+from sim.robot.shapes import visible_links
+
+SECONDS: Final = 20.0
+"""That a check may take; it takes some hundredths of a second, the first a second."""
+
+CPU_SECONDS: Final = 10
+
+MEMORY: Final = 2 << 30
+"""Address space of a process that checks [B]; it takes a tenth of that."""
+
+_REMEMBERED: Final = 1024
+"""Robots that need not be checked again, by their digests."""
+
+PROCESSES: Final = LimitedProcesses(
+    "sim.robot.check", count=2, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
+)
+
+
+class _Checked:
+    """Digests of robots that have passed, those that were asked for last at the end."""
+
+    def __init__(self) -> None:
+        self._digests: OrderedDict[bytes, None] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def knows(self, digest: bytes) -> bool:
+        with self._lock:
+            known = digest in self._digests
+            if known:
+                self._digests.move_to_end(digest)
+            return known
+
+    def add(self, digest: bytes) -> None:
+        with self._lock:
+            self._digests[digest] = None
+            if len(self._digests) > _REMEMBERED:
+                self._digests.popitem(last=False)
+
+
+_checked: Final = _Checked()
+
+
+def check_files(toml: str, urdf: str) -> None:
+    """Check in another process that a robot's files can be used. Once a robot: it is remembered.
+
+    Args:
+        toml: Text of robot.toml.
+        urdf: Text of robot.urdf.
+
+    Raises:
+        RobotFileError: A file cannot be used; names file and field. Or the check took too much time
+            or memory, or ended its process.
+    """
+    bounds.check_toml(toml)
+    bounds.check_urdf(urdf)
+    digest = hashlib.sha256(b"%d %s%s" % (len(toml), toml.encode(), urdf.encode())).digest()
+    if _checked.knows(digest):
+        return
+    try:
+        PROCESSES.ask({"toml": toml, "urdf": urdf})
+    except ProcessEnded as error:
+        raise RobotFileError(f"the robot cannot be used: checking it {error}") from error
+    except SimulationInputError as error:
+        raise RobotFileError(str(error)) from error
+    _checked.add(digest)
+
+
+def _answer(request: Document) -> Document:
+    """All that is made of a robot's files but its kernel."""
+    # The first use: a process that has answered one request has it.
+    import pinocchio as pin  # noqa: PLC0415
+
+    robot = parse_robot(request["toml"], request["urdf"])
+    limbs_of(robot)
+    visible_links(robot)
+    try:
+        pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
+    except (ValueError, RuntimeError) as error:
+        raise RobotFileError(f"robot.urdf: Pinocchio cannot read it: {error}"[:500]) from error
+    return {}
+
+
+if __name__ == "__main__":
+    serve(_answer)

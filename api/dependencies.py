@@ -53,16 +53,22 @@ class SimulationSlots:
         return await run_sync(work, limiter=self._limiter)
 
 
+_VALIDATIONS: Final = 2
+"""Bodies that are validated at once: threads of Python take turns, the event loop's among them."""
+
+
 class State(TypedDict):
     """`request.state` of every request: what the lifespan of the application yields.
 
-    stopping: set by the server when it begins to stop; event streams end then. runs_jobs: whether
-    the runner beside it still claims jobs; None if there is none.
+    validations: threads that validate bodies. stopping: set by the server when it begins to stop;
+    event streams end then. runs_jobs: whether the runner beside it still claims jobs; None if there
+    is none.
     """
 
     service: JobService
     settings: Settings
     slots: SimulationSlots
+    validations: anyio.CapacityLimiter
     stopping: asyncio.Event
     runs_jobs: Callable[[], bool] | None
 
@@ -88,6 +94,7 @@ def lifespan(
             service=service,
             settings=settings,
             slots=slots,
+            validations=anyio.CapacityLimiter(_VALIDATIONS),
             stopping=asyncio.Event(),
             runs_jobs=runs_jobs,
         )

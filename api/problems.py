@@ -46,6 +46,7 @@ from services.optimizer.errors import (
     Unreadable,
 )
 from sim.errors import SimulationError, SimulationInputError
+from sim.robot.bounds import shortened
 
 _log = logging.getLogger("gaitswarm.api")
 
@@ -57,6 +58,11 @@ _METHODS: Final = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 
 _MOST_ERRORS: Final = 20
 """A body can be wrong in ten thousand places; nobody reads them all."""
+
+_LONGEST_FIELD: Final = 300
+_LONGEST_MESSAGE: Final = 1000
+_LONGEST_DETAIL: Final = 5000
+"""Characters: what is wrong may quote a whole body."""
 
 _TITLES: Final = {
     "malformed-json": "The body is not JSON",
@@ -126,7 +132,7 @@ def problem(
         type=f"urn:gaitswarm:problem:{kind}",
         title=_TITLES.get(kind, HTTPStatus(status).phrase),
         status=status,
-        detail=detail,
+        detail=shortened(detail, _LONGEST_DETAIL),
         instance=request_path,
         errors=list(errors),
     )
@@ -188,9 +194,9 @@ async def _on_domain_error(request: Request, error: Exception) -> Response:
     errors = []
     if isinstance(error, InvalidRequest):
         message = detail.removeprefix(f"{error.field}: ")
-        errors = [FieldErrorView(field=error.field, message=message)]
+        errors = [_short(FieldErrorView(field=error.field, message=message))]
     elif isinstance(error, SimulationInputError):
-        errors = [FieldErrorView.from_message("", detail)]
+        errors = [_short(FieldErrorView.from_message("", detail))]
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
         _log.error("%s %s: %s", request.method, request.url.path, detail)
         return problem(request.url.path, status, name, detail, headers=_RETRY)
@@ -231,11 +237,18 @@ async def _on_invalid(request: Request, raised: Exception) -> Response:
         errors = [FieldErrorView(field="body", message=message)]
         return problem(request.url.path, 400, "malformed-json", f"body: {message}", errors=errors)
     errors = _in_the_words_of_the_request(found, error.body)
-    shown = errors[:_MOST_ERRORS]
+    shown = [_short(entry) for entry in errors[:_MOST_ERRORS]]
     detail = "; ".join(f"{e.field}: {e.message}" if e.field else e.message for e in shown)
     if len(errors) > _MOST_ERRORS:
         detail += f"; and {len(errors) - _MOST_ERRORS} more"
     return problem(request.url.path, 422, "invalid-request", detail, errors=shown)
+
+
+def _short(error: FieldErrorView) -> FieldErrorView:
+    return FieldErrorView(
+        field=shortened(error.field, _LONGEST_FIELD),
+        message=shortened(error.message, _LONGEST_MESSAGE),
+    )
 
 
 def _in_the_words_of_the_request(

@@ -12,6 +12,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from services.optimizer.errors import InvalidRequest, StoreUnavailable
 from services.worker import EvaluatorKind
+from sim.compiler.cache import DEFAULT_SIZE
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
 
@@ -56,6 +57,11 @@ class Settings(BaseSettings):
     cache: bool = Field(
         default=True, description="Whether a design is walked only if no job has walked it before."
     )
+    kernel_cache_bytes: int = Field(
+        default=DEFAULT_SIZE,
+        ge=0,
+        description="What compiled kernels may take together [B]; `sim.compiler.cache` reads it.",
+    )
     concurrent_jobs: int = Field(default=2, ge=1, le=256, description="Jobs to run at once.")
     lease_seconds: float = Field(
         default=30.0,
@@ -99,6 +105,11 @@ class Settings(BaseSettings):
         default=10_000.0,
         gt=0.0,
         description="The same for a request that walks a sample of designs [s].",
+    )
+    api_max_job_seconds: float = Field(
+        default=1e10,
+        gt=0.0,
+        description="Longest job that is taken, all walks of all designs added [s].",
     )
     api_shutdown_seconds: int = Field(
         default=5, ge=1, le=600, description="How long open requests may finish on shutdown [s]."

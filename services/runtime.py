@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -78,6 +79,7 @@ def open_runtime(
     concurrent_jobs: int = 2,
     lease_seconds: float = 30.0,
     cache: bool = False,
+    longest_job: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Runtime]:
     """Open a database and run its queued jobs until the block is left; then close all.
@@ -91,6 +93,7 @@ def open_runtime(
         lease_seconds: After so long without a word from this process another one takes its jobs
             over [s].
         cache: Whether a design is walked only if no job has walked it before.
+        longest_job: Simulated time of all walks of all designs that a new job may have [s].
         should_stop: As for `open_evaluator`.
 
     Yields:
@@ -104,7 +107,7 @@ def open_runtime(
     with ExitStack() as stack:
         store = open_store(database)
         stack.callback(store.close)
-        service = JobService(store)
+        service = JobService(store, longest_job=longest_job)
         if evaluator is None:
             yield Runtime(service, None, None)
             return

@@ -7,11 +7,14 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Query, Response, status
 
 from api.access import may_submit
+from api.bodies import validated
 from api.dependencies import ExistingJob, JobIdText, Service
 from api.documentation import problems
 from gaitswarm.views import PREFIX
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from sim.identification.recorded_walk import RecordedWalk
+
+RecordingBody = Annotated[RecordedWalk, Depends(validated(RecordedWalk, "walk"))]
 
 router = APIRouter(prefix=PREFIX)
 
@@ -25,7 +28,7 @@ router = APIRouter(prefix=PREFIX)
     dependencies=[Depends(may_submit)],
     responses=problems(400, 403, 413, 422),
 )
-def add_recording(walk: RecordedWalk, service: Service, response: Response) -> RecordingView:
+def add_recording(walk: RecordingBody, service: Service, response: Response) -> RecordingView:
     """Motor currents of a measured walk, for jobs of kind `identification`.
 
     The id is the content's hash: the same walk again is the same recording. `gaitswarm record`

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
 from api.access import Owner, may_command
+from api.bodies import validated
 from api.dependencies import JobId, JobIdText, Service, Slots
 from api.documentation import problems
 from gaitswarm.views import (
@@ -39,6 +40,9 @@ IdempotencyKey = Annotated[
     ),
 ]
 
+SpecBody = Annotated[AnySpec, Depends(validated(AnySpec, "spec"))]
+ForkBody = Annotated[ForkRequest, Depends(validated(ForkRequest, "request"))]
+
 
 async def request_document(request: Request) -> Any:
     """The body as it was sent, before defaults and presets are filled in."""
@@ -64,7 +68,7 @@ async def request_document(request: Request) -> Any:
     },
 )
 def submit_job(
-    spec: AnySpec,
+    spec: SpecBody,
     service: Service,
     response: Response,
     owner: Owner,
@@ -99,7 +103,7 @@ def submit_job(
     },
 )
 def fork_job(
-    request: ForkRequest,
+    request: ForkBody,
     job_id: JobId,
     service: Service,
     response: Response,
@@ -130,7 +134,7 @@ def fork_job(
     summary="Estimate a job",
     responses=problems(400, 413, 422),
 )
-async def estimate_job(spec: AnySpec, service: Service, slots: Slots) -> EstimateView:
+async def estimate_job(spec: SpecBody, service: Service, slots: Slots) -> EstimateView:
     """Check a job as submitting it would, and say what it would cost. Nothing is stored.
 
     The time is by the rate of earlier jobs with the same robot and controller; without one, a short

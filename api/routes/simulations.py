@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Final
+from typing import Annotated, Final
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Depends, Response
 
+from api.bodies import validated
 from api.dependencies import ServerSettings, Slots, check_length, check_sampled_length
 from api.documentation import binary, problems
 from gaitswarm.requests.replay import ReplayRequest, run_replay
@@ -17,6 +18,10 @@ from gaitswarm.views.base import MEDIA_TYPE
 from gaitswarm.views.robustness import RobustnessView
 
 router = APIRouter(prefix=PREFIX, tags=["simulations"])
+
+SimulationBody = Annotated[SimulationRequest, Depends(validated(SimulationRequest, "request"))]
+RobustnessBody = Annotated[RobustnessRequest, Depends(validated(RobustnessRequest, "request"))]
+ReplayBody = Annotated[ReplayRequest, Depends(validated(ReplayRequest, "request"))]
 
 NOT_STORED: Final = {"Cache-Control": "no-store"}
 
@@ -35,7 +40,7 @@ class BinaryResponse(Response):
     responses=problems(400, 413, 422),
 )
 async def simulate_design(
-    request: SimulationRequest, settings: ServerSettings, slots: Slots
+    request: SimulationBody, settings: ServerSettings, slots: Slots
 ) -> Response:
     """Let one design walk in the chosen scenarios and say what it is worth.
 
@@ -56,7 +61,7 @@ async def simulate_design(
     responses=problems(400, 413, 422),
 )
 async def estimate_robustness(
-    request: RobustnessRequest, settings: ServerSettings, slots: Slots
+    request: RobustnessBody, settings: ServerSettings, slots: Slots
 ) -> Response:
     """Let a design and others around it walk, and estimate the norm of the Jacobian of the
     objectives with respect to the variables, both normalised (thesis 4.4.3).
@@ -81,7 +86,7 @@ async def estimate_robustness(
     )
     | problems(400, 413, 422),
 )
-async def replay_walk(request: ReplayRequest, settings: ServerSettings, slots: Slots) -> Response:
+async def replay_walk(request: ReplayBody, settings: ServerSettings, slots: Slots) -> Response:
     """Let one design walk in one scenario, and get where every link was, frame by frame.
 
     A walk that failed is replayed up to its end, with its status in the header. Nothing is stored;

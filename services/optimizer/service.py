@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -12,8 +13,8 @@ from services.optimizer.analysis.fork import Parent, check_begun, forked
 from services.optimizer.analysis.history import read_history
 from services.optimizer.analysis.questions import Questions
 from services.optimizer.analysis.start import started
-from services.optimizer.errors import ProvenanceChanged
-from services.optimizer.jobs.estimate import Estimate, MeasuredRates, estimate
+from services.optimizer.errors import InvalidRequest, ProvenanceChanged
+from services.optimizer.jobs.estimate import Estimate, MeasuredRates, duration, estimate
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.iteration import Evaluation, Iteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
@@ -27,6 +28,9 @@ from sim.identification.recorded_walk import RecordedWalk
 _EARLIER: Final = 50
 """Newest jobs among which one like a new job is looked for."""
 
+_MOST_WALKS: Final = 1_000_000
+"""Walks of an iteration: their objectives, 48 B each, are in memory together."""
+
 
 @dataclass(frozen=True, slots=True)
 class JobService(Questions):
@@ -35,9 +39,12 @@ class JobService(Questions):
     Attributes:
         store: where jobs are kept; its owner's to close.
         provenance: spec -> provenance of what is computed from here for it.
+        longest_job: simulated time of all walks of all designs that a job may have [s]; if it is
+            finite, the walks of an iteration are limited as well.
     """
 
     provenance: Callable[[Spec], JobProvenance] = job_provenance
+    longest_job: float = math.inf
     _rates: MeasuredRates = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -70,8 +77,7 @@ class JobService(Questions):
             InvalidRequest: It cannot be simulated; names the field.
             IdempotencyConflict: The key was used before, for another job.
         """
-        spec.check_can_be_simulated()
-        spec.check_recordings(self.recording)
+        self._check(spec)
         if request is None:
             request = spec.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
@@ -122,7 +128,7 @@ class JobService(Questions):
             lambda: self.asked(job, request.from_iteration),
         )
         spec, fork = forked(parent, request, self.provenance)
-        spec.check_can_be_simulated()
+        self._check(spec)
         if sent is None:
             sent = request.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
@@ -147,8 +153,7 @@ class JobService(Questions):
         Raises:
             InvalidRequest: It cannot be simulated; names the field.
         """
-        spec.check_can_be_simulated()
-        spec.check_recordings(self.recording)
+        self._check(spec)
         return self.store.create_claimed_job(
             started(spec, self.job, self.columns),
             runner_name(),
@@ -193,8 +198,7 @@ class JobService(Questions):
         Raises:
             InvalidRequest: it cannot be simulated; names the field.
         """
-        spec.check_can_be_simulated()
-        spec.check_recordings(self.recording)
+        self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
         others = [job for job in self.store.jobs(limit=_EARLIER).items if job.readable]
         return estimate(started(spec, self.job, self.columns), cases, others, self._rates)
@@ -297,7 +301,36 @@ class JobService(Questions):
             Conflict: it was cancelled.
             InvalidRequest: the budget is spent already, or too large.
         """
+        job = self.job(job_id)
+        if job.readable:
+            self._check_length(job.spec.with_budget(iterations))
         return self.store.extend(job_id, iterations)
+
+    def _check(self, spec: Spec) -> None:
+        """Raises InvalidRequest."""
+        spec.check_can_be_simulated()
+        spec.check_recordings(self.recording)
+        self._check_length(spec)
+
+    def _check_length(self, spec: Spec) -> None:
+        if math.isinf(self.longest_job):
+            return
+        cases = spec.cases(self.store.recordings(spec.recording_ids))
+        at_once = len(cases) * spec.optimizer.particles
+        if at_once > _MOST_WALKS:
+            raise InvalidRequest(
+                f"an iteration has {at_once} walks, more than the {_MOST_WALKS} that are kept at"
+                " once; give it fewer particles, scenarios or worlds",
+                field="optimizer",
+            )
+        seconds = spec.budget * duration(spec, cases)
+        if seconds > self.longest_job:
+            raise InvalidRequest(
+                f"all walks of the job last {seconds:.3g} s together, more than the"
+                f" {self.longest_job:.3g} s that a job may have here; give it fewer iterations, or"
+                " fewer or shorter scenarios",
+                field="iterations",
+            )
 
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100

@@ -24,6 +24,7 @@ _DECIMALS: Final = 5
 """Of a stored current [A]: far below the converter's step, and a third of the text."""
 
 Amperes = Annotated[float, Field(ge=0.0, le=1000.0, allow_inf_nan=False)]
+Currents = Annotated[tuple[Amperes, ...], Field(fail_fast=True)]
 
 
 class RecordedWalk(BaseModel):
@@ -46,7 +47,8 @@ class RecordedWalk(BaseModel):
     joints: tuple[str, ...] = Field(
         min_length=1, max_length=256, description="Joints of the columns, in the robot's order."
     )
-    current: tuple[tuple[Amperes, ...], ...] = Field(
+    current: tuple[Currents, ...] = Field(
+        fail_fast=True,
         min_length=1,
         max_length=100_000,
         description="Absolute motor currents [A], one row a tick, one number a joint.",

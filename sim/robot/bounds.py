@@ -40,6 +40,9 @@ MOST_VALUES: Final = 5000
 MOST_ELEMENTS: Final = 10_000
 """Elements of a robot.urdf."""
 
+MOST_ATTRIBUTES: Final = 64
+"""Attributes of an element of a URDF: Pinocchio's reader looks at each pair of them."""
+
 LONGEST_ATTRIBUTE: Final = 1000
 """Characters of an attribute of a URDF."""
 
@@ -150,6 +153,8 @@ class _UrdfScan:
             raise self._error(f"nested too deep; {DEEPEST} elements within each other are the most")
         if self._elements > MOST_ELEMENTS:
             raise self._error(f"has more than {MOST_ELEMENTS} elements")
+        if len(attributes) > MOST_ATTRIBUTES:
+            raise self._error(f"<{shortened(tag)}> has more than {MOST_ATTRIBUTES} attributes")
         for name, value in attributes.items():
             longest = LONGEST_NAME if name == "name" else LONGEST_ATTRIBUTE
             if len(value) > longest:

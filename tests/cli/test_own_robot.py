@@ -95,6 +95,7 @@ def test_a_scenario_out_of_its_reach_is_refused_by_leg_and_millimetres(
         ("voltage = 11.6", 'voltage = "high"', ("supply.voltage", "[V]")),
         ("counts = 511", "counts = = 511", ("line 39",)),
         ("phase = 0.75", "phase = 7.5", ("legs.1.phase", "line 64", "[1]")),
+        ("phase = 0.75", f"{'.'.join('a' * 99)} = 1", ("robot.toml, line 64", "nested too deep")),
     ],
 )
 def test_an_error_in_a_robot_file_names_field_line_and_unit(

@@ -12,6 +12,7 @@ from sim.robot.bounds import (
     LONGEST_NAME,
     LONGEST_TOML,
     LONGEST_URDF,
+    MOST_ATTRIBUTES,
     MOST_ELEMENTS,
     MOST_LEGS,
     MOST_LINKS,
@@ -85,6 +86,10 @@ def test_a_toml_beyond_the_bounds_is_refused_with_the_way_out(toml: str, said: s
             f"more than {MOST_ELEMENTS} elements",
         ),
         (chain(2).replace(END, "<a>" * 100_000), "nested too deep"),
+        (
+            URDF.replace(END, "<a " + " ".join(f"a{k}=''" for k in range(65)) + "/>" + END),
+            f"<a> has more than {MOST_ATTRIBUTES} attributes",
+        ),
         (URDF.replace(END, f"<!--{' ' * LONGEST_URDF}-->{END}"), "longer than 800000 characters"),
         (URDF.replace('name="body"', f'name="{"b" * 5000}"'), "name of <link> is longer than 100"),
         (URDF.replace('xyz="', f'xyz="{"0 " * 5000}', 1), "xyz of <origin> is longer than 1000"),

@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
+from gaitswarm.settings import Settings
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import Job, JobState, Progress, TimeLeft, time_left
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import open_store
+from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.walks import SHORT_WALK
 from tests.store.examples import spec
 
@@ -102,3 +103,47 @@ def test_a_scenario_is_fine_if_a_searched_gait_can_stay_within_reach(tmp_path: P
     job, new = JobService(store).submit(JobSpec.model_validate(asked))
     assert new and JobService(store).job(job.id) == job
     store.close()
+
+
+def test_a_job_longer_than_is_taken_is_refused_however_it_is_asked_for(store: SqlStore) -> None:
+    asked = JobSpec(scenarios=("1", "2"), iterations=4)
+    # Three cycles of 1.5 s and of 2.2 s, of 25 designs in each of four iterations.
+    taken = JobService(store, longest_job=1111.0)
+    service = JobService(store, longest_job=1109.0)
+    job, _ = taken.submit(asked)
+    said = r"iterations: .* last 1\.11e\+03 s together, more than the .*; give it fewer iterations"
+    for refused in (
+        lambda: service.submit(asked),
+        lambda: service.submit_embedded(asked),
+        lambda: service.estimate(asked),
+        lambda: service.extend(job.id, 4),
+    ):
+        with pytest.raises(InvalidRequest, match=said):
+            refused()
+    assert taken.extend(job.id, 4).id == job.id
+    assert [listed.id for listed in store.jobs().items] == [job.id]
+
+
+def test_a_cycle_time_that_is_searched_counts_by_the_middle_of_its_bounds(store: SqlStore) -> None:
+    searched = JobSpec(scenarios=("1",), iterations=4).with_gait_searched()
+    seconds = 100 * 3 * 1.3
+    JobService(store, longest_job=seconds + 1.0).submit(searched)
+    with pytest.raises(InvalidRequest, match="iterations"):
+        JobService(store, longest_job=seconds - 1.0).submit(searched)
+
+
+def test_an_iteration_of_more_walks_than_are_kept_at_once_is_refused(store: SqlStore) -> None:
+    asked = JobSpec.model_validate(
+        {"worlds": {"count": 100}, "optimizer": {"name": "pso", "particles": 2000}, "iterations": 1}
+    )
+    with pytest.raises(InvalidRequest, match="optimizer: an iteration has 1200000 walks"):
+        JobService(store, longest_job=1e10).submit(asked)
+
+
+def test_a_weeks_work_of_a_cluster_is_taken_by_default(store: SqlStore) -> None:
+    limit = Settings().api_max_job_seconds
+    asked = JobSpec.model_validate(
+        {"worlds": {"count": 32}, "optimizer": {"particles": 200}, "iterations": 10_000}
+    )
+    job, _ = JobService(store, longest_job=limit).submit(asked)
+    assert job.state is JobState.QUEUED

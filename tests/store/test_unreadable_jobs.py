@@ -16,6 +16,7 @@ from services.optimizer.service import JobService
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore
 from services.optimizer.store.tables import jobs
+from tests.examples.hostile import TOML, URDF, chain
 from tests.store.examples import LEASE, Clock, begun, completed, spec
 from tests.store.test_recordings import recording
 
@@ -58,6 +59,8 @@ UNREADABLE = {
     "of an unknown kind": document(kind="gardening"),
     "with an unknown field": document(colour="red"),
     "of a wrong type": document(scenarios=7, name=None, iterations="many", optimizer=None),
+    "of before there were limits": document(robot={"toml": TOML, "urdf": chain(4500)}),
+    "with keys that nest": document(robot={"toml": ".".join("a" * 90_000) + "=1", "urdf": URDF}),
     "no object": '"a spec"',
     "null": "null",
 }

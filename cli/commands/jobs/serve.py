@@ -159,5 +159,6 @@ def _runtime(
         concurrent_jobs=settings.concurrent_jobs,
         lease_seconds=settings.lease_seconds,
         cache=settings.cache,
+        longest_job=settings.api_max_job_seconds,
         should_stop=should_stop,
     )

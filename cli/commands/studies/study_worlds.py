@@ -74,7 +74,7 @@ def worlds(
         study_document,
         study_table,
     )
-    from services.optimizer.analysis.ratio import CONFIDENCE
+    from services.optimizer.analysis.interval import CONFIDENCE
     from services.optimizer.search.registry import DEFAULT_METHOD
 
     judged_in = HeldOut(held_out, held_out_seed)

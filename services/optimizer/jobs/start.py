@@ -48,7 +48,7 @@ def _tag(value: Any) -> str | None:
 
 
 StartChoice = Annotated[
-    Annotated[tuple[StartDesign, ...], Field(max_length=10_000), Tag(_DESIGNS)]
+    Annotated[tuple[StartDesign, ...], Field(max_length=10_000, fail_fast=True), Tag(_DESIGNS)]
     | Annotated[EarlierJobs, Tag(_JOBS)],
     Discriminator(
         _tag,

@@ -1,0 +1,107 @@
+"""Bodies by anybody: validated where they hold nobody up, robots in them checked elsewhere.
+
+What a body is validated by is Python: in the event loop, every other request would wait for it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Annotated, Any, Final
+
+from anyio.to_thread import run_sync
+from fastapi import Body, Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import TypeAdapter, ValidationError, WrapValidator
+
+from sim.errors import RobotFileError
+from sim.robot.check import check_files
+
+MOST_NAMES: Final = 10_000
+"""Names of fields in a body, designs to start from aside: each may be an error to be told."""
+
+MOST_VARIABLES: Final = 128
+"""Names of a design to start from that do not count."""
+
+MOST_ROBOTS: Final = 16
+"""Robots of one's own in a body."""
+
+Location = tuple[str | int, ...]
+
+
+def validated(model: Any, name: str) -> Callable[..., Any]:
+    """A dependency that reads the body of a request and validates it in a thread.
+
+    Args:
+        model: What the body is to be, for pydantic; the document shows it.
+        name: Of the body, in the document.
+
+    Returns:
+        For `Depends`; it answers the validated body, or raises RequestValidationError.
+    """
+    adapter: TypeAdapter[Any] = TypeAdapter(model)
+
+    async def read(http: Request, **body: Any) -> Any:
+        work = partial(_validated, adapter, body[name])
+        return await run_sync(work, limiter=http.state.validations)
+
+    # FastAPI knows of the body and its schema by this; the validation is put off.
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    as_sent = Annotated[model, WrapValidator(lambda document, _: document), Body()]
+    read.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [
+            inspect.Parameter("http", kind, annotation=Request),
+            inspect.Parameter(name, kind, annotation=as_sent),
+        ]
+    )
+    return read
+
+
+def _validated(adapter: TypeAdapter[Any], document: Any) -> Any:
+    _check_bounds(document)
+    try:
+        return adapter.validate_python(document)
+    except ValidationError as error:
+        found = error.errors(include_url=False)
+        raise RequestValidationError(
+            [{**entry, "loc": ("body", *entry["loc"])} for entry in found], body=document
+        ) from error
+
+
+def _check_bounds(document: Any) -> None:
+    """What is costly before it is refused: very many names, and robots."""
+    names, robots = 0, list[tuple[Location, str, str]]()
+    for where, part in _objects(document):
+        # Of designs to start from the first bad one is told; there may be many.
+        names += len(part) if where[-2:-1] != ("start",) else max(0, len(part) - MOST_VARIABLES)
+        toml, urdf = part.get("toml"), part.get("urdf")
+        if isinstance(toml, str) and isinstance(urdf, str):
+            robots.append((where, toml, urdf))
+        if names > MOST_NAMES:
+            raise _refusal(where, f"more than {MOST_NAMES} fields by here; send fewer", document)
+        if len(robots) > MOST_ROBOTS:
+            many = f"more than {MOST_ROBOTS} robots of your own; send fewer"
+            raise _refusal(where, many, document)
+    for where, toml, urdf in robots:
+        try:
+            check_files(toml, urdf)
+        except RobotFileError as error:
+            raise _refusal(where, str(error), document) from error
+
+
+def _refusal(where: Location, problem: str, document: Any) -> RequestValidationError:
+    entry = {"type": "value_error", "loc": ("body", *where), "msg": problem, "input": None}
+    return RequestValidationError([entry], body=document)
+
+
+def _objects(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
+    """All objects of a document, and where they are."""
+    waiting: list[tuple[Location, Any]] = [((), document)]
+    while waiting:
+        where, value = waiting.pop()
+        if isinstance(value, dict):
+            yield where, value
+            waiting += [((*where, key), part) for key, part in value.items()]
+        elif isinstance(value, list):
+            waiting += [((*where, index), part) for index, part in enumerate(value)]

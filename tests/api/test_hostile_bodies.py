@@ -1,0 +1,140 @@
+"""A server that anybody may post to: 200 hostile bodies, posted one after the other.
+
+Each is refused by its field or taken for what it is; the server lives, answers others meanwhile,
+and does not grow.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from tests.examples.hostile import Body, corpus
+from tests.examples.servers import ServerProcess
+
+pytestmark = pytest.mark.slow
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells this of a process")
+
+BLOCKED = 0.1
+"""Seconds that the event loop may be busy with one body."""
+
+GROWTH = 256
+"""Mebibytes that the server may grow by."""
+
+
+@dataclass
+class Posted:
+    """What came back for each body, and what the server was doing.
+
+    busy: seconds that the event loop's thread computed meanwhile; lags: seconds that requests took
+    that asked for next to nothing.
+    """
+
+    server: ServerProcess
+    answers: list[tuple[Body, httpx2.Response]] = field(default_factory=list)
+    busy: list[tuple[float, str]] = field(default_factory=list)
+    lags: list[float] = field(default_factory=list)
+    memory: tuple[int, int] = (0, 0)
+
+
+@pytest.fixture(scope="module")
+def posted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Posted]:
+    server = ServerProcess(tmp_path_factory.mktemp("hostile") / "jobs.db", "--no-runner")
+    found = Posted(server)
+    ended = threading.Event()
+
+    def ask() -> None:
+        with httpx2.Client(base_url=server.url, timeout=60.0) as client:
+            while not ended.wait(0.05):
+                begun = time.perf_counter()
+                assert client.get("/v1/healthz").status_code == 200
+                found.lags.append(time.perf_counter() - begun)
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    try:
+        pid = server.process.pid
+        before = _resident(pid)
+        for body in corpus():
+            computed = _computed(pid)
+            answer = server.client.post(
+                body.path, content=body.content, headers={"Content-Type": "application/json"}
+            )
+            found.busy.append((_computed(pid) - computed, body.name))
+            found.answers.append((body, answer))
+        found.memory = before, _resident(pid)
+        yield found
+    finally:
+        ended.set()
+        asking.join()
+        server.close()
+
+
+def _computed(pid: int) -> float:
+    """Seconds of a processor that a process's first thread, the event loop's, has had."""
+    path = Path(f"/proc/{pid}/task/{pid}/schedstat")
+    return int(path.read_text().split()[0]) * 1e-9 if path.exists() else 0.0
+
+
+def _resident(pid: int) -> int:
+    """Memory of a process [MiB]."""
+    path = Path(f"/proc/{pid}/statm")
+    return (int(path.read_text().split()[1]) * 4096) >> 20 if path.exists() else 0
+
+
+def test_there_are_two_hundred_bodies() -> None:
+    assert len(corpus()) >= 200
+
+
+def test_every_body_is_refused_or_taken_for_what_it_is(posted: Posted) -> None:
+    wrong = [
+        (body.name, answer.status_code, answer.text[:200])
+        for body, answer in posted.answers
+        if answer.status_code not in body.statuses
+    ]
+    assert wrong == []
+
+
+def test_every_refusal_is_a_short_problem_that_names_the_field(posted: Posted) -> None:
+    refusals = [(body, answer) for body, answer in posted.answers if answer.status_code >= 400]
+    assert len(refusals) > 150
+    for body, answer in refusals:
+        assert answer.headers["content-type"] == "application/problem+json", body.name
+        assert len(answer.content) < 50_000, body.name
+        fields = [error["field"] for error in answer.json()["errors"]]
+        if body.field is not None:
+            named = [f for f in fields if f == body.field or f.startswith(f"{body.field}.")]
+            assert named, (body.name, fields)
+
+
+def test_the_server_lives_and_serves(posted: Posted) -> None:
+    assert posted.server.process.poll() is None
+    job = posted.server.submit({"scenarios": ["1"], "iterations": 1})
+    assert posted.server.job(job)["state"] == "queued"
+
+
+@LINUX
+def test_no_body_keeps_the_event_loop_busy(posted: Posted) -> None:
+    assert [(body, busy) for busy, body in posted.busy if busy > BLOCKED] == []
+
+
+def test_others_are_answered_meanwhile(posted: Posted) -> None:
+    lags = sorted(posted.lags)
+    assert len(lags) > 50
+    # Machines are noisy; the longest lags are those of its other processes.
+    assert lags[len(lags) * 95 // 100] < BLOCKED
+    assert lags[-1] < 2.0
+
+
+@LINUX
+def test_the_server_does_not_grow_by_what_it_refuses_or_takes(posted: Posted) -> None:
+    before, after = posted.memory
+    assert after - before < GROWTH

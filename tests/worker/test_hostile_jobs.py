@@ -1,0 +1,60 @@
+"""Jobs whose robot takes too much: the job fails with the reason, and the runner goes on."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.run.runner import Runner
+from services.optimizer.store.sql_store import SqlStore
+from services.worker.in_process import InProcessEvaluator
+from sim.errors import ProcessEnded
+from sim.kernel import derivation
+from sim.robot import RobotFiles
+from tests.examples.hostile import TOML, URDF
+from tests.examples.processes import eventually
+
+pytestmark = pytest.mark.slow
+
+
+def spec(robot: RobotFiles | str) -> JobSpec:
+    return JobSpec.model_validate(
+        {
+            "robot": robot,
+            "controller": "pi",
+            "scenarios": ["1"],
+            "optimizer": {"name": "pso", "particles": 2},
+            "iterations": 1,
+        }
+    )
+
+
+def test_a_robot_without_a_kernel_fails_its_job_and_the_runner_takes_the_next(
+    store: SqlStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ended(_: object) -> dict[str, object]:
+        raise ProcessEnded("took more than 4096 MiB of memory")
+
+    monkeypatch.setattr(derivation.PROCESSES, "ask", ended)
+    # An axis that no robot had before: there is no kernel in the cache.
+    tilted = f'<axis xyz="-1 0 {time.time_ns() % 10**9 * 1e-12:.12f}"/>'
+    hostile = RobotFiles(toml=TOML, urdf=URDF.replace('<axis xyz="-1 0 0"/>', tilted))
+    first, _ = store.create_job(spec(hostile))
+    second, _ = store.create_job(spec("szabadka2"))
+    evaluator = InProcessEvaluator(1)
+    runner = Runner(store, evaluator, concurrency=1, poll_seconds=0.05)
+    runner.start()
+    try:
+        eventually(lambda: store.job(second.id).state.terminal, seconds=120.0)
+    finally:
+        runner.stop()
+        evaluator.close()
+    failed = store.job(first.id)
+    assert failed.state is JobState.FAILED
+    assert failed.error is not None
+    assert "deriving it took more than 4096 MiB of memory" in failed.error
+    assert store.job(second.id).state is JobState.SUCCEEDED

@@ -7,14 +7,10 @@ stiff, damped shaft.
 
 from __future__ import annotations
 
-from typing import Final
-
 import casadi as ca
 
+from sim.kernel.parameters import STATIC_FRICTION_RATE
 from sim.kernel.spatial import Scalar
-
-STATIC_FRICTION_RATE: Final = 0.02
-"""Rate of a joint from which on its gearhead's static friction is full [rad/s]."""
 
 
 def shaft_torque(

@@ -26,6 +26,9 @@ JAM_STIFFNESS: Final = 2000.0
 JAM_DAMPING: Final = 10.0
 """Of the same [N m s/rad]: about half of what damps a coxa's rotor on it critically."""
 
+STATIC_FRICTION_RATE: Final = 0.02
+"""Rate of a joint from which on its gearhead's static friction is full [rad/s]."""
+
 SHOVE_DURATION: Final = 0.1
 """For which a shove's force is constant [s]."""
 
@@ -134,6 +137,17 @@ class Layout:
             self.slices[name] = slice(start, start + length)
             start += length
         self.size = start
+
+    def fields(self, packed: Floats) -> dict[str, Floats]:
+        """Name the parts of a vector.
+
+        Args:
+            packed: (size,).
+
+        Returns:
+            By field, views.
+        """
+        return {name: packed[where] for name, where in self.slices.items()}
 
     def pack(self, **values: float | Floats) -> Floats:
         """The vector.

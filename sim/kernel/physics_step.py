@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
-from typing import Any, Final
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -26,21 +26,6 @@ from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.inertia import BodyInertia
 from sim.robot.limbs import Limb, Placement, limb_of, limbs_of
-
-INTEGRANDS: Final = (
-    "torque",
-    "acceleration",
-    "angular_acceleration",
-    "power",
-    "forward_speed",
-    "absolute_power",
-    "absolute_current",
-    "heat",
-)
-"""Rates that the driver accumulates, at the middle of every step: squared gear torque sum [N2 m2],
-squared accelerations [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over
-the motors, the sums of the absolute electrical power [W], of the absolute current [A], and of the
-heat R I^2 [W]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,39 +1,35 @@
 """The readable driver: the same walk over CasADi's interpreter.
 
-The oracle of tick.c, control.c and driver.c (of sensors.c: sensors.py), and the fallback where
-there is no C compiler. Function by function their twin; the physics agrees to rounding, the integer
-arithmetic exactly.
+The oracle of driver.c (of tick.c and control.c: control_tick.py, of sensors.c: sensors.py), and the
+fallback where there is no C compiler. Function by function their twin; the physics agrees to
+rounding, the integer arithmetic exactly.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import ControlLaw
-from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
-from sim.kernel.physics_step import INTEGRANDS, PhysicsModel, physics_model
+from sim.kernel.control_tick import Past, coded, control, low_pass, padded_states, status_of
+from sim.kernel.physics_step import PhysicsModel, physics_model
 from sim.kernel.sensors import Sensors
 from sim.kernel.walk import (
-    CODE_LIMIT,
+    INTEGRANDS,
     Coding,
     LaneUse,
     WalkResult,
     WalkResults,
     WalkSetup,
     check_gains,
-    coarsen,
 )
 from sim.outcome import Status
 from sim.robot import Robot
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class ReferenceKernel:
@@ -69,7 +65,7 @@ class ReferenceKernel:
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> tuple[WalkResult, int]:
         """What became of the walk, and how many rounds of physics steps it took."""
         step = Stepper(self._model, setup)
-        past, sensors = _Past.of(setup.desired.shape[1]), Sensors(setup.sensors)
+        past, sensors = Past.of(setup.desired.shape[1]), Sensors(setup.sensors)
         sensed = np.zeros(setup.desired.shape[1])
         sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
@@ -77,8 +73,8 @@ class ReferenceKernel:
         for tick, desired in enumerate(setup.desired):
             encoder = step.internal_state[: len(desired)] if self._has_backlash else step.q[7:]
             readings = sensors.read(encoder, np.abs(sensed))
-            error, load = _coded(*readings, desired, coding)
-            output = _control(setup.control_law, coding, error, load, past)
+            error, load = coded(*readings, desired, coding)
+            output = control(setup.control_law, coding, error, load, past)
             step.duty[:] = output * coding.duty_per_count
             if setup.disturbance is not None:
                 step.disturbance[:] = setup.disturbance[tick]
@@ -95,13 +91,13 @@ class ReferenceKernel:
                     step.kick()
                     step.drift(1.0 if left else 0.5)
                     current = np.abs(step.current)
-                    sensed = _low_pass(sensed, current, setup.smoothing(refinement))
+                    sensed = low_pass(sensed, current, setup.smoothing(refinement))
                     sums += step.integrands / refinement
                     peak_current = max(peak_current, float(step.largest_current[0]))
-            status = _status_of(step, setup)
+            status = status_of(step.q, step.v, step.internal_state, setup)
             if status is not Status.OK:
                 break
-        states = _padded(rows, setup.ticks) if log else None
+        states = padded_states(rows, setup.ticks) if log else None
         return WalkResult(status, sums, step.q.copy(), peak_current, states), rounds
 
 
@@ -183,64 +179,6 @@ def _buffered(function: Any, inputs: Sequence[Floats], outputs: Sequence[Floats]
     for k, array in enumerate(outputs):
         buffer.set_res(k, array.data)
     return buffer, evaluate
-
-
-@dataclass(slots=True)
-class _Past:
-    """What the controllers remember from tick to tick: (J,) each; no error before the first."""
-
-    integral: Ints
-    error: Ints | None = None
-
-    @classmethod
-    def of(cls, n_joints: int) -> _Past:
-        return cls(np.zeros(n_joints, dtype=np.int64))
-
-
-def _low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
-    """The current sensors' analog filter over one physics step, (J,) [A]."""
-    return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
-
-
-def _coded(
-    angles: Floats, current: Floats, desired: NDArray[np.int32], coding: Coding
-) -> tuple[Ints, Ints]:
-    """Coded angle error and absolute current, (J,)."""
-    error = desired.astype(np.int64) - coding.angle_codes(angles)
-    return np.clip(error, -CODE_LIMIT, CODE_LIMIT), coding.current_codes(current)
-
-
-def _control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: _Past) -> Ints:
-    """PWM counts (J,); what is past is updated in place (thesis 5.3)."""
-    change = np.zeros_like(error) if past.error is None else error - past.error
-    direct = error * law.proportional_gain + change * law.derivative_gain
-    grown = past.integral + error * law.integral_gain
-    if law.direct is not None:
-        direct = direct + law.direct.respond(error, load, change)
-    if law.integrated is not None:
-        grown = grown + law.integrated.respond(error, load, change)
-    full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
-    past.error, past.integral = error, np.clip(grown, -full, full)
-    output = descale(direct, FRACTION_BITS) + descale(past.integral, INTEGRAL_BITS)
-    coarse = coarsen(np.clip(output, -limit, limit), coding.pwm_step)
-    pwm: Ints = np.clip(coarse, -limit, limit)
-    return pwm
-
-
-def _status_of(state: Stepper, setup: WalkSetup) -> Status:
-    q = state.q
-    if not all(np.isfinite(array).all() for array in (q, state.v, state.internal_state)):
-        return Status.DIVERGED
-    upright = 1.0 - 2.0 * (q[3] * q[3] + q[4] * q[4])
-    if q[2] < setup.fall_height or upright < setup.fall_cosine:
-        return Status.FELL
-    return Status.OK
-
-
-def _padded(rows: list[Floats], ticks: int) -> Floats:
-    log = np.full((ticks, len(rows[0])), np.nan)
-    log[: len(rows)] = rows
-    return log
 
 
 @lru_cache(maxsize=8)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, overload
+from typing import Any, Final, Literal, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,21 @@ Ints = NDArray[np.int64]
 
 Precision = Literal["single", "double"]
 """Of the compiled physics. Positions, sums and control are computed in double precision in both."""
+
+INTEGRANDS: Final = (
+    "torque",
+    "acceleration",
+    "angular_acceleration",
+    "power",
+    "forward_speed",
+    "absolute_power",
+    "absolute_current",
+    "heat",
+)
+"""Rates that a driver accumulates, at the middle of every step: squared gear torque sum [N2 m2],
+squared accelerations [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over
+the motors, the sums of the absolute electrical power [W], of the absolute current [A], and of the
+heat R I^2 [W]."""
 
 CODE_LIMIT = 65535
 """Largest coded error or current; the robot's integers have 16 bits."""
@@ -285,7 +300,7 @@ class WalkResult:
 
     Attributes:
         status: how it ended.
-        sums: `physics_step.INTEGRANDS` summed over physics steps, shorter ones by their share,
+        sums: `INTEGRANDS` summed over physics steps, shorter ones by their share,
             (8,).
         end: final q, (7+J,).
         peak_current: largest |I| of any motor at any physics step [A].

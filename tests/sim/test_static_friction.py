@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.kernel.gearhead import STATIC_FRICTION_RATE
 from sim.kernel.native import native_kernel
-from sim.kernel.parameters import pack_parameters
+from sim.kernel.parameters import STATIC_FRICTION_RATE, pack_parameters
 from sim.kernel.physics_step import physics_model
 from sim.robot import Robot, load_robot
 from sim.scenario import SCENARIOS

@@ -1,0 +1,137 @@
+"""The control tick of readable drivers: twin of tick.c and control.c."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.base import ControlLaw
+from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
+from sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
+from sim.outcome import Status
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(slots=True)
+class Past:
+    """What the controllers remember from tick to tick: (J,) each.
+
+    Attributes:
+        integral: of the integrators [counts, with `INTEGRAL_BITS` fraction bits].
+        error: of the tick before [counts]; none before the first.
+    """
+
+    integral: Ints
+    error: Ints | None = None
+
+    @classmethod
+    def of(cls, n_joints: int) -> Past:
+        """Before the first tick.
+
+        Args:
+            n_joints: J.
+
+        Returns:
+            Empty integrators, and no error yet.
+        """
+        return cls(np.zeros(n_joints, dtype=np.int64))
+
+
+def low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
+    """The current sensors' analog filter over one physics step.
+
+    Args:
+        sensed: Behind the filter, (J,) [A].
+        current: Absolute, (J,) [A].
+        smoothing: Share of its distance from `current` that it goes [1]; 1 for no filter.
+
+    Returns:
+        Behind the filter after the step, (J,) [A].
+    """
+    return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
+
+
+def coded(
+    angles: Floats, current: Floats, desired: NDArray[np.int32], coding: Coding
+) -> tuple[Ints, Ints]:
+    """What the controllers read.
+
+    Args:
+        angles: That the encoders see, (J,) [rad].
+        current: Absolute, behind the filter, (J,) [A].
+        desired: Coded angles, (J,) [counts].
+        coding: Of sensors and PWM.
+
+    Returns:
+        Angle error and absolute current, (J,) [counts].
+    """
+    error = desired.astype(np.int64) - coding.angle_codes(angles)
+    return np.clip(error, -CODE_LIMIT, CODE_LIMIT), coding.current_codes(current)
+
+
+def control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: Past) -> Ints:
+    """One tick of all joints' controllers (thesis 5.3).
+
+    Args:
+        law: Of every joint.
+        coding: Of sensors and PWM.
+        error: Of the angles, (J,) [counts].
+        load: Absolute currents, (J,) [counts].
+        past: Is updated in place.
+
+    Returns:
+        PWM counts, (J,).
+    """
+    change = np.zeros_like(error) if past.error is None else error - past.error
+    direct = error * law.proportional_gain + change * law.derivative_gain
+    grown = past.integral + error * law.integral_gain
+    if law.direct is not None:
+        direct = direct + law.direct.respond(error, load, change)
+    if law.integrated is not None:
+        grown = grown + law.integrated.respond(error, load, change)
+    full, limit = coding.pwm_counts << INTEGRAL_BITS, coding.pwm_counts
+    past.error, past.integral = error, np.clip(grown, -full, full)
+    output = descale(direct, FRACTION_BITS) + descale(past.integral, INTEGRAL_BITS)
+    coarse = coarsen(np.clip(output, -limit, limit), coding.pwm_step)
+    pwm: Ints = np.clip(coarse, -limit, limit)
+    return pwm
+
+
+def status_of(q: Floats, v: Floats, internal_state: Floats, setup: WalkSetup) -> Status:
+    """Whether a walk goes on, as it is asked at the end of every control tick.
+
+    Args:
+        q: Positions, (7+J,).
+        v: Velocities, (6+J,).
+        internal_state: (I,).
+        setup: The walk.
+
+    Returns:
+        OK, or how it has ended.
+    """
+    if not all(np.isfinite(array).all() for array in (q, v, internal_state)):
+        return Status.DIVERGED
+    upright = 1.0 - 2.0 * (q[3] * q[3] + q[4] * q[4])
+    if q[2] < setup.fall_height or upright < setup.fall_cosine:
+        return Status.FELL
+    return Status.OK
+
+
+def padded_states(rows: Sequence[Floats], ticks: int) -> Floats:
+    """States of a walk, as `WalkResult` has them.
+
+    Args:
+        rows: Of the ticks that were walked.
+        ticks: T.
+
+    Returns:
+        T rows, NaN after an early end.
+    """
+    states = np.full((ticks, len(rows[0])), np.nan)
+    states[: len(rows)] = rows
+    return states

@@ -35,14 +35,15 @@ from benchmarks.physics import ROBOT, pinocchio_aba
 from sim.assembly import PHYSICS_RATE, control_steps, plan_walk
 from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
+from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.kernel.native import load_kernel
 from sim.kernel.observation import WalkLog
 from sim.kernel.walk import Precision
+from sim.mujoco.mjcf import Surroundings
+from sim.mujoco.model import Feet, even_drags, model
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
 from sim.simulate import simulate
-from tests.mujoco.export import Feet, model
-from tests.mujoco.walker import CONTROL_PERIOD, drag_of
 
 SCENARIO = SCENARIOS[0]
 PRECISIONS: Final[tuple[Precision, ...]] = ("double", "single")
@@ -64,9 +65,11 @@ def stiff_walk() -> WalkLog:
 def mujoco_rollout(log: WalkLog, *, contacts: bool, rate: int) -> Callable[[], float]:
     """A whole walk in `mujoco.rollout`, motors as affine actuators; us a step."""
     robot = load_robot(ROBOT)
-    feet = Feet(drag_of(robot, SCENARIO)) if contacts else None
+    standing = SCENARIO.duty_factor * len(robot.legs)
+    drags = even_drags(robot, Surroundings.of(robot, SCENARIO), standing)
+    feet = Feet(drags) if contacts else None
     substeps = round(CONTROL_PERIOD * rate)
-    m = model(robot, scenario=SCENARIO, timestep=1.0 / rate, feet=feet, motor_voltage=True)
+    m = model(robot, scenario=SCENARIO, timestep=1.0 / rate, feet=feet, voltage_motors=True)
     m.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
     d = mujoco.MjData(m)
     d.qpos[:] = np.concatenate(

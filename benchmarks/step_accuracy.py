@@ -3,8 +3,9 @@
     python -m benchmarks.step_accuracy [--rates 2500 5000 10000 20000 40000] [--json]
 
 The published optimum A walks `normal-fast` on the robot of `benchmarks.engines`. Objectives are
-compared with those of our walk at 160 kHz. In MuJoCo the forces of gears and ground are ours,
-written anew in NumPy (tests/mujoco), so that nothing but the step differs.
+compared with those of our walk at 160 kHz. In MuJoCo the laws of gears and ground are ours,
+written anew in NumPy (sim/mujoco), and all steps have one length, so that nothing but the step
+differs.
 """
 
 from __future__ import annotations
@@ -17,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.physics import ROBOT
-from sim.assembly import PHYSICS_RATE
+from sim.assembly import PHYSICS_RATE, control_steps, judge, plan_walk
 from sim.controllers import CONTROLLERS
-from sim.kernel.observation import WalkLog
+from sim.mujoco.kernel import MujocoKernel
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
 from sim.simulate import simulate
-from tests.mujoco.controllers import FuzzyPi
-from tests.mujoco.walker import walk_by_euler
 
 SCENARIO = SCENARIOS[0]
 FINE: Final = 160_000
@@ -35,25 +34,23 @@ COMPARED: Final = 5
 Floats = NDArray[np.float64]
 
 
-def ours(rate: int) -> tuple[Floats, WalkLog]:
-    """Objectives and log of our walk at a physics rate [Hz]."""
+def ours(rate: int) -> Floats:
+    """Objectives of our walk at a physics rate [Hz]."""
     design = CONTROLLERS["fuzzy-pi"].published["A"]
     values = np.array([list(design.values())])
-    result = simulate(
-        SCENARIO, "fuzzy-pi", list(design), values, robot=ROBOT, physics_rate=rate, log=True
-    )
-    (log,) = result.logs
-    assert log is not None
-    return result.outcome.objectives[0, :COMPARED], log
+    result = simulate(SCENARIO, "fuzzy-pi", list(design), values, robot=ROBOT, physics_rate=rate)
+    return result.outcome.objectives[0, :COMPARED]
 
 
 def mujocos(rate: int) -> Floats:
     """Objectives in MuJoCo's own steps under our forces."""
-    _, log = ours(PHYSICS_RATE)
     robot = load_robot(ROBOT)
-    controller = FuzzyPi(robot, log, CONTROLLERS["fuzzy-pi"].published["A"])
-    trace = walk_by_euler(robot, SCENARIO, log, controller, timestep=1.0 / rate)
-    return trace.objectives[:COMPARED]
+    coding, timestep = control_steps(robot)
+    plan = plan_walk(robot, SCENARIO, timestep)
+    assert plan is not None
+    setup = plan(CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"]))
+    (result,) = MujocoKernel(robot, rate=rate).walk([setup], coding, log=False)
+    return judge(setup, result, coding.substeps, timestep)[1][:COMPARED]
 
 
 def main() -> None:
@@ -63,8 +60,8 @@ def main() -> None:
     parser.add_argument("--rates", type=int, nargs="+", default=rates, metavar="HZ")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    exact, _ = ours(FINE)
-    walked = [("ours", PHYSICS_RATE, ours(PHYSICS_RATE)[0])]
+    exact = ours(FINE)
+    walked = [("ours", PHYSICS_RATE, ours(PHYSICS_RATE))]
     walked += [("MuJoCo's Euler", rate, mujocos(rate)) for rate in options.rates]
     rows = [
         {"step": step, "rate": rate, "percent": (100.0 * np.abs(found / exact - 1.0)).tolist()}

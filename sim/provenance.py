@@ -26,6 +26,7 @@ _SUFFIXES: Final = (".py", ".c", ".h")
 _NOT_IN_A_CASE: Final = (
     "benchmark.py",
     "measurement",
+    "mujoco/export.py",
     "provenance.py",
     "replay.py",
     "robot/shapes.py",
@@ -34,8 +35,11 @@ _NOT_IN_A_CASE: Final = (
 )
 """Modules and packages of `sim` that no case runs through."""
 
-_LIBRARIES: Final = ("casadi", "numpy", "pin")
+LIBRARIES: Final = ("casadi", "numpy", "pin")
 """Distributions that compute: of the kernel's source, of trajectories and of controllers."""
+
+_NOT_INSTALLED: Final = "none"
+"""In place of a version."""
 
 _DIGITS: Final = 32
 
@@ -107,20 +111,25 @@ def version_changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[s
         One phrase for each library that has another version, or that only one of the two has.
     """
     return [
-        f"{name} {now.get(name, 'none')} instead of {before.get(name, 'none')}"
+        f"{name} {now.get(name, _NOT_INSTALLED)} instead of {before.get(name, _NOT_INSTALLED)}"
         for name in sorted(before.keys() | now.keys())
-        if before.get(name, "none") != now.get(name, "none")
+        if before.get(name, _NOT_INSTALLED) != now.get(name, _NOT_INSTALLED)
     ]
 
 
 @lru_cache(maxsize=32)
-def provenance_of(*robots: RobotSource, precision: Precision = "double") -> Provenance:
+def provenance_of(
+    *robots: RobotSource,
+    precision: Precision = "double",
+    libraries: tuple[str, ...] = LIBRARIES,
+) -> Provenance:
     """The provenance of what this process computes of robots; nothing is compiled for it.
 
     Args:
         robots: the robots as cases name them, none where nothing walks. They are looked at once:
             later calls give the same answer.
         precision: of the physics' numbers.
+        libraries: distributions that compute; a case in another engine needs that one's, too.
 
     Returns:
         The provenance of its cases in this process.
@@ -136,10 +145,17 @@ def provenance_of(*robots: RobotSource, precision: Precision = "double") -> Prov
         robot=", ".join(machine.description.name for machine in machines),
         robot_digest=hashlib.sha256(content.encode()).hexdigest()[:_DIGITS],
         code_digest=simulator_digest(),
-        libraries={name: metadata.version(name) for name in _LIBRARIES},
+        libraries={name: _version(name) for name in libraries},
         backend="native" if native else "reference",
         precision=precision,
     )
+
+
+def _version(distribution: str) -> str:
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return _NOT_INSTALLED
 
 
 def simulator_files() -> tuple[Path, ...]:

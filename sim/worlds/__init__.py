@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from sim.scenario import HELD_OUT
+from sim.worlds.engine_walk import EngineWalk
 from sim.worlds.perturbations import PERTURBATIONS, check_worlds, sample_worlds
 from sim.worlds.world_walk import WorldWalk
 
-__all__ = ["HELD_OUT", "PERTURBATIONS", "WorldWalk", "check_worlds", "sample_worlds"]
+__all__ = [
+    "HELD_OUT",
+    "PERTURBATIONS",
+    "EngineWalk",
+    "WorldWalk",
+    "check_worlds",
+    "sample_worlds",
+]

@@ -11,7 +11,7 @@ from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from sim.controllers import ControllerName, control_law
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.walk import Precision, WalkSetup
+from sim.kernel.walk import Kernel, Precision, WalkSetup
 from sim.outcome import (
     N_MEASUREMENTS,
     N_OBJECTIVES,
@@ -79,6 +79,22 @@ class WorldWalk:
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
+    def run_with(self, kernel: Kernel | None, worlds: Floats) -> Outcome:
+        """Let the design walk in every world, by a kernel of one's choice.
+
+        Args:
+            kernel: Of the robot; None for that of `run`.
+            worlds: (n, len(variables)), in the variables' units.
+
+        Returns:
+            Objectives and statuses.
+
+        Raises:
+            SimulationInputError: A world or the design cannot be simulated; names the variable.
+        """
+        (simulation,) = walk_together([self._simulating(worlds, log=False, kernel=kernel)])
+        return simulation.outcome
+
     def walking(self, designs: Floats) -> Walking[Outcome]:
         """Let the design walk in every world, beside walks of other cases."""
         walked = yield from self._simulating(designs, log=False)
@@ -100,10 +116,12 @@ class WorldWalk:
         (simulation,) = walk_together([self._simulating(worlds, log=log)])
         return simulation
 
-    def _simulating(self, worlds: Floats, *, log: bool) -> Walking[Simulation]:
+    def _simulating(
+        self, worlds: Floats, *, log: bool, kernel: Kernel | None = None
+    ) -> Walking[Simulation]:
         check_worlds(self.variables, worlds)
         robot = load_robot(self.robot)
-        kernel = kernel_of(robot, precision=self.precision)
+        kernel = kernel or kernel_of(robot, precision=self.precision)
         coding, timestep = control_steps(robot)
         statuses = np.full(len(worlds), Status.UNREACHABLE, dtype=np.uint8)
         objectives = np.full((len(worlds), N_OBJECTIVES), np.nan)

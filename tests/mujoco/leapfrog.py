@@ -13,9 +13,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.mujoco.gears import Actuation, Gears
+from sim.mujoco.ground import Ground
 from sim.robot import Robot
-from tests.mujoco.ground import Ground, Reaction, apply_forces, feet_of
-from tests.mujoco.motors import Actuation, Gears
+from tests.mujoco.resistance import Resistance, apply_forces, feet_of
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +49,9 @@ class Leapfrog:
         self, m: mujoco.MjModel, d: mujoco.MjData, robot: Robot, gears: Gears, ground: Ground
     ) -> None:
         self._m, self._d, self._robot, self._gears, self._ground = m, d, robot, gears, ground
+        self._resistance = Resistance(robot, ground)
+        # Rotors behind backlash are damped by themselves.
+        self._damping = np.zeros(robot.n_joints) if gears.memory else gears.motors.damping
         legs = robot.description.legs
         self._bodies = [int(m.site_bodyid[m.site(leg.foot).id]) for leg in legs]
 
@@ -63,10 +67,10 @@ class Leapfrog:
         d.qvel[:3] = attitude_of(d) @ linear
         self._gears.drift(time)
 
-    def reaction(self, timestep: float) -> Reaction:
-        """Of the ground, here and now. Positions and velocities are derived for MuJoCo."""
+    def foot_forces(self) -> Floats:
+        """Of the ground, here and now, (L, 3) [N]. Positions are derived for MuJoCo."""
         mujoco.mj_step1(self._m, self._d)
-        return self._ground(*feet_of(self._d), timestep)
+        return self._ground.forces(*feet_of(self._d), 0.0)[0]
 
     def landing(self, time: float) -> bool:
         """Whether a foot may come down within a time [s], as seen at the last kick."""
@@ -76,23 +80,26 @@ class Leapfrog:
         """Velocities after a step [s]; disturbance: torques on the links (J,) [N m]."""
         m, d = self._m, self._d
         half = 0.5 * timestep
-        reaction = self.reaction(timestep)
+        mujoco.mj_step1(m, d)
+        force_on_feet, memory = self._ground.forces(*feet_of(d), timestep)
+        damping = self._resistance(*feet_of(d), timestep)
         actuation = self._gears.actuate(duty, d.qpos[7:], d.qvel[6:])
         d.qfrc_applied[:6] = 0.0
         d.qfrc_applied[6:] = actuation.torque + disturbance
-        apply_forces(m, d, self._robot, reaction.force)
+        apply_forces(m, d, self._robot, force_on_feet)
         inertia = np.zeros((m.nv, m.nv))
         mujoco.mj_fullM(m, d, inertia)
         force = d.qfrc_applied - d.qfrc_bias
-        inertia[range(6, m.nv), range(6, m.nv)] += half * self._gears.damping
-        for leg in np.flatnonzero(reaction.damping.any(axis=(1, 2))).tolist():
+        inertia[range(6, m.nv), range(6, m.nv)] += half * self._damping
+        for leg in np.flatnonzero(damping.any(axis=(1, 2))).tolist():
             jacobian, gain = self._foot(leg)
-            resistance = half * jacobian.T @ reaction.damping[leg]
+            resistance = half * jacobian.T @ damping[leg]
             inertia += resistance @ jacobian
             force -= resistance @ gain
         acceleration = np.linalg.solve(inertia, force)
-        self._ground.memory = reaction.memory
-        spins = self._gears.kick(actuation, acceleration[6:], timestep)
+        self._ground.memory = memory
+        own = self._gears.kick(actuation, timestep, implicit=0.5)
+        spins = acceleration[6:] if own is None else own
         return self._accelerate(acceleration, actuation, spins, timestep)
 
     def _foot(self, leg: int) -> tuple[Floats, Floats]:
@@ -126,7 +133,7 @@ class Leapfrog:
             acceleration=gain + cross(angular + half * turn, middle),
             angular_acceleration=turn,
             attitude=attitude,
-            load=actuation.torque - (half * gears.damping + gears.armature) * acceleration[6:],
+            load=actuation.torque - (half * self._damping + gears.armature) * acceleration[6:],
             current=gears.motors.current_after(drive.current, half * spins),
             voltage=drive.voltage,
         )

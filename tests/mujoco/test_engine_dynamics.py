@@ -9,22 +9,16 @@ import pytest
 
 from sim.kernel.parameters import pack_parameters
 from sim.kernel.physics_step import physics_model
+from sim.mujoco.gears import Gears, LooseGears
+from sim.mujoco.ground import Ground, Stick
+from sim.mujoco.model import model
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import STEEP, random_state
-from tests.mujoco.export import Feet, model
-from tests.mujoco.ground import (
-    GROUNDS,
-    Floats,
-    Ground,
-    LinearZone,
-    Stick,
-    apply_forces,
-    feet_of,
-)
 from tests.mujoco.leapfrog import Leapfrog
-from tests.mujoco.motors import Gears, LooseGears, gears_of
-from tests.mujoco.walker import LANDING_HORIZON, drag_of
+from tests.mujoco.numbers import even_feet, own_gears, own_ground
+from tests.mujoco.resistance import Floats, apply_forces, feet_of
+from tests.mujoco.walker import LANDING_HORIZON
 
 TIMESTEP = 2e-4
 DATASHEET = RobotVariant(name="szabadka2")
@@ -104,14 +98,14 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
     parameters = pack_parameters(robot, scenario, TIMESTEP)
     exported = model(robot, scenario=scenario)
     d = mujoco.MjData(exported)
-    ground = GROUNDS[robot.description.contact_law](robot)
+    ground = own_ground(robot)
     friction = np.array([contact.friction for contact in robot.contacts()])
     rng = np.random.default_rng(7)
     held, slid, worst = 0, 0, 0.0
     for _ in range(300):
         q, v = random_state(rng, robot.n_joints)
         v *= 10.0 ** rng.uniform(-4.0, 0.0)
-        gears = gears_of(robot, q[7:])
+        gears = own_gears(robot, q[7:])
         remembered = remember_anything(rng, gears, ground, v[6:])
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
         disturbance = rng.normal(size=robot.n_joints)
@@ -121,7 +115,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
         mujoco.mj_step1(exported, d)
         d.qfrc_applied[:6] = 0.0
         d.qfrc_applied[6:] = gears.actuate(duty, q[7:], v[6:]).torque + disturbance
-        forces = ground(*feet_of(d), 0.0).force
+        forces, _ = ground.forces(*feet_of(d), 0.0)
         apply_forces(exported, d, robot, forces)
         limit = friction * forces[:, 2]
         rub = np.hypot(forces[:, 0], forces[:, 1])
@@ -160,7 +154,7 @@ def test_a_kick_changes_velocities_and_what_is_carried_alike(variant: str, times
         height, rising = (part[foot, 2] for part in feet_of(d))
         q[2] += robot.contacts()[foot].sole - height
         q[2] += rng.uniform(-2.0, 2.0) * LANDING_HORIZON * rising
-        gears, ground = gears_of(robot, q[7:]), GROUNDS[robot.description.contact_law](robot)
+        gears, ground = own_gears(robot, q[7:]), own_ground(robot)
         remembered = remember_anything(rng, gears, ground, v[6:])
         duty = rng.uniform(-1.0, 1.0, robot.n_joints)
         disturbance = rng.normal(size=robot.n_joints)
@@ -206,10 +200,10 @@ def internal_state_of(gears: Gears, ground: Ground) -> Floats:
 def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
     """Its normal force is ours; below the friction's limit, its drag is the one asked for."""
     scenario = SCENARIOS[0]
-    feet = Feet(drag_of(robot, scenario))
+    feet = even_feet(robot, scenario)
     exported = model(robot, scenario=scenario, feet=feet)
     d = mujoco.MjData(exported)
-    ground, legs = LinearZone(robot), robot.description.legs
+    ground, legs = own_ground(robot), robot.description.legs
     rng = np.random.default_rng(5)
     q, _ = random_state(rng, robot.n_joints)
     seen = 0
@@ -219,7 +213,7 @@ def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
         into(d, q, rng.normal(size=6 + robot.n_joints) * 0.03)
         mujoco.mj_forward(exported, d)
         position, velocity = d.sensordata.reshape(2, len(legs), 3)
-        expected = ground(position, velocity, 0.0).force
+        expected, _ = ground.forces(position, velocity, 0.0)
         for k in range(d.ncon):
             (sole,) = (name for name in _geoms(exported, d.contact[k]) if name != "ground")
             leg = [f"{leg.foot}_sole" for leg in legs].index(sole)
@@ -228,7 +222,7 @@ def test_mujocos_own_contact_can_be_our_spring_and_damper(robot: Robot) -> None:
             force = d.contact[k].frame.reshape(3, 3).T @ wrench[:3] * _upwards(d.contact[k])
             assert force[2] == pytest.approx(expected[leg, 2], rel=0.01, abs=0.5)
             point = _velocity_of(exported, d, d.contact[k].pos, legs[leg].foot)
-            pull = -feet.drag * point[:2]
+            pull = -feet.drags[leg] * point[:2]
             if np.hypot(*pull) < 0.8 * robot.description.contact.friction * force[2]:
                 np.testing.assert_allclose(force[:2], pull, rtol=0.05, atol=1.0)
                 seen += 1

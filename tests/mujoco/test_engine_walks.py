@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import cycle
 
 import numpy as np
@@ -15,8 +15,8 @@ from sim.robot import RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
 from tests.examples import walks
 from tests.mujoco.controllers import Coded, FuzzyPi, Pi
-from tests.mujoco.export import Feet
-from tests.mujoco.walker import Controller, Floats, Trace, drag_of, walk, walk_by_euler
+from tests.mujoco.engine import walk_in_mujoco
+from tests.mujoco.walker import Controller, Floats, Trace, walk
 
 pytestmark = pytest.mark.slow
 
@@ -65,7 +65,7 @@ def own_controller(drive: str, log: WalkLog, variant: RobotVariant = PLAIN) -> C
     return controller(load_robot(variant), log, design)
 
 
-def deviations(trace: Trace, log: WalkLog, seconds: float = np.inf) -> dict[str, float]:
+def deviations(trace: Trace | WalkLog, log: WalkLog, seconds: float = np.inf) -> dict[str, float]:
     """Largest deviation of every trajectory from the log, up to a time."""
     rows = log.time <= seconds + 1e-9
     return {
@@ -107,11 +107,11 @@ def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
     variant: RobotVariant,
 ) -> None:
     """Semi-implicit Euler is of first order: at 160 kHz it is near our step at the same rate."""
-    scenario, robot = NORMAL_FAST.model_copy(update={"cycles": 0.07}), load_robot(variant)
+    scenario = NORMAL_FAST.model_copy(update={"cycles": 0.07})
     _, log = our_walk("stiff PI", scenario, variant, physics_rate=160_000)
-    controller = partial(own_controller, "stiff PI", log, variant)
-    coarse, fine = (
-        walk_by_euler(robot, scenario, log, controller(), timestep=1.0 / rate)
+    controller, design, _ = DRIVES["stiff PI"]
+    (_, coarse), (_, fine) = (
+        walk_in_mujoco(variant, scenario, controller, design, rate=rate)
         for rate in (40_000, 160_000)
     )
     apart = max(deviations(fine, log).values())
@@ -122,6 +122,7 @@ def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
 @pytest.mark.parametrize(
     ("variant", "drive"),
     [
+        *((DEFAULT, drive) for drive in DRIVES),
         *((PLAIN, drive) for drive in DRIVES),
         (KARNOPP, "published optimum A"),
         (STICK, "stiff PI"),
@@ -132,19 +133,18 @@ def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
 def test_in_mujocos_own_steps_a_walk_is_worth_the_same_within_two_percent(
     variant: RobotVariant, drive: str
 ) -> None:
-    """Ours at its default rate; MuJoCo's in steps that are short enough for semi-implicit Euler."""
-    loose, rate = variant is LOOSE, 40_000 if variant is LOOSE else 10_000
+    """As a certificate has it: MuJoCo's steps are shorter where a foot comes down."""
     # In one cycle, a foot at the jump of its friction may make a shock that differs by 3 %.
     scenario = NORMAL_FAST if variant is KARNOPP else one_cycle(NORMAL_FAST)
     objectives, log = our_walk(drive, scenario, variant)
-    controller = own_controller(drive, log, variant)
-    trace = walk_by_euler(load_robot(variant), scenario, log, controller, timestep=1.0 / rate)
+    controller, design, _ = DRIVES[drive]
+    found, trace = walk_in_mujoco(variant, scenario, controller, design)
     # A foot at the jump of its friction may be on either side of it.
-    first = 1e-3 if variant is KARNOPP else 1e-4
+    first = 1e-3 if variant is KARNOPP else 2e-4
     assert max(deviations(trace, log, seconds=0.1).values()) < first
     # Half a play of 2.5 degrees is 0.022 rad: loose joints may lie at either end of it.
-    assert max(deviations(trace, log).values()) < (5e-2 if loose else 5e-3)
-    np.testing.assert_allclose(trace.objectives[:5], objectives[:5], rtol=0.02)
+    assert max(deviations(trace, log).values()) < (5e-2 if variant is LOOSE else 5e-3)
+    np.testing.assert_allclose(found[:5], objectives[:5], rtol=0.02)
 
 
 @pytest.mark.parametrize(
@@ -154,13 +154,10 @@ def test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts(
     scenario: Scenario, drive: str
 ) -> None:
     """Spherical soles as stiff and damped as ours, whose forces act 10 mm below the tibia's end."""
-    robot = load_robot(PLAIN)
-    objectives, log = our_walk(drive, scenario)
-    feet = Feet(drag_of(robot, scenario))
-    trace = walk_by_euler(
-        robot, scenario, log, own_controller(drive, log), timestep=2e-4, feet=feet
-    )
-    found = trace.objectives / objectives
+    objectives, _ = our_walk(drive, scenario)
+    controller, design, _ = DRIVES[drive]
+    walked, _ = walk_in_mujoco(PLAIN, scenario, controller, design, soles="spheres")
+    found = walked / objectives
     assert found[ENERGY] == pytest.approx(1.0, abs=0.15)
     assert found[RECIPROCAL_SPEED] == pytest.approx(1.0, abs=0.15)
     # Not asked for, but as near: shocks of body and attitude.
@@ -169,15 +166,12 @@ def test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts(
 
 def test_most_of_the_torques_difference_is_the_lever_of_the_sole() -> None:
     """In long strides, MuJoCo's forces at the tibia's end bring the gear torques nearer."""
-    robot, drive = load_robot(PLAIN), "stiff PI"
     scenario = LOADED_SLOW.model_copy(update=walks.LONG_STRIDES)
-    objectives, log = our_walk(drive, scenario)
+    objectives, _ = our_walk("stiff PI", scenario)
+    controller, design, _ = DRIVES["stiff PI"]
     away = {}
-    for points in (False, True):
-        feet = Feet(drag_of(robot, scenario), points=points)
-        trace = walk_by_euler(
-            robot, scenario, log, own_controller(drive, log), timestep=2e-4, feet=feet
-        )
-        away[points] = abs(trace.objectives[0] / objectives[0] - 1.0)
-    assert away[False] < 0.25
-    assert away[True] < 0.5 * away[False]
+    for soles in ("spheres", "points"):
+        found, _ = walk_in_mujoco(PLAIN, scenario, controller, design, soles=soles)
+        away[soles] = abs(found[0] / objectives[0] - 1.0)
+    assert away["spheres"] < 0.25
+    assert away["points"] < 0.5 * away["spheres"]

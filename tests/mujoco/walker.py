@@ -1,8 +1,8 @@
-"""A walk in MuJoCo, with everything but the rigid bodies written anew from docs/model.md.
+"""A walk in MuJoCo in our own steps, all but the rigid bodies written anew from docs/model.md.
 
-Motors, gears, battery, ground, controllers and objectives are computed in NumPy, here and in the
-modules beside; nothing of the simulator's kernel takes part. From its own log of the same walk come
-the start and the desired angles.
+Motors, gears, battery and ground are those of sim/mujoco, controllers and objectives are computed
+here and in the modules beside; nothing of the simulator's kernel takes part. From its own log of
+the same walk come the start and the desired angles.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.observation import WalkLog
+from sim.mujoco.gears import Gears
+from sim.mujoco.model import model
 from sim.robot import Robot
 from sim.scenario import Scenario
-from tests.mujoco.export import Feet, model
-from tests.mujoco.ground import GROUNDS, apply_forces, feet_of
-from tests.mujoco.leapfrog import Leapfrog, Middle, attitude_of
-from tests.mujoco.motors import Gears, gears_of
+from tests.mujoco.leapfrog import Leapfrog, Middle
+from tests.mujoco.numbers import own_gears, own_ground
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class Trace:
     """States at the control ticks (T rows) and objectives f1..f6 of one walk in MuJoCo.
 
     base_position (T, 3) [m]; base_orientation (T, 4) x y z w; joint_angle, motor_angle (T, J)
-    [rad]; foot_force (T, L, 3) [N] if the ground's forces were ours.
+    [rad]; foot_force (T, L, 3) [N].
     """
 
     base_position: Floats
@@ -65,18 +65,6 @@ def physics_rate_of(robot: Robot) -> int:
     return 5000 if robot.description.contact_law == "karnopp" else 2500
 
 
-def drag_of(robot: Robot, scenario: Scenario) -> float:
-    """Drag [N s/m] of `linear_zone` at a foot that carries its even share of the weight.
-
-    The zone's drag is mu F_z / v_lin; MuJoCo's is one number for all loads.
-    """
-    contact = robot.description.contact
-    weight = 9.81 * np.cos(np.deg2rad(scenario.slope))
-    weight *= float(model(robot, scenario=scenario).body_mass.sum())
-    standing = scenario.duty_factor * len(robot.legs)
-    return float(contact.friction * weight / standing / contact.slip_velocity)
-
-
 def walk(
     robot: Robot, scenario: Scenario, log: WalkLog, controller: Controller, ticks: int | None = None
 ) -> Trace:
@@ -87,13 +75,13 @@ def walk(
     rate = physics_rate_of(robot)
     m = model(robot, scenario=scenario)
     d = _at_the_start(m, log)
-    gears, ground = gears_of(robot, d.qpos[7:]), GROUNDS[robot.description.contact_law](robot)
+    gears, ground = own_gears(robot, d.qpos[7:]), own_ground(robot)
     step = Leapfrog(m, d, robot, gears, ground)
     substeps, shorter = round(CONTROL_PERIOD * rate), math.ceil(LANDING_RATE / rate)
     measures, record = _Measures(), _Record(robot, len(log.time) if ticks is None else ticks)
     sensed, landing = np.zeros(robot.n_joints), False
     for tick in range(record.ticks):
-        record.add(tick, d, gears, step.reaction(0.0).force)
+        record.add(tick, d, gears, step.foot_forces())
         duty = controller(tick, record.motor_angle[tick], sensed)
         rounds = shorter if landing else 1
         timestep = 1.0 / rate / rounds
@@ -106,59 +94,6 @@ def walk(
                 step.drift(timestep if left else 0.5 * timestep)
                 sensed = sensed + share * (np.abs(middle.current) - sensed)
                 measures.add(middle, timestep)
-    return record.trace(measures.objectives(d.qpos[2] - record.states[0, 2]))
-
-
-def walk_by_euler(
-    robot: Robot,
-    scenario: Scenario,
-    log: WalkLog,
-    controller: Controller,
-    *,
-    timestep: float,
-    feet: Feet | None = None,
-    ticks: int | None = None,
-) -> Trace:
-    """The same in MuJoCo's own steps, semi-implicit Euler, of one length [s].
-
-    feet: MuJoCo's own contacts in place of our law of ground forces.
-    """
-    m = model(robot, scenario=scenario, timestep=timestep, feet=feet)
-    d = _at_the_start(m, log)
-    gears, ground = gears_of(robot, d.qpos[7:]), GROUNDS[robot.description.contact_law](robot)
-    share = settled_share(robot, timestep)
-    measures, record = _Measures(), _Record(robot, len(log.time) if ticks is None else ticks)
-    sensed, forces = np.zeros(robot.n_joints), np.zeros((len(robot.legs), 3))
-    for tick in range(record.ticks):
-        record.add(tick, d, gears, forces)
-        duty = controller(tick, record.motor_angle[tick], sensed)
-        for _ in range(round(CONTROL_PERIOD / timestep)):
-            mujoco.mj_step1(m, d)
-            actuation = gears.actuate(duty, d.qpos[7:], d.qvel[6:])
-            sensed = sensed + share * (np.abs(actuation.drive.current) - sensed)
-            d.qfrc_applied[:6] = 0.0
-            d.qfrc_applied[6:] = actuation.torque
-            if feet is None:
-                reaction = ground(*feet_of(d), timestep)
-                ground.memory, forces = reaction.memory, reaction.force
-                apply_forces(m, d, robot, forces)
-            attitude = attitude_of(d)
-            velocity = attitude.T @ d.qvel[:3]
-            mujoco.mj_step2(m, d)
-            gears.kick(actuation, d.qacc[6:], timestep)
-            gears.drift(timestep)
-            measures.add(
-                Middle(
-                    velocity=velocity,
-                    acceleration=d.qacc[:3],
-                    angular_acceleration=d.qacc[3:6],
-                    attitude=attitude,
-                    load=actuation.torque - gears.armature * d.qacc[6:],
-                    current=actuation.drive.current,
-                    voltage=actuation.drive.voltage,
-                ),
-                timestep,
-            )
     return record.trace(measures.objectives(d.qpos[2] - record.states[0, 2]))
 
 

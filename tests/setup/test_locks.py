@@ -44,8 +44,9 @@ def test_locks_pin_all_that_is_asked_for() -> None:
     asked = {_name(r) for r in [*PROJECT["project"]["dependencies"], *extras["postgres"]]}
     development = {_name(r) for r in PROJECT["dependency-groups"]["dev"] if isinstance(r, str)}
     assert asked - set(run) == set()
-    assert (asked | development) - set(dev) == set()
-    assert (asked | {_name(r) for r in extras["cluster"]}) - set(image) == set()
+    engines = {_name(r) for r in extras["mujoco"]}
+    assert (asked | development | engines) - set(dev) == set()
+    assert (asked | engines | {_name(r) for r in extras["cluster"]}) - set(image) == set()
 
 
 @pytest.mark.parametrize("other", ["dev", "image"])

@@ -1,0 +1,60 @@
+"""`gaitswarm mjcf`: a robot for MuJoCo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.options import RobotOption
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(mjcf)
+
+
+def mjcf(
+    *,
+    robot: RobotOption = None,
+    scenario: Annotated[
+        str,
+        typer.Option(help="Whose load, slope and first pose the model has: name, number or FILE."),
+    ] = "normal-fast",
+    contacts: Annotated[
+        bool,
+        typer.Option(help="Let soles meet the ground, by MuJoCo's own contacts fitted to ours."),
+    ] = True,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE.xml", help="Default: standard output."),
+    ] = None,
+) -> None:
+    """Write a robot as MJCF, which MuJoCo's viewer opens: its controls are the motors' voltages.
+
+    Needs pip install 'gaitswarm[mujoco]'. The viewer comes with pip install mujoco:
+    python -m mujoco.viewer --mjcf=FILE.xml.
+    """
+    from cli.output import note, print_text
+    from cli.robots import chosen_robot, chosen_scenarios
+    from services.optimizer.errors import InvalidRequest
+    from sim.mujoco.engines import check_installed
+    from sim.robot import load_robot
+
+    machine = load_robot(chosen_robot(robot))
+    chosen = chosen_scenarios(scenario)
+    if len(chosen) != 1:
+        raise InvalidRequest("one scenario, not several", field="scenario")
+    check_installed()
+    from sim.mujoco.export import exported
+
+    text = exported(machine, chosen[0], contacts=contacts)
+    if output is None:
+        print_text(text)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InvalidRequest(f"cannot write {output}: {error}", field="output") from error
+    note(f"model written to {output}")

@@ -1,0 +1,1 @@
+"""A robot in MuJoCo: its export, and walks by another engine."""

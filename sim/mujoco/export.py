@@ -1,0 +1,52 @@
+"""A robot in a scenario as a model of its own, to be looked at."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from sim.gait.trajectory import desired_angles
+from sim.mujoco.mjcf import Rig, Surroundings, mjcf
+from sim.mujoco.model import Feet, even_drags, with_contacts
+from sim.robot import Robot
+from sim.robot.posture import resting_height
+from sim.robot.shapes import visible_links
+from sim.scenario import Scenario
+
+
+def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
+    """Write a robot in a scenario as MJCF that MuJoCo's viewer opens and steps.
+
+    It has the scenario's load and slope, joints with the motors' voltages as controls [V], shapes
+    to be seen, and a keyframe `start`, the pose in which a walk through the scenario begins.
+    Backlash, the battery's sag and static friction are not in it.
+
+    Args:
+        robot: The robot.
+        scenario: The walk.
+        contacts: Whether soles meet the ground: springs, dampers and friction of the robot's, as
+            far as MuJoCo's own contacts can be made so. Without, it falls freely.
+
+    Returns:
+        The text, which MuJoCo has compiled once.
+
+    Raises:
+        UnreachablePose: The walk's first pose is out of the legs' reach.
+        RobotFileError: The URDF's tree is not one that can be simulated.
+    """
+    surroundings = Surroundings.of(robot, scenario)
+    joints = desired_angles(robot, scenario).start
+    mass = robot.mass + scenario.load
+    height = resting_height(robot, joints, mass * -float(surroundings.gravity[2]))
+    rig = Rig(
+        voltage_motors=True,
+        looks=visible_links(robot, scenario.load),
+        start=np.array([0.0, 0.0, height + scenario.drop, 1.0, 0.0, 0.0, 0.0, *joints]),
+    )
+    if contacts:
+        standing = scenario.duty_factor * len(robot.legs)
+        feet = Feet(even_drags(robot, surroundings, standing))
+        rig = with_contacts(robot, surroundings, rig, feet)
+    text = mjcf(robot, surroundings, rig)
+    mujoco.MjModel.from_xml_string(text)
+    return text

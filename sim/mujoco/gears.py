@@ -1,0 +1,281 @@
+"""Motors, battery and gears as numbers, written anew from docs/model.md."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.kernel.parameters import STATIC_FRICTION_RATE
+from sim.robot import Robot
+from sim.robot.robot import JointActuators
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """Of the motors at an instant, (J,) each.
+
+    Attributes:
+        voltage: [V].
+        current: [A].
+        torque: at the gearheads' outputs, after friction [N m].
+    """
+
+    voltage: Floats
+    current: Floats
+    torque: Floats
+
+
+class Motors:
+    """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
+
+    Args:
+        actuators: Of the robot.
+        numbers: `viscous` and, of a robot that has it, `static_friction` (J,), and the battery's
+            `supply_voltage` and `supply_resistance` (1,), as `sim.kernel.parameters.Layout` has
+            them.
+
+    Attributes:
+        damping: by which torques after friction fall with the rates, static friction left out,
+            (J,) [N m s/rad].
+    """
+
+    def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
+        self._k, self._r = actuators.torque, actuators.resistance
+        self._viscous = numbers["viscous"]
+        self._static = numbers.get("static_friction", np.empty(0))
+        self._source = float(numbers["supply_voltage"][0])
+        self._internal = float(numbers["supply_resistance"][0])
+        self.damping = self._k**2 / self._r + self._viscous
+
+    def __call__(self, duty: Floats, rates: Floats) -> Drive:
+        """The motors at an instant.
+
+        The battery gives sum(duty I) at U = source - internal sum(duty I).
+
+        Args:
+            duty: Motor voltage per supply voltage, (J,) [1].
+            rates: Of the gearheads' outputs, (J,) [rad/s].
+
+        Returns:
+            Voltages, currents and torques.
+        """
+        back = self._k * rates
+        share = duty / self._r
+        supply = (self._source + self._internal * (share @ back)) / (
+            1.0 + self._internal * (share @ duty)
+        )
+        voltage = duty * supply
+        current = (voltage - back) / self._r
+        torque = self._k * current - self._viscous * rates
+        if self._static.size:
+            torque -= self._static * np.clip(rates / STATIC_FRICTION_RATE, -1.0, 1.0)
+        return Drive(voltage, current, torque)
+
+    def current_after(self, current: Floats, faster: Floats) -> Floats:
+        """Currents at the same voltages when the rates have grown.
+
+        Args:
+            current: Before, (J,) [A].
+            faster: By which the rates have grown, (J,) [rad/s].
+
+        Returns:
+            After, (J,) [A].
+        """
+        after: Floats = current - self._k / self._r * faster
+        return after
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Actuation:
+    """Of motors and gears at an instant.
+
+    Attributes:
+        drive: of the motors.
+        torque: on the links, (J,) [N m].
+    """
+
+    drive: Drive
+    torque: Floats
+
+
+class Gears(Protocol):
+    """Motors and what joins them to the links.
+
+    Attributes:
+        motors: the motors.
+        armature: rotor inertia that turns with the links, (J,) [kg m2].
+    """
+
+    motors: Motors
+    armature: Floats
+
+    @property
+    def memory(self) -> tuple[Floats, ...]:
+        """Angles [rad] and rates [rad/s] of rotors of their own, (J,) each; else nothing."""
+
+    def encoders(self, angles: Floats) -> Floats:
+        """What the encoders see.
+
+        Args:
+            angles: Of the links, (J,) [rad].
+
+        Returns:
+            (J,) [rad].
+        """
+
+    def actuate(
+        self, duty: Floats, angles: Floats, rates: Floats, ahead: Floats | float = 0.0
+    ) -> Actuation:
+        """What motors and gears do at an instant.
+
+        Args:
+            duty: Motor voltage per supply voltage, (J,) [1].
+            angles: Of the links, (J,) [rad].
+            rates: Of the links, (J,) [rad/s].
+            ahead: By which gearheads are turned further, (J,) [rad].
+
+        Returns:
+            Drive and torques.
+        """
+
+    def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
+        """Step the rates of rotors of their own.
+
+        Args:
+            actuation: At the beginning of the step.
+            timestep: [s].
+            implicit: Share of the step by whose end the motors' damping is taken: 0 for its
+                beginning, 0.5 for its middle.
+
+        Returns:
+            Accelerations of these rotors, (J,) [rad/s2]; None where they turn with the links.
+        """
+
+    def drift(self, time: float) -> None:
+        """Turn rotors of their own.
+
+        Args:
+            time: For how long [s].
+        """
+
+
+class FirmGears:
+    """Rotors that turn with the links.
+
+    Args:
+        robot: The robot.
+        motors: Its motors.
+    """
+
+    def __init__(self, robot: Robot, motors: Motors) -> None:
+        self.motors, self.armature = motors, robot.actuators().armature
+
+    @property
+    def memory(self) -> tuple[Floats, ...]:
+        """Nothing."""
+        return ()
+
+    def encoders(self, angles: Floats) -> Floats:
+        """The links' angles."""
+        return angles
+
+    def actuate(
+        self, duty: Floats, angles: Floats, rates: Floats, ahead: Floats | float = 0.0
+    ) -> Actuation:
+        """The motors' torques."""
+        del angles, ahead
+        drive = self.motors(duty, rates)
+        return Actuation(drive, drive.torque)
+
+    def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
+        """Nothing: MuJoCo turns them as the links' armature."""
+        del actuation, timestep, implicit
+        return None
+
+    def drift(self, time: float) -> None:
+        """Nothing."""
+
+
+class LooseGears:
+    """Rotors of their own that touch the links at either end of a play, through damped shafts.
+
+    Args:
+        robot: The robot.
+        motors: Its motors.
+        play: Of all joints, end to end, (J,) [rad].
+        angles: At which rotors and links begin, at rest, (J,) [rad].
+
+    Attributes:
+        angles: of the rotors at the gearheads' outputs, (J,) [rad].
+        rates: likewise, (J,) [rad/s].
+    """
+
+    def __init__(self, robot: Robot, motors: Motors, play: Floats, angles: Floats) -> None:
+        actuators = robot.actuators()
+        self.motors, self._inertia = motors, actuators.armature
+        self._half = play / 2.0
+        self._stiffness, self._damping = actuators.shaft_stiffness, actuators.shaft_damping
+        self.armature = np.zeros(robot.n_joints)
+        self.angles, self.rates = angles.copy(), np.zeros(robot.n_joints)
+
+    @property
+    def memory(self) -> tuple[Floats, ...]:
+        """The rotors' angles and rates."""
+        return self.angles, self.rates
+
+    def encoders(self, angles: Floats) -> Floats:
+        """The rotors' angles."""
+        del angles
+        return self.angles
+
+    def actuate(
+        self, duty: Floats, angles: Floats, rates: Floats, ahead: Floats | float = 0.0
+    ) -> Actuation:
+        """The shafts' torques."""
+        passed = self._shaft_torques(self.angles + ahead - angles, self.rates - rates)
+        return Actuation(self.motors(duty, self.rates), passed)
+
+    def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
+        """Motors damp at the given time of the step, shafts at its beginning."""
+        inertia = self._inertia + implicit * timestep * self.motors.damping
+        own: Floats = (actuation.drive.torque - actuation.torque) / inertia
+        self.rates = self.rates + timestep * own
+        return own
+
+    def drift(self, time: float) -> None:
+        """Angles at constant rates."""
+        self.angles = self.angles + time * self.rates
+
+    def _shaft_torques(self, ahead: Floats, faster: Floats) -> Floats:
+        """Torques on the links [N m] of rotors that are ahead [rad] and faster [rad/s] (J,).
+
+        None inside the play; beyond it a spring and damper that never pulls back.
+        """
+        beyond = ahead - np.clip(ahead, -self._half, self._half)
+        side = np.sign(beyond)
+        push = self._stiffness * np.abs(beyond) + self._damping * side * faster
+        torque: Floats = side * np.maximum(push, 0.0)
+        return torque
+
+
+def gears_of(robot: Robot, numbers: Mapping[str, Floats], angles: Floats) -> Gears:
+    """The gears of a robot, motors and links at the same angles and at rest.
+
+    Args:
+        robot: The robot.
+        numbers: As for `Motors`; of a robot with backlash `backlash` (J,), too.
+        angles: (J,) [rad].
+
+    Returns:
+        Its gears.
+    """
+    motors = Motors(robot.actuators(), numbers)
+    if robot.has_backlash:
+        return LooseGears(robot, motors, numbers["backlash"], angles)
+    return FirmGears(robot, motors)

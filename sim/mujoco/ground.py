@@ -1,0 +1,164 @@
+"""Forces of the ground on the feet as numbers, written anew from docs/model.md."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.robot.description import ContactLaw
+
+Floats = NDArray[np.float64]
+
+
+class Ground(ABC):
+    """A clamped spring and damper along the ground's normal, and a law of friction.
+
+    Args:
+        numbers: (L,) each, by the names of `sim.robot.description.Contact`: those of
+            `sim.kernel.parameters.CONTACT_LAWS`.
+
+    Attributes:
+        numbers: these.
+        memory: what the law knows of the steps before, (L, m).
+    """
+
+    def __init__(self, numbers: Mapping[str, Floats]) -> None:
+        self.numbers = numbers
+        self._k, self._c = numbers["stiffness"], numbers["damping"]
+        self._sole, self._mu = numbers["sole"], numbers["friction"]
+        self.memory: Floats = np.zeros((len(self._mu), 0))
+
+    def press(self, position: Floats, velocity: Floats) -> tuple[NDArray[np.bool_], Floats]:
+        """What the normal does: F_z = k p - c dz/dt while the sole touches, never pulling.
+
+        Args:
+            position: Of the feet, (L, 3) [m].
+            velocity: Of the feet, (L, 3) [m/s].
+
+        Returns:
+            Which feet touch, (L,), and the force on them, (L,) [N].
+        """
+        depth = self._sole - position[:, 2]
+        touching = depth > 0.0
+        elastic = self._k * depth - self._c * velocity[:, 2]
+        return touching, np.where(touching, np.maximum(elastic, 0.0), 0.0)
+
+    def landing(self, position: Floats, velocity: Floats, time: float) -> bool:
+        """Whether a foot in the air, at this speed, is on the ground after a time.
+
+        Args:
+            position: Of the feet, (L, 3) [m].
+            velocity: Of the feet, (L, 3) [m/s].
+            time: [s].
+
+        Returns:
+            True if one is.
+        """
+        depth = self._sole - position[:, 2]
+        return bool(((depth <= 0.0) & (depth > velocity[:, 2] * time)).any())
+
+    def forces(self, position: Floats, velocity: Floats, timestep: float) -> tuple[Floats, Floats]:
+        """The ground's answer to all feet; `memory` stays as it is.
+
+        Args:
+            position: Of the feet, (L, 3) [m].
+            velocity: Of the feet, (L, 3) [m/s].
+            timestep: For how long it will be [s].
+
+        Returns:
+            Forces on the feet, (L, 3) [N], and the memory after the step.
+        """
+        touching, normal = self.press(position, velocity)
+        rub, memory = self.friction(touching, self._mu * normal, velocity[:, :2], timestep)
+        return np.column_stack([rub, normal]), memory
+
+    @abstractmethod
+    def friction(
+        self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
+    ) -> tuple[Floats, Floats]:
+        """Forces along the ground.
+
+        Args:
+            touching: Which feet do, (L,).
+            limit: mu F_z, (L,) [N].
+            slip: Velocities along the ground, (L, 2) [m/s].
+            timestep: [s].
+
+        Returns:
+            Forces, (L, 2) [N], and the memory after the step.
+        """
+
+
+class LinearZone(Ground):
+    """Friction against the slip, linear below a slip velocity."""
+
+    def friction(
+        self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
+    ) -> tuple[Floats, Floats]:
+        """mu F_z v / max(|v|, v_lin), against the motion."""
+        del touching, timestep
+        speed = np.hypot(slip[:, 0], slip[:, 1])
+        drag = limit / np.maximum(speed, self.numbers["slip_velocity"])
+        return -drag[:, None] * slip, self.memory
+
+
+class Karnopp(Ground):
+    """Full friction along each axis of the world that the foot moves along fast enough."""
+
+    def friction(
+        self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
+    ) -> tuple[Floats, Floats]:
+        """mu F_z along x, and again along y."""
+        del touching, timestep
+        slides = np.abs(slip) > self.numbers["stick_velocity"][:, None]
+        return np.where(slides, -np.sign(slip) * limit[:, None], 0.0), self.memory
+
+
+class DeadZone(Ground):
+    """Friction against the slip: none below one velocity, full from another one on."""
+
+    def friction(
+        self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
+    ) -> tuple[Floats, Floats]:
+        """The share of mu F_z grows linearly between the two, against the motion."""
+        del touching, timestep
+        none, full = self.numbers["stick_velocity"], self.numbers["slip_velocity"]
+        speed = np.maximum(np.hypot(slip[:, 0], slip[:, 1]), none)
+        # Identified speeds may cross: the friction then jumps at the first.
+        share = np.clip((speed - none) / np.maximum(full - none, 1e-9), 0.0, 1.0)
+        return -(limit * share / speed)[:, None] * slip, self.memory
+
+
+class Stick(Ground):
+    """A spring and damper along the ground that slips where it would pull more than mu F_z.
+
+    Its memory (L, 2) is the springs' elongation along the world's axes [m]: it grows by the step's
+    motion before it pulls, shrinks by the share by which a slipping foot's pull is cut, and is gone
+    when the foot lifts off.
+    """
+
+    def __init__(self, numbers: Mapping[str, Floats]) -> None:
+        super().__init__(numbers)
+        self.memory = np.zeros((len(self._mu), 2))
+
+    def friction(
+        self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
+    ) -> tuple[Floats, Floats]:
+        """The springs' and dampers' pull, cut to mu F_z."""
+        spring, damper = self.numbers["stick_stiffness"], self.numbers["stick_damping"]
+        longer = np.where(touching[:, None], self.memory + timestep * slip, 0.0)
+        pull = -(spring[:, None] * longer + damper[:, None] * slip)
+        size = np.hypot(pull[:, 0], pull[:, 1])
+        share = np.divide(limit, size, out=np.ones_like(size), where=size > limit)[:, None]
+        return np.where(touching[:, None], share * pull, 0.0), share * longer
+
+
+GROUNDS: Final[Mapping[ContactLaw, type[Ground]]] = MappingProxyType(
+    {"linear_zone": LinearZone, "karnopp": Karnopp, "stick": Stick, "dead_zone": DeadZone}
+)
+"""By name of the law."""

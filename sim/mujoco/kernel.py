@@ -1,0 +1,312 @@
+"""Walks whose rigid bodies and steps are MuJoCo's.
+
+A kernel like the others, some hundred times slower than the compiled one. MuJoCo's own are the
+equations of motion and the integrator, semi-implicit Euler, and with soles that it knows the
+contacts. Control ticks, sensors and their errors, and the numbers of a world are the simulator's;
+motors, gears and ground are this room's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.kernel.control_tick import Past, coded, control, low_pass, padded_states, status_of
+from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
+from sim.kernel.sensors import Sensors
+from sim.kernel.walk import (
+    INTEGRANDS,
+    Coding,
+    LaneUse,
+    WalkResult,
+    WalkResults,
+    WalkSetup,
+    check_gains,
+)
+from sim.mujoco.gears import gears_of
+from sim.mujoco.ground import GROUNDS
+from sim.mujoco.mjcf import Rig, Soles, Surroundings, mjcf
+from sim.mujoco.model import Feet, even_drags, with_contacts
+from sim.outcome import Status
+from sim.robot import Robot
+from sim.robot.inertia import BodyInertia, parallel_axis
+
+Floats = NDArray[np.float64]
+
+RATE: Final = 5_000
+"""Steps a second [Hz] of MuJoCo's Euler, whose error is of first order in their length."""
+
+BACKLASH_RATE: Final = 40_000
+"""The same with backlash, where links are light without their rotors."""
+
+LANDING_RATE: Final = 80_000
+"""Steps a second [Hz] in control ticks in which a foot may come down: its damper stops it sooner
+than in a longer step, and nearly all of the error comes from there."""
+
+_HUGE: Final = 1e10
+"""Of velocities, mjMAXVAL: MuJoCo calls a state that is greater unstable."""
+
+_HORIZON: Final = 1.25 * CONTROL_PERIOD
+"""How far ahead that is seen [s]."""
+
+_TICKS_A_GLANCE: Final = 50
+"""Between looks at whether anybody waits for the walk."""
+
+
+class WalkStopped(Exception):
+    """Nobody waits for a walk any more."""
+
+
+class MujocoKernel:
+    """Walks in MuJoCo.
+
+    Args:
+        robot: That walks.
+        soles: What meets the ground by MuJoCo's own contacts; `none` for our laws of contact.
+        rate: MuJoCo's steps a second [Hz], all of one length, of a multiple of the control rate;
+            None for `RATE`, or `BACKLASH_RATE`, and shorter ones where a foot may come down.
+        should_stop: Polled on the way.
+    """
+
+    backend: Final = "mujoco"
+    lanes: Final = 1
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        soles: Soles = "none",
+        rate: int | None = None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._robot, self._soles, self._should_stop = robot, soles, should_stop
+        self._rate = rate or (BACKLASH_RATE if robot.has_backlash else RATE)
+        self._landing_rate = LANDING_RATE if rate is None else rate
+        self._layout = Layout(robot)
+
+    def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
+        """All walks, one after the other.
+
+        Args:
+            setups: As of any kernel.
+            coding: As of any kernel.
+            log: Whether to keep states.
+
+        Returns:
+            Results, in order; sums are over steps of the setup's own length.
+
+        Raises:
+            SimulationInputError: A setup has arrays of other sizes.
+            WalkStopped: `should_stop` has said so.
+        """
+        for setup in setups:
+            check_gains(setup.control_law)
+            setup.check(
+                joints=self._robot.n_joints,
+                internal_state=internal_state_size(self._robot),
+                parameters=self._layout.size,
+            )
+        walks = tuple(self._walk(setup, coding, log=log) for setup in setups)
+        rounds = sum(setup.ticks for setup in setups)
+        return WalkResults(walks, LaneUse(rounds, rounds))
+
+    def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> WalkResult:
+        step = _Stepper(self._robot, setup, self._soles)
+        n_joints = setup.desired.shape[1]
+        past, sensors, sensed = Past.of(n_joints), Sensors(setup.sensors), np.zeros(n_joints)
+        sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
+        rows: list[Floats] = []
+        status = Status.OK
+        for tick, desired in enumerate(setup.desired):
+            if tick % _TICKS_A_GLANCE == 0 and self._should_stop():
+                raise WalkStopped
+            error, load = coded(*sensors.read(step.encoders(), sensed), desired, coding)
+            counts = control(setup.control_law, coding, error, load, past)
+            duty = counts.astype(np.float64) * coding.duty_per_count
+            if log:
+                rows.append(np.concatenate([step.q, step.v, step.internal_state, sensed, duty]))
+            begin, end = setup.shove_ticks
+            further = None if setup.disturbance is None else setup.disturbance[tick]
+            rate = self._landing_rate if step.landing(_HORIZON) else self._rate
+            substeps = round(CONTROL_PERIOD * rate)
+            share = coding.substeps / substeps
+            smoothing = _smoothing(setup.current_smoothing, share)
+            step.refine(1.0 / rate)
+            for _ in range(substeps):
+                integrands, current = step.step(duty, further, shoved=begin <= tick < end)
+                sensed = low_pass(sensed, current, smoothing)
+                sums += share * integrands
+                peak_current = max(peak_current, float(current.max()))
+                if step.diverged:
+                    break
+            if step.diverged:
+                status = Status.DIVERGED
+                break
+            status = status_of(step.q, step.v, step.internal_state, setup)
+            if status is not Status.OK:
+                break
+        states = padded_states(rows, setup.ticks) if log else None
+        return WalkResult(status, sums, step.q, peak_current, states)
+
+
+class _Stepper:
+    """MuJoCo's state of one walk, with gears and ground beside it."""
+
+    def __init__(self, robot: Robot, setup: WalkSetup, soles: Soles) -> None:
+        self._numbers = numbers = Layout(robot).fields(setup.parameters)
+        self._pushed = soles == "none"
+        self._m = m = _model(robot, numbers, soles)
+        self._d = mujoco.MjData(m)
+        x, y, z, w = setup.start[3:7].tolist()
+        self._d.qpos[:] = [*setup.start[:3], w, x, y, z, *setup.start[7:]]
+        self._gears = gears_of(robot, numbers, setup.start[7:])
+        self._ground = GROUNDS[robot.description.contact_law](numbers)
+        self._resistance = robot.actuators().resistance
+        feet = [leg.foot for leg in robot.description.legs]
+        self._feet = [int(m.site_bodyid[m.site(foot).id]) for foot in feet]
+        self._displaced = bool(numbers["displaced"].any())
+        self.diverged = False
+        self._jammed = bool(numbers["jam_stiffness"].any())
+
+    @property
+    def q(self) -> Floats:
+        """Positions as a kernel has them: quaternion x y z w."""
+        qpos = self._d.qpos
+        return np.concatenate([qpos[:3], qpos[4:7], qpos[3:4], qpos[7:]])
+
+    @property
+    def v(self) -> Floats:
+        """Velocities as a kernel has them: the base's twist in its own frame."""
+        qvel = self._d.qvel
+        attitude = np.empty(9)
+        mujoco.mju_quat2Mat(attitude, self._d.qpos[3:7])
+        return np.concatenate([attitude.reshape(3, 3).T @ qvel[:3], qvel[3:]])
+
+    @property
+    def internal_state(self) -> Floats:
+        """Rotors, then what the ground remembers."""
+        return np.concatenate([*self._gears.memory, self._ground.memory.ravel()])
+
+    def landing(self, time: float) -> bool:
+        """Whether a foot may come down within a time [s]."""
+        self._derive()
+        return self._ground.landing(*self._of_feet(), time)
+
+    def refine(self, timestep: float) -> None:
+        """Set the length of the steps that follow [s]."""
+        self._m.opt.timestep = timestep
+
+    def encoders(self) -> Floats:
+        """What the encoders see, (J,) [rad]."""
+        return self._gears.encoders(self._d.qpos[7:]).copy()
+
+    def step(self, duty: Floats, further: Floats | None, *, shoved: bool) -> tuple[Floats, Floats]:
+        """One step; `INTEGRANDS` and absolute currents (J,) [A] at its beginning."""
+        m, d, numbers, timestep = self._m, self._d, self._numbers, self._m.opt.timestep
+        self._derive()
+        angles, rates = d.qpos[7:], d.qvel[6:]
+        displaced = 0.0 if further is None or not self._displaced else further
+        actuation = self._gears.actuate(duty, angles, rates, displaced)
+        torque = actuation.torque
+        if further is not None and not self._displaced:
+            torque = torque + further
+        d.qfrc_applied[:3] = numbers["push"] if shoved else 0.0
+        d.qfrc_applied[3:6] = 0.0
+        d.qfrc_applied[6:] = torque
+        if self._jammed:
+            d.qfrc_applied[6:] -= (
+                numbers["jam_stiffness"] * (angles - numbers["jam_angle"])
+                + numbers["jam_damping"] * rates
+            )
+        if self._pushed:
+            self._push_feet()
+        # The first body is the world, the next the robot's.
+        ahead_x, ahead_y = d.xmat[1, 0], d.xmat[1, 3]
+        forward = (ahead_x * d.qvel[0] + ahead_y * d.qvel[1]) / math.hypot(ahead_x, ahead_y)
+        mujoco.mj_fwdActuation(m, d)
+        mujoco.mj_fwdAcceleration(m, d)
+        mujoco.mj_fwdConstraint(m, d)
+        mujoco.mj_Euler(m, d)
+        self.diverged = not d.qvel @ d.qvel < _HUGE * _HUGE
+        self._gears.kick(actuation, timestep)
+        self._gears.drift(timestep)
+        load = float(np.abs(torque - self._gears.armature * d.qacc[6:]).sum())
+        drive, acceleration, turn = actuation.drive, d.qacc[:3], d.qacc[3:6]
+        current = np.abs(drive.current)
+        power = drive.voltage * drive.current
+        integrands = np.array(
+            [
+                load * load,
+                acceleration @ acceleration,
+                turn @ turn,
+                power.sum(),
+                forward,
+                np.abs(power).sum(),
+                current.sum(),
+                self._resistance @ (current * current),
+            ]
+        )
+        return integrands, current
+
+    def _derive(self) -> None:
+        """All that follows from positions and velocities: mj_step1 without its checks, which would
+        write to a file of the user's.
+        """
+        m, d = self._m, self._d
+        mujoco.mj_fwdPosition(m, d)
+        mujoco.mj_sensorPos(m, d)
+        mujoco.mj_fwdVelocity(m, d)
+        mujoco.mj_sensorVel(m, d)
+
+    def _of_feet(self) -> tuple[Floats, Floats]:
+        """Positions [m] and velocities [m/s] of the feet, (L, 3) each, by MuJoCo's sensors."""
+        position, velocity = self._d.sensordata.reshape(2, -1, 3)
+        return position, velocity
+
+    def _push_feet(self) -> None:
+        """The ground's forces, beside those that are applied already."""
+        m, d = self._m, self._d
+        position, velocity = self._of_feet()
+        forces, self._ground.memory = self._ground.forces(position, velocity, m.opt.timestep)
+        for foot in np.flatnonzero(forces[:, 2]).tolist():
+            mujoco.mj_applyFT(
+                m, d, forces[foot], _NOTHING, position[foot], self._feet[foot], d.qfrc_applied
+            )
+
+
+_NOTHING: Final = np.zeros(3)
+
+
+def _model(robot: Robot, numbers: Mapping[str, Floats], soles: Soles) -> mujoco.MjModel:
+    """The robot with the masses, gravity and feet of a walk's parameters."""
+    surroundings = _surroundings(robot, numbers)
+    rig = Rig()
+    if soles != "none":
+        feet = Feet(even_drags(robot, surroundings), points=soles == "points")
+        rig = with_contacts(robot, surroundings, rig, feet)
+    return mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
+
+
+def _surroundings(robot: Robot, numbers: Mapping[str, Floats]) -> Surroundings:
+    mass = float(numbers["base_mass"][0])
+    centre = numbers["base_moment"] / mass
+    xx, yy, zz, xy, xz, yz = numbers["base_inertia"].tolist()
+    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    body = BodyInertia(mass, centre, about_origin - mass * parallel_axis(centre))
+    own = CONTACT_LAWS[robot.description.contact_law].parameters
+    contacts = tuple(
+        contact.model_copy(update={name: float(numbers[name][leg]) for name in own})
+        for leg, contact in enumerate(robot.contacts())
+    )
+    return Surroundings(body, numbers["gravity"], contacts)
+
+
+def _smoothing(smoothing: float, share: float) -> float:
+    """The analog low-pass over a share of the step that it is given for."""
+    return smoothing if smoothing >= 1.0 else -math.expm1(share * math.log1p(-smoothing))

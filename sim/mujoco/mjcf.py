@@ -1,0 +1,323 @@
+"""A robot as MJCF, MuJoCo's own format of models.
+
+MuJoCo itself is not needed to write it. Joints keep the order of the robot's joint arrays. Every
+foot is a site of the leg's name, with a sensor of its position and one of its velocity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.kernel.parameters import gravity_on
+from sim.robot import Robot
+from sim.robot.description import Contact
+from sim.robot.inertia import BodyInertia
+from sim.robot.limbs import limbs_of
+from sim.scenario import Scenario
+
+if TYPE_CHECKING:
+    from sim.robot.shapes import Shape, VisibleLink
+
+Floats = NDArray[np.float64]
+
+Soles = Literal["none", "spheres", "points"]
+"""What meets the ground: nothing, so that forces on the feet come from outside; spheres of the
+sole's length about the tibias' ends; or, with the ground raised by as much, these ends
+themselves."""
+
+TIMESTEP: Final = 2e-4
+"""Of a model for which none is given [s]."""
+
+_FULL: Final = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
+"""MJCF's order of an inertia's elements: xx, yy, zz, xy, xz, yz."""
+
+_POINT: Final = "1e-7"
+"""Radius of a sphere that stands for a point [m]."""
+
+_COLOURS: Final[Mapping[str, str]] = {
+    "body": "0.45 0.5 0.55 1",
+    "coxa": "0.85 0.55 0.2 1",
+    "femur": "0.3 0.45 0.7 1",
+    "tibia": "0.4 0.6 0.45 1",
+    "foot": "0.2 0.2 0.2 1",
+    "load": "0.6 0.35 0.3 1",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """What a walk changes of a robot's model.
+
+    Attributes:
+        body: inertia of the body with all that it carries, in its own frame.
+        gravity: in a world whose z axis is normal to the ground, (3,) [m/s2].
+        contacts: of the feet, in the order of the legs.
+    """
+
+    body: BodyInertia
+    gravity: Floats
+    contacts: tuple[Contact, ...]
+
+    @classmethod
+    def of(cls, robot: Robot, scenario: Scenario | None = None) -> Surroundings:
+        """Of a scenario: its load as a point mass, its slope as level ground in tilted gravity.
+
+        Args:
+            robot: The robot.
+            scenario: None for level ground and no load.
+
+        Returns:
+            What the scenario changes.
+        """
+        if scenario is None:
+            return cls(robot.body, gravity_on(0.0), robot.contacts())
+        at = np.array([0.0, 0.0, robot.description.load_height])
+        load = BodyInertia(scenario.load, at, np.zeros((3, 3)))
+        body = robot.body.joined(load) if scenario.load else robot.body
+        gravity = gravity_on(scenario.slope, scenario.slope_direction)
+        return cls(body, gravity, robot.contacts())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """What of a robot a model has, beside its rigid bodies.
+
+    Attributes:
+        timestep: of MuJoCo's steps [s].
+        soles: what meets the ground.
+        contacts: attributes of each foot's contact pair, in the order of the legs; none for
+            MuJoCo's defaults.
+        friction_impedance: MuJoCo's impratio, how much stiffer than a contact's normal constraint
+            its tangential one is [1].
+        voltage_motors: whether joints have actuators that turn a motor's voltage [V] into its
+            torque, quasi-static, friction included. Else torques come from outside.
+        looks: links with shapes to be seen; soles are drawn as they are.
+        start: positions of a keyframe `start`, as MuJoCo's qpos; None for no keyframe.
+    """
+
+    timestep: float = TIMESTEP
+    soles: Soles = "none"
+    contacts: Sequence[Mapping[str, str]] = ()
+    friction_impedance: float = 1.0
+    voltage_motors: bool = False
+    looks: Sequence[VisibleLink] = ()
+    start: Floats | None = None
+
+
+def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
+    """Write a robot on a free joint as MJCF.
+
+    Args:
+        robot: The robot.
+        surroundings: Of its walk.
+        rig: What the model has beside rigid bodies.
+
+    Returns:
+        Text that MuJoCo reads.
+
+    Raises:
+        RobotFileError: The URDF's tree is not one that can be simulated.
+        ValueError: Point soles are asked for, but soles have several lengths.
+    """
+    limbs_of(robot)  # Refuses what cannot be simulated, with the reason.
+    root = ET.Element("mujoco", model=robot.description.name)
+    ET.SubElement(root, "compiler", angle="radian", autolimits="false")
+    option = ET.SubElement(
+        root,
+        "option",
+        timestep=repr(rig.timestep),
+        gravity=_numbers(surroundings.gravity),
+        integrator="Euler",
+        cone="elliptic",
+        jacobian="dense",
+        impratio=repr(rig.friction_impedance),
+    )
+    if rig.soles == "none":
+        ET.SubElement(option, "flag", contact="disable", constraint="disable")
+    world = ET.SubElement(root, "worldbody")
+    if rig.looks:
+        ET.SubElement(world, "light", pos="0 0 3", dir="0 0 -1", directional="true")
+    if rig.soles != "none":
+        height = repr(_plane_height(surroundings.contacts, rig.soles))
+        ET.SubElement(world, "geom", name="ground", type="plane", size="0 0 1", pos=f"0 0 {height}")
+    drawn = _shapes(robot, rig.looks)
+    first = next(iter(robot.urdf.links))
+    at = {} if rig.start is None else {"pos": _numbers(rig.start[:3])}
+    body = ET.SubElement(world, "body", {"name": first} | at)
+    ET.SubElement(body, "freejoint", name="base")
+    _add_inertia(body, surroundings.body)
+    _add_shapes(body, drawn.get(first, ()))
+    for leg in range(len(robot.legs)):
+        foot = _add_leg(body, robot, leg, drawn)
+        if rig.soles != "none":
+            radius = surroundings.contacts[leg].sole
+            _add_sole(foot, robot, leg, repr(radius) if rig.soles == "spheres" else _POINT)
+    feet = [leg.foot for leg in robot.description.legs]
+    if rig.soles != "none":
+        _add_pairs(root, feet, surroundings.contacts, rig.contacts)
+    _add_sensors(root, feet)
+    if rig.voltage_motors:
+        _add_motors(root, robot)
+    if rig.start is not None:
+        keys = ET.SubElement(root, "keyframe")
+        ET.SubElement(keys, "key", name="start", qpos=_numbers(rig.start))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
+
+
+def _plane_height(contacts: Sequence[Contact], soles: Soles) -> float:
+    if soles == "spheres":
+        return 0.0
+    lengths = {contact.sole for contact in contacts}
+    if len(lengths) > 1:
+        raise ValueError("soles of several lengths cannot meet one ground as points")
+    return lengths.pop()
+
+
+def _add_leg(
+    base: ET.Element,
+    robot: Robot,
+    number: int,
+    drawn: Mapping[str, Sequence[Shape]],
+) -> ET.Element:
+    """The leg's last body."""
+    urdf, leg = robot.urdf, robot.description.legs[number]
+    # Behind backlash, rotors do not turn with the links.
+    rotors = np.zeros(robot.n_joints) if robot.has_backlash else robot.actuators().armature
+    armature = dict(zip(robot.joint_names, rotors.tolist(), strict=True))
+    joints = {joint.name: joint for joint in urdf.joints}
+    parent = base
+    for name in leg.joints:
+        joint = joints[name]
+        carrier = urdf.place(joint.parent)
+        turned = carrier.rotation @ joint.origin.matrix()
+        at = carrier.rotation @ joint.origin.xyz + carrier.position
+        parent = ET.SubElement(parent, "body", {"name": joint.child} | _placement(at, turned))
+        ET.SubElement(
+            parent,
+            "joint",
+            name=name,
+            type="hinge",
+            axis=_numbers(joint.axis),
+            armature=repr(armature[name]),
+            damping="0",
+        )
+        _add_inertia(parent, urdf.bodies[joint.child])
+        _add_shapes(parent, drawn.get(joint.child, ()))
+    foot = urdf.place(leg.foot)
+    ET.SubElement(parent, "site", {"name": leg.foot} | _placement(foot.position, foot.rotation))
+    return parent
+
+
+def _add_sole(tibia: ET.Element, robot: Robot, number: int, radius: str) -> None:
+    foot = robot.description.legs[number].foot
+    ET.SubElement(
+        tibia,
+        "geom",
+        name=f"{foot}_sole",
+        type="sphere",
+        size=radius,
+        pos=_numbers(robot.urdf.place(foot).position),
+        contype="0",
+        conaffinity="0",
+        mass="0",
+        rgba=_COLOURS["foot"],
+    )
+
+
+def _add_inertia(body: ET.Element, inertia: BodyInertia) -> None:
+    ET.SubElement(
+        body,
+        "inertial",
+        mass=repr(float(inertia.mass)),
+        pos=_numbers(inertia.centre),
+        fullinertia=_numbers(inertia.rotational[_FULL]),
+    )
+
+
+def _shapes(robot: Robot, looks: Sequence[VisibleLink]) -> dict[str, list[Shape]]:
+    """By link that is a body of its own: what is fixed to one, and soles, are left out."""
+    return {
+        link.name: [shape for shape in link.shapes if shape.role != "foot"]
+        for link in looks
+        if robot.urdf.places[link.name].body == link.name
+    }
+
+
+def _add_shapes(body: ET.Element, shapes: Sequence[Shape]) -> None:
+    for shape in shapes:
+        *at, x, y, z, w = shape.origin
+        halves = np.array(shape.size) * {"box": [0.5] * 3, "sphere": [1.0]}.get(
+            shape.type, [1.0, 0.5]
+        )
+        ET.SubElement(
+            body,
+            "geom",
+            type=shape.type,
+            size=_numbers(halves),
+            pos=_numbers(at),
+            quat=_numbers([w, x, y, z]),
+            contype="0",
+            conaffinity="0",
+            mass="0",
+            rgba=_COLOURS[shape.role],
+        )
+
+
+def _add_pairs(
+    root: ET.Element,
+    feet: Sequence[str],
+    contacts: Sequence[Contact],
+    attributes: Sequence[Mapping[str, str]],
+) -> None:
+    element = ET.SubElement(root, "contact")
+    for number, (foot, contact) in enumerate(zip(feet, contacts, strict=True)):
+        pair = {
+            "geom1": f"{foot}_sole",
+            "geom2": "ground",
+            "condim": "3",
+            "friction": _numbers([contact.friction] * 2 + [0.0] * 3),
+        }
+        ET.SubElement(element, "pair", pair | dict(attributes[number] if attributes else {}))
+
+
+def _add_sensors(root: ET.Element, sites: Sequence[str]) -> None:
+    """All feet's positions, then all their velocities, in the world."""
+    sensor = ET.SubElement(root, "sensor")
+    for kind in ("framepos", "framelinvel"):
+        for site in sites:
+            ET.SubElement(sensor, kind, objtype="site", objname=site)
+
+
+def _add_motors(root: ET.Element, robot: Robot) -> None:
+    actuator = ET.SubElement(root, "actuator")
+    actuators = robot.actuators()
+    for name, k, r, b in zip(
+        robot.joint_names, actuators.torque, actuators.resistance, actuators.viscous, strict=True
+    ):
+        ET.SubElement(
+            actuator,
+            "general",
+            name=f"{name}_voltage",
+            joint=name,
+            gainprm=repr(float(k / r)),
+            biastype="affine",
+            biasprm=_numbers([0.0, 0.0, -(k * k / r + b)]),
+        )
+
+
+def _placement(position: Floats, rotation: Floats) -> dict[str, str]:
+    place = {"pos": _numbers(position)}
+    if not np.array_equal(rotation, np.eye(3)):
+        place["xyaxes"] = _numbers(rotation[:, :2].T.ravel())
+    return place
+
+
+def _numbers(values: Sequence[float] | Floats) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,138 @@
+"""Compiled models of a robot, MuJoCo's contacts fitted to it.
+
+MuJoCo's contact force is [s p - b v - d a] / ((1 - d) A) for a penetration p that the force gives
+the acceleration a, s and b being solref's direct stiffness and damping, d the impedance and A the
+inverse mass that MuJoCo ascribes to the two bodies at the contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.mujoco.mjcf import TIMESTEP, Rig, Surroundings, mjcf
+from sim.robot import Robot
+from sim.robot.description import Contact
+from sim.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Feet:
+    """MuJoCo's own contact of soles on a plane, in place of forces that are applied.
+
+    Attributes:
+        drags: tangential force per slip velocity below the friction limit, by leg [N s/m].
+        points: whether the ground is raised by the sole's length and met by the tibias' ends
+            themselves, so that its forces act there, as ours do, and not at the bottom of a sphere.
+        impedance: MuJoCo's d, the share of a contact's effect that the constraint may force. The
+            smaller, the more exactly the soft constraint is a spring and damper; the default is
+            the least that MuJoCo takes.
+        friction_impedance: impratio, how much stiffer than the normal constraint the tangential
+            one is. At 1 a sliding foot would also be lifted; the tangential impedance is this
+            times `impedance`.
+    """
+
+    drags: tuple[float, ...]
+    points: bool = False
+    impedance: float = 1e-4
+    friction_impedance: float = 100.0
+
+
+def model(
+    robot: Robot,
+    *,
+    scenario: Scenario | None = None,
+    timestep: float = TIMESTEP,
+    feet: Feet | None = None,
+    voltage_motors: bool = False,
+) -> mujoco.MjModel:
+    """The compiled model of a robot in a scenario.
+
+    Args:
+        robot: The robot.
+        scenario: Its load and slope count; None for level ground and no load.
+        timestep: Of MuJoCo's steps [s].
+        feet: Of MuJoCo's own contact; None for forces from outside.
+        voltage_motors: Whether joints have actuators that take a motor's voltage.
+
+    Returns:
+        The model.
+    """
+    rig = Rig(timestep, voltage_motors=voltage_motors)
+    surroundings = Surroundings.of(robot, scenario)
+    if feet is not None:
+        rig = with_contacts(robot, surroundings, rig, feet)
+    return mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
+
+
+def with_contacts(robot: Robot, surroundings: Surroundings, rig: Rig, feet: Feet) -> Rig:
+    """Let MuJoCo compute the contacts: every pair's soft constraint is the robot's spring, damper.
+
+    Args:
+        robot: The robot.
+        surroundings: Of its walk.
+        rig: Of the model.
+        feet: How contacts are to be.
+
+    Returns:
+        The rig with soles and contact pairs.
+    """
+    rig = replace(rig, soles="points" if feet.points else "spheres")
+    free = mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
+    return replace(
+        rig,
+        contacts=[
+            _pair(free, leg.foot, contact, drag, feet)
+            for leg, contact, drag in zip(
+                robot.description.legs, surroundings.contacts, feet.drags, strict=True
+            )
+        ],
+        friction_impedance=feet.friction_impedance,
+    )
+
+
+def even_drags(
+    robot: Robot, surroundings: Surroundings, standing: float | None = None
+) -> tuple[float, ...]:
+    """Drags with which friction is full at the slip that the robot's law has it full at.
+
+    A law's drag follows the normal force; MuJoCo's is one number for all loads.
+
+    Args:
+        robot: The robot.
+        surroundings: Of its walk.
+        standing: Feet that carry the weight evenly [1]; None for half of them.
+
+    Returns:
+        By leg [N s/m].
+    """
+    mass = robot.urdf.total_mass - robot.urdf.body.mass + surroundings.body.mass
+    share = -float(surroundings.gravity[2]) * mass / (standing or 0.5 * len(robot.legs))
+    zoned = robot.description.contact_law in {"linear_zone", "dead_zone"}
+    return tuple(
+        contact.friction * share / (contact.slip_velocity if zoned else contact.stick_velocity)
+        for contact in surroundings.contacts
+    )
+
+
+def _pair(
+    free: mujoco.MjModel, foot: str, contact: Contact, drag: float, feet: Feet
+) -> Mapping[str, str]:
+    """Attributes of a foot's contact pair."""
+    d = feet.impedance
+    body = free.site_bodyid[free.site(foot).id]
+    per_force = float(free.body_invweight0[body, 0]) * (1.0 - d)
+    spring, damper = contact.stiffness * per_force, contact.damping * per_force
+    # Tangential constraints have no position, hence no stiffness that would matter.
+    rub = drag * per_force / feet.friction_impedance
+    return {
+        "solimp": f"{d!r} {d!r} 0.001 0.5 2",
+        "solref": f"{-spring!r} {-damper!r}",
+        "solreffriction": f"-1 {-rub!r}",
+    }

@@ -1,0 +1,40 @@
+"""Walks by MuJoCo's kernel, with all that a kernel is given by the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.assembly import control_steps, judge, plan_walk
+from sim.controllers import control_law
+from sim.kernel.observation import WalkLog, walk_log
+from sim.kernel.walk import WalkResult
+from sim.mujoco.kernel import MujocoKernel
+from sim.mujoco.mjcf import Soles
+from sim.outcome import Status
+from sim.robot import RobotChoice, load_robot
+from sim.scenario import Scenario
+
+
+def walk_in_mujoco(
+    variant: RobotChoice,
+    scenario: Scenario,
+    controller: str,
+    design: Mapping[str, float],
+    *,
+    rate: int | None = None,
+    soles: Soles = "none",
+) -> tuple[NDArray[np.float64], WalkLog]:
+    """Objectives f1 to f6 and log of one walk to its end."""
+    robot = load_robot(variant)
+    coding, timestep = control_steps(robot)
+    plan = plan_walk(robot, scenario, timestep)
+    assert plan is not None
+    setup = plan(control_law(controller, tuple(design.items())))
+    (result,) = MujocoKernel(robot, rate=rate, soles=soles).walk([setup], coding, log=True)
+    assert isinstance(result, WalkResult) and result.states is not None
+    status, objectives = judge(setup, result, coding.substeps, timestep)
+    assert status is Status.OK
+    return objectives, walk_log(robot, setup, result.states)

@@ -1,0 +1,50 @@
+"""A robot's numbers as the forces in MuJoCo want them, straight from its description."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.mujoco.gears import Gears, gears_of
+from sim.mujoco.ground import GROUNDS, Ground
+from sim.mujoco.mjcf import Surroundings
+from sim.mujoco.model import Feet, even_drags
+from sim.robot import Robot
+from sim.robot.description import Contact
+from sim.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+
+def own_gears(robot: Robot, angles: Floats) -> Gears:
+    """The robot's, with motors and links at the same angles (J,) [rad], at rest."""
+    actuators, supply = robot.actuators(), robot.description.supply
+    numbers = {
+        "viscous": actuators.viscous,
+        "supply_voltage": np.array([supply.voltage]),
+        "supply_resistance": np.array([supply.resistance]),
+        "static_friction": actuators.static_friction if robot.has_static_friction else np.empty(0),
+        "backlash": actuators.backlash,
+    }
+    return gears_of(robot, numbers, angles)
+
+
+def own_ground(robot: Robot) -> Ground:
+    """The robot's law of contact with every foot's own numbers."""
+    return GROUNDS[robot.description.contact_law](_contacts(robot))
+
+
+def even_feet(robot: Robot, scenario: Scenario, *, points: bool = False) -> Feet:
+    """MuJoCo's own contacts, with the drag of feet that carry even shares of the weight."""
+    standing = scenario.duty_factor * len(robot.legs)
+    drags = even_drags(robot, Surroundings.of(robot, scenario), standing)
+    return Feet(drags, points=points)
+
+
+def _contacts(robot: Robot) -> Mapping[str, Floats]:
+    return {
+        name: np.array([getattr(contact, name) for contact in robot.contacts()])
+        for name in Contact.model_fields
+    }

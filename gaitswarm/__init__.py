@@ -75,6 +75,7 @@ if TYPE_CHECKING:
         TournamentStandingsView,
         TournamentView,
     )
+    from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import VerificationView
     from services.optimizer.jobs.kinds.calibration import CalibrationSpec
     from services.optimizer.jobs.kinds.certificate import CertificateSpec
@@ -143,6 +144,7 @@ __all__ = [
     "EvaluatorUnavailable",
     "FirmwareView",
     "Forbidden",
+    "FrontView",
     "GaSettings",
     "GaitswarmError",
     "GlobalBfgsSettings",
@@ -169,6 +171,7 @@ __all__ = [
     "OptimizationResult",
     "PatternSearchSettings",
     "Preference",
+    "PreferenceForView",
     "ProblemRunsView",
     "ProvenanceChanged",
     "PsoPsSettings",
@@ -259,6 +262,7 @@ _MODULES: Final = {
     "gaitswarm.views.tournament": (
         "ProblemRunsView", "TournamentStandingsView", "TournamentView",
     ),
+    "gaitswarm.views.trade_offs": ("FrontView", "PreferenceForView"),
     "gaitswarm.views.verification": ("VerificationView",),
     "services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),

@@ -6,9 +6,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from api.dependencies import AfterIteration, ExistingJob, JobId, Service
+from api.dependencies import LARGEST_INDEX, AfterIteration, ExistingJob, JobId, Service
 from api.documentation import binary, problems
 from gaitswarm.requests.families import TOLERANCE, run_scenario_families
+from gaitswarm.requests.trade_offs import (
+    DESIGNS,
+    MOST_DESIGNS,
+    run_front,
+    run_preference_for,
+)
 from gaitswarm.views import (
     PREFIX,
     DistributionView,
@@ -19,6 +25,7 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.base import MEDIA_TYPE
 from gaitswarm.views.families import ScenarioFamiliesView
+from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
 
@@ -109,6 +116,59 @@ def get_scenario_families(
     families of every size; from stored objectives, no walk is simulated.
     """
     return _json(run_scenario_families(service, job_id, tolerance))
+
+
+@router.get(
+    "/front",
+    operation_id="get_front",
+    summary="See what designs trade",
+    response_model=FrontView,
+    responses=problems(404, 409, 422),
+)
+def get_front(
+    job_id: JobId,
+    service: Service,
+    most: Annotated[
+        int,
+        Query(
+            ge=1,
+            le=MOST_DESIGNS,
+            description="Most designs; of more, those with a mark and others that cover the front"
+            " evenly.",
+        ),
+    ] = DESIGNS,
+) -> Response:
+    """The Pareto front of a job over f1 to f5: designs that no other dominates, its knees, the best
+    in each objective and under A, B and C, and its hypervolume over the iterations.
+
+    From stored objectives, no walk is simulated; for any job that tunes a drive, whatever its
+    search was for.
+    """
+    return _json(run_front(service, job_id, most=most))
+
+
+@router.get(
+    "/preference-for",
+    operation_id="get_preference_for",
+    summary="Find the preference of a design",
+    responses=problems(404, 409, 422),
+)
+def get_preference_for(
+    job_id: JobId,
+    service: Service,
+    iteration: Annotated[
+        int, Query(ge=0, le=LARGEST_INDEX, description="Iteration of the design, from 0.")
+    ],
+    particle: Annotated[
+        int,
+        Query(ge=0, le=LARGEST_INDEX, description="Number of the design in its iteration, from 0."),
+    ],
+) -> PreferenceForView:
+    """Biases and exponents under which a design is the best of its job, if there are any.
+
+    409 for a design that fails in a scenario.
+    """
+    return run_preference_for(service, job_id, iteration, particle)
 
 
 def _json(view: View) -> Response:

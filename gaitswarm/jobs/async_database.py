@@ -36,6 +36,7 @@ from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
+from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
@@ -248,6 +249,16 @@ class AsyncDatabaseJobs(AsyncLocalWalks, AsyncJobs):
         """Judge a job's designs by fewer scenarios, from what is stored."""
         jobs = await self._jobs()
         return await to_thread.run_sync(partial(jobs.scenarios, job_id, tolerance=tolerance))
+
+    async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
+        """Find a job's front from what is stored."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.front, job_id, most=most))
+
+    async def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
+        """Find a design's preference from what is stored."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.preference_for, job_id, iteration, particle)
 
     async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Compare runs from what is stored."""

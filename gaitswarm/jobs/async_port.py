@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         TournamentStandingsView,
         TournamentView,
     )
+    from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from services.optimizer.analysis.fits.targets import LeaveOut
     from sim.identification.recorded_walk import RecordedWalk
 
@@ -173,6 +174,14 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """See which scenarios of a job matter, from what is stored."""
+
+    @abstractmethod
+    async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
+        """See what designs of a job trade."""
+
+    @abstractmethod
+    async def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
+        """Find the preference under which a design wins its job."""
 
     @abstractmethod
     async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:

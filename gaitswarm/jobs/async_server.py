@@ -60,6 +60,7 @@ from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
+from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
@@ -224,6 +225,14 @@ class AsyncServerJobs(AsyncJobs):
     async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Let the server judge a job's designs by fewer scenarios."""
         return await self._send(calls.scenarios(job_id, tolerance))
+
+    async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
+        """Let the server find a job's front."""
+        return await self._send(calls.front(job_id, most))
+
+    async def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
+        """Let the server find a design's preference."""
+        return await self._send(calls.preference_for(job_id, iteration, particle))
 
     async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Let the server compare runs."""

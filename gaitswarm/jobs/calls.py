@@ -40,6 +40,7 @@ from gaitswarm.views.tournament import (
     TournamentStandingsView,
     TournamentsView,
 )
+from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
@@ -227,6 +228,29 @@ def scenarios(job_id: str, tolerance: float) -> Call[ScenarioFamiliesView]:
     """
     path, read = f"{job_path(job_id)}/scenarios", ScenarioFamiliesView.model_validate_json
     return Call("GET", path, read, {"tolerance": repr(tolerance)})
+
+
+def front(job_id: str, most: int) -> Call[FrontView]:
+    """Find out what designs of a job trade.
+
+    Args:
+        job_id: Identifier of the job.
+        most: Designs of the front to list.
+    """
+    path, read = f"{job_path(job_id)}/front", FrontView.model_validate_json
+    return Call("GET", path, read, {"most": str(most)})
+
+
+def preference_for(job_id: str, iteration: int, particle: int) -> Call[PreferenceForView]:
+    """Find the preference under which a design wins its job.
+
+    Args:
+        job_id: Identifier of the job.
+        iteration: Iteration of the design, from 0.
+        particle: Number of the design in its iteration, from 0.
+    """
+    path, read = f"{job_path(job_id)}/preference-for", PreferenceForView.model_validate_json
+    return Call("GET", path, read, {"iteration": str(iteration), "particle": str(particle)})
 
 
 def parameters(job_ids: Sequence[str]) -> Call[IdentifiabilityView]:

@@ -19,6 +19,7 @@ from gaitswarm.requests import arguments
 from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.requests.families import run_scenario_families
 from gaitswarm.requests.targets import run_targets
+from gaitswarm.requests.trade_offs import DESIGNS, run_front, run_preference_for
 from gaitswarm.settings import default_database
 from gaitswarm.specs import ForkOptions, PreferenceInput, SpecInput, SpecOptions, chosen_spec
 from gaitswarm.tables import EvaluationTable, TableFormat, encoded_table
@@ -35,6 +36,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
@@ -270,6 +272,14 @@ class DatabaseJobs(DatabaseTournaments, LocalWalks, Jobs):
     def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Judge a job's designs by fewer scenarios, from what is stored."""
         return run_scenario_families(self._service, job_id, tolerance)
+
+    def front(self, job_id: str, *, most: int = DESIGNS) -> FrontView:
+        """Find a job's front from what is stored."""
+        return run_front(self._service, job_id, most=most)
+
+    def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
+        """Find a design's preference from what is stored."""
+        return run_preference_for(self._service, job_id, iteration, particle)
 
     def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Compare runs from what is stored."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView
+    from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from services.optimizer.analysis.fits.targets import LeaveOut
 
 
@@ -101,6 +102,42 @@ class Findings(ABC):
             InvalidRequest: The job tunes no drive, or the tolerance makes no sense.
             Conflict: No design of it walks in all scenarios, or it is too large to be held in
                 memory.
+        """
+
+    @abstractmethod
+    def front(self, job_id: str, *, most: int = 1000) -> FrontView:
+        """See what designs of a job trade: its Pareto front over f1 to f5, from what is stored.
+
+        Args:
+            job_id: Identifier of a job that tunes a drive.
+            most: Designs of the front to list, 1 to 10 000; of more, those with a mark and others
+                that cover the front evenly.
+
+        Returns:
+            The front with its knees, extremes and winners, and its hypervolume over the iterations.
+
+        Raises:
+            InvalidRequest: The job tunes no drive, or the number makes no sense.
+            Conflict: No design of it walks in all scenarios, or it is too large to be held in
+                memory.
+        """
+
+    @abstractmethod
+    def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
+        """Find the preference under which a design wins its job, from what is stored.
+
+        Args:
+            job_id: Identifier of a job that tunes a drive.
+            iteration: Iteration of the design, from 0.
+            particle: Number of the design in its iteration, from 0.
+
+        Returns:
+            The best preference for each set of biases, with the design's place under it.
+
+        Raises:
+            InvalidRequest: The job tunes no drive, or a number makes no sense.
+            NotFound: The job has no such design.
+            Conflict: The design fails in a scenario, or the job is too large to be held in memory.
         """
 
     @abstractmethod

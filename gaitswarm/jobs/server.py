@@ -59,6 +59,7 @@ from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
+from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
@@ -222,6 +223,14 @@ class ServerJobs(Jobs):
     def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Let the server judge a job's designs by fewer scenarios."""
         return self._send(calls.scenarios(job_id, tolerance))
+
+    def front(self, job_id: str, *, most: int = 1000) -> FrontView:
+        """Let the server find a job's front."""
+        return self._send(calls.front(job_id, most))
+
+    def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
+        """Let the server find a design's preference."""
+        return self._send(calls.preference_for(job_id, iteration, particle))
 
     def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Let the server compare runs."""

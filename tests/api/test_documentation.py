@@ -48,6 +48,8 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/particles",
         f"post {job}/ranking",
         f"get {job}/scenarios",
+        f"get {job}/front",
+        f"get {job}/preference-for",
         f"get {job}/parameters",
         f"get {job}/targets",
         "get /v1/tournaments",

@@ -9,24 +9,7 @@ import pytest
 
 from services.optimizer.analysis.robustness.preference_winners import drawn_preferences, winners
 from services.optimizer.analysis.utilities import fitness_of, log_utilities
-from services.optimizer.jobs.columns import EvaluationColumns
-from sim.outcome import Status
-
-
-def columns_of(objectives: np.ndarray, failed: tuple[int, ...] = ()) -> EvaluationColumns:
-    """objectives: (r, 5) of one scenario."""
-    rows = len(objectives)
-    statuses = np.zeros((rows, 1), dtype=np.uint8)
-    statuses[list(failed)] = Status.FELL
-    return EvaluationColumns(
-        iteration=np.arange(rows),
-        particle=np.zeros(rows, dtype=np.int64),
-        designs=np.zeros((rows, 1)),
-        objectives=np.hstack([objectives, np.zeros((rows, 1))])[:, None],
-        statuses=statuses,
-        fitness=np.ones(rows),
-    )
-
+from tests.examples.columns import columns_of
 
 TRADE_OFF = np.array(
     [

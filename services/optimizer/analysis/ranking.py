@@ -110,8 +110,7 @@ def rank(
     Returns:
         The ranking; the designs' order by the new preference beside that by the old.
     """
-    logarithms, before = log_utilities(columns, preference), columns.fitness
-    fitness = fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
+    fitness, before = fitness_by(columns, preference, worlds=worlds), columns.fitness
     present, ordered = _best_first(before, 1), np.sort(before)
     return Ranking(
         top=tuple(
@@ -127,6 +126,23 @@ def rank(
         best_so_far=best_so_far(columns.iteration, fitness),
         correlation=rank_correlation(fitness, before),
     )
+
+
+def fitness_by(
+    columns: EvaluationColumns, preference: Preference, *, worlds: TuningWorlds | None = None
+) -> Floats:
+    """Judge all rows by a preference.
+
+    Args:
+        columns: r evaluations of a job that tunes a drive.
+        preference: to judge by.
+        worlds: in which the job judges every design; None for the model alone.
+
+    Returns:
+        (r,) fitness, minimized, +inf for a design that failed.
+    """
+    logarithms = log_utilities(columns, preference)
+    return fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
 
 
 def best_so_far(iteration: NDArray[np.int64], fitness: Floats) -> Floats:

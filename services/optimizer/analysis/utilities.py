@@ -6,6 +6,7 @@ differ from Python's in the last bit, so that nothing that is stored is computed
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
 from services.optimizer.jobs.spec import Spec
 
@@ -68,6 +70,36 @@ def fitness_of(log_utility: Floats) -> Floats:
     with np.errstate(over="ignore", invalid="ignore"):
         fitness = np.exp(log_utility.mean(axis=1))
     return np.where(failed, np.inf, fitness)
+
+
+def objective_vectors(
+    columns: EvaluationColumns,
+    bias: Sequence[float] = (0.0,) * 5,
+    *,
+    worlds: TuningWorlds | None = None,
+) -> Floats:
+    """What each design comes to in each objective, over all scenarios.
+
+    Number m of a design is its fitness under a preference that weighs objective m alone. Without
+    worlds, fitness under any preference with these biases is the product of these numbers, each to
+    the power of its exponent.
+
+    Args:
+        columns: r evaluations of walks in K scenarios.
+        bias: M = 5 or 6 biases b_m >= 0 in the units of f_m; by default none.
+        worlds: in which the job judges every design; None for the model alone.
+
+    Returns:
+        (r, M), each in its objective's unit, minimized; a row is +inf throughout where a walk of
+        the design failed or lacks an objective.
+    """
+    result = np.empty((len(columns), len(bias)))
+    for m, exponent in enumerate(np.eye(len(bias)).tolist()):
+        alone = Preference(bias=tuple(bias), exponent=tuple(exponent))
+        logarithms = log_utilities(columns, alone)
+        result[:, m] = fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
+    result[~np.isfinite(result).all(axis=1)] = np.inf
+    return result
 
 
 def utilities(columns: EvaluationColumns, spec: Spec) -> Floats:

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.analysis.ranking import fitness_by
 from services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
-from services.optimizer.analysis.utilities import fitness_of, log_utilities
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import PREFERENCES, Preference
@@ -92,11 +92,11 @@ def winners(
     """
     preferences = [*NAMED.values(), *drawn]
     names = [*NAMED, *("" for _ in drawn)]
-    best = np.array([_log_fitness(columns, p, worlds).argmin() for p in preferences])
+    best = np.array([fitness_by(columns, p, worlds=worlds).argmin() for p in preferences])
     rows = np.unique(best)
     # How far each winner leads the others, under every preference.
     winning = columns.rows(rows)
-    rivals = np.sort([_log_fitness(winning, p, worlds) for p in preferences], axis=1)
+    rivals = np.sort([np.log(fitness_by(winning, p, worlds=worlds)) for p in preferences], axis=1)
     lead = rivals[:, 1] - rivals[:, 0] if len(rows) > 1 else np.zeros(len(preferences))
     found = []
     for row in rows.tolist():
@@ -106,11 +106,3 @@ def winners(
         share = np.count_nonzero(won >= len(NAMED)) / max(1, len(drawn))
         found.append(Winner(row, preferences[chosen], named, share))
     return tuple(sorted(found, key=lambda winner: (not winner.named, -winner.share, winner.row)))
-
-
-def _log_fitness(
-    columns: EvaluationColumns, preference: Preference, worlds: TuningWorlds | None
-) -> Floats:
-    logarithms = log_utilities(columns, preference)
-    judged = logarithms if worlds is None else worlds.aggregated(logarithms)
-    return np.asarray(np.log(fitness_of(judged)))

@@ -1,0 +1,40 @@
+"""Histories of jobs, made of objectives alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from services.optimizer.analysis.ranking import fitness_by
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from services.optimizer.jobs.preference import PREFERENCES, Preference
+from sim.outcome import Status
+
+
+def columns_of(
+    objectives: np.ndarray,
+    failed: tuple[int, ...] = (),
+    *,
+    particles: int = 1,
+    own: Preference = PREFERENCES["A"],
+    worlds: TuningWorlds | None = None,
+) -> EvaluationColumns:
+    """A job's history.
+
+    objectives: (r, 5) of one scenario, or (r, K, 5); failed: rows whose walks all fell; own:
+    preference of the job.
+    """
+    walks = objectives[:, None] if objectives.ndim == 2 else objectives
+    rows, cases, _ = walks.shape
+    statuses = np.zeros((rows, cases), dtype=np.uint8)
+    statuses[list(failed)] = Status.FELL
+    columns = EvaluationColumns(
+        iteration=np.arange(rows) // particles,
+        particle=np.arange(rows) % particles,
+        designs=np.zeros((rows, 1)),
+        objectives=np.concatenate([walks, np.zeros((rows, cases, 1))], axis=2),
+        statuses=statuses,
+        fitness=np.empty(rows),
+    )
+    columns.fitness[:] = fitness_by(columns, own, worlds=worlds)
+    return columns

@@ -155,8 +155,8 @@ class FrontView(View):
         examples=[0.63],
     )
     hypervolume_error: float = Field(
-        description="Its standard error [1]; 0 if it is exact. Fronts of too many designs are"
-        " measured by 100 000 points drawn in the box.",
+        description="Its standard error [1]; 0 if it is exact. A front of thousands of designs may"
+        " be measured by points drawn in the box.",
         examples=[0.0],
     )
     iterations: list[FrontIterationView] = Field(

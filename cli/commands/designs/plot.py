@@ -1,4 +1,4 @@
-"""`gaitswarm plot`: pictures of a job's convergence, of a controller, and of robustness."""
+"""`gaitswarm plot`: pictures of convergence, fronts, controllers and robustness."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ Output = Annotated[
 def register(app: typer.Typer) -> None:
     """Add the group of commands."""
     plots = typer.Typer(
-        help="Draw a job's convergence, a controller's surface, or how robust designs are."
+        help="Draw a job's convergence or front, a controller's surface, or how robust designs are."
     )
     plots.command()(convergence)
+    plots.command()(front)
     plots.command()(surface)
     plots.command()(robustness)
     app.add_typer(plots, name="plot")
@@ -47,6 +48,20 @@ def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = N
         job = jobs.job(job_id)
         iterations = list(jobs.iterations(job_id))
     save(draw_convergence(iterations, title=job.name or f"job {job.id}"), output)
+    note(f"picture written to {output}")
+
+
+def front(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
+    """Draw the Pareto front of a job in every pair of objectives, with its knees and winners."""
+    from cli.front_tables import draw_front
+    from cli.output import note
+    from cli.plots import save
+    from gaitswarm.jobs.open import open_jobs
+
+    with open_jobs(server, db) as jobs:
+        job = jobs.job(job_id)
+        view = jobs.front(job_id, most=10_000)
+    save(draw_front(view, title=f"Pareto front of {job.name or f'job {job.id}'}"), output)
     note(f"picture written to {output}")
 
 

@@ -1,7 +1,8 @@
-"""`gaitswarm preferences`: which preference's winner is the most robust."""
+"""`gaitswarm preferences`: whose winner is the most robust, and under which a design wins."""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
@@ -29,6 +30,15 @@ def preferences(
     radius: Radius = 0.02,
     seed: Seed = 1,
     precision: Precision = None,
+    for_design: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="ITERATION.PARTICLE",
+            help="Find the preference under which this design of the job wins instead; no walk is"
+            " run.",
+        ),
+    ] = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
@@ -36,8 +46,11 @@ def preferences(
     """Choose a preference so that its winner is robust (thesis 4.5), among a job's designs.
 
     They are ranked anew under many preferences, from what is stored; of the winners the robustness
-    index is estimated, by walks.
+    index is estimated, by walks. With --for: which preference makes a design of the job its best.
     """
+    if for_design is not None:
+        _suit(job_id, for_design, server=server, db=db, as_json=as_json)
+        return
     from cli.commands.designs.robustness import shown_progress
     from cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
@@ -59,6 +72,36 @@ def preferences(
         print_json(view)
     else:
         _print(view)
+
+
+def _suit(
+    job_id: str, for_design: str, *, server: str | None, db: str | None, as_json: bool
+) -> None:
+    from cli.front_tables import fits_table, verdict
+    from cli.output import print_json, stdout_console
+    from gaitswarm.jobs.open import open_jobs
+
+    iteration, particle = _place(for_design)
+    with open_jobs(server, db) as jobs:
+        view = jobs.preference_for(job_id, iteration, particle)
+    if as_json:
+        print_json(view)
+        return
+    console = stdout_console()
+    console.print(fits_table(view))
+    console.print(verdict(view), markup=False)
+
+
+def _place(design: str) -> tuple[int, int]:
+    """Iteration and particle; tables print them with a slash between. Raises InvalidRequest."""
+    from services.optimizer.errors import InvalidRequest
+
+    found = re.fullmatch(r"(\d{1,9})[./](\d{1,9})", design, re.ASCII)
+    if found is None:
+        raise InvalidRequest(
+            "must be the iteration and the number of a design in it, such as 24.7", field="for"
+        )
+    return int(found[1]), int(found[2])
 
 
 def _print(view: RobustPreferencesView) -> None:

@@ -22,8 +22,11 @@ Rows = NDArray[np.intp]
 MOST_BOUNDS: Final = 250_000
 """Local upper bounds up to which a hypervolume is exact."""
 
-SAMPLES: Final = 100_000
-"""Points that are drawn for an estimate."""
+_MOST_SAMPLES: Final = 100_000
+"""Points that are drawn for an estimate, at most."""
+
+_COMPARISONS: Final = 1_000_000_000
+"""Pairs of points that an estimate compares; the more points there are, the fewer are drawn."""
 
 _DRAW: Final = 0xA7EA
 """Purpose of the random numbers."""
@@ -160,11 +163,11 @@ class _Undominated:
 def _estimated(points: Floats) -> HypervolumeCurve:
     """The share of points drawn in the box that are dominated, after each point."""
     size = points.shape[1]
-    drawn = uniform(0, _DRAW, iteration=0, particle=0, count=SAMPLES * size)
-    left = drawn.reshape(SAMPLES, size)
+    samples = min(_MOST_SAMPLES, _COMPARISONS // len(points))
+    drawn = uniform(0, _DRAW, iteration=0, particle=0, count=samples * size)
+    left = drawn.reshape(samples, size)
     hits = np.zeros(len(points), dtype=np.int64)
-    step = 1
-    first = 0
+    first, step = 0, 1
     while first < len(points) and len(left):
         chunk = points[first : first + step]
         when = _first_below(chunk, left)
@@ -173,9 +176,9 @@ def _estimated(points: Floats) -> HypervolumeCurve:
         left = left[~dominated]
         first += len(chunk)
         step = max(1, _AT_ONCE // max(1, len(left)))
-    values = np.cumsum(hits) / SAMPLES
-    last = float(values[-1]) if len(values) else 0.0
-    return HypervolumeCurve(values, math.sqrt(last * (1.0 - last) / SAMPLES))
+    values = np.cumsum(hits) / samples
+    last = float(values[-1])
+    return HypervolumeCurve(values, math.sqrt(last * (1.0 - last) / samples))
 
 
 def _first_below(points: Floats, samples: Floats) -> Rows:

@@ -27,14 +27,23 @@ def published_beside(spec: Spec) -> dict[str, SimulationView]:
     study = next(iter([*names, *published]), None)
     if study is None:
         return {}
+    return {f"published {study}": published_walk(spec, study)}
+
+
+def published_walk(spec: JobSpec, study: str) -> SimulationView:
+    """A published design in the job's scenarios, under its preference.
+
+    study: name of the design, one that was published for the job's controller.
+    """
+    published = CONTROLLERS[spec.controller].published[study]
     request = SimulationRequest(
         robot=spec.robot,
         controller=spec.controller,
-        design=on_the_jobs_terms(published[study], spec),
+        design=on_the_jobs_terms(published, spec),
         scenarios=spec.scenarios,
         preference=spec.preference,
     )
-    return {f"published {study}": run_simulation(request)}
+    return run_simulation(request)
 
 
 def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from cli.tables import SHORT, number
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+    from gaitswarm.views import SimulationView
     from gaitswarm.views.trade_offs import (
         FrontView,
         FrontWinnerView,
@@ -75,6 +77,60 @@ def summary(view: FrontView) -> Iterator[str]:
 
 def _whose(winner: FrontWinnerView) -> str:
     return "the job's own" if winner.preference == "job" else winner.preference
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A design from elsewhere beside a front.
+
+    Attributes:
+        objectives: over all scenarios, by name; None if it fails in one.
+        fitness: by the job's own preference.
+        dominated_by: designs of the front that dominate it.
+        dominates: designs of the front that it dominates.
+        of: designs that it was compared with.
+    """
+
+    objectives: dict[str, float] | None
+    fitness: float | None
+    dominated_by: int
+    dominates: int
+    of: int
+
+
+def placed(walk: SimulationView, view: FrontView) -> Placed:
+    """Where a design that walked in the job's scenarios lies with respect to the front."""
+    import numpy as np
+
+    names = [objective.name for objective in view.objectives]
+    walks = [
+        [result.objectives[name] for name in names] for result in walk.scenarios.values()
+        if result.status == "ok"
+    ]  # fmt: skip
+    if len(walks) < len(walk.scenarios):
+        return Placed(None, None, 0, 0, len(view.designs))
+    own = np.exp(np.log(np.array(walks, dtype=np.float64)).mean(axis=0))
+    front = np.array([list(design.objectives.values()) for design in view.designs])
+    return Placed(
+        dict(zip(names, own.tolist(), strict=True)),
+        walk.fitness,
+        int(((front <= own).all(axis=1) & (front < own).any(axis=1)).sum()),
+        int(((own <= front).all(axis=1) & (own < front).any(axis=1)).sum()),
+        len(front),
+    )
+
+
+def placed_lines(published: Mapping[str, Placed]) -> Iterator[str]:
+    """One sentence for each design."""
+    for name, own in published.items():
+        if own.objectives is None:
+            yield f"published {name} fails in a scenario"
+            continue
+        told = [f"{SHORT[key]} {number(value)}" for key, value in own.objectives.items()]
+        yield (
+            f"published {name} is dominated by {own.dominated_by} of {own.of} designs of the front,"
+            f" and dominates {own.dominates}: {', '.join(told)}, fitness {number(own.fitness)}"
+        )
 
 
 def front_csv(view: FrontView) -> bytes:

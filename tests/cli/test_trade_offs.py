@@ -41,9 +41,27 @@ def test_a_front_is_shown_with_its_marks_and_written_as_a_table(
     assert f"hypervolume {view['hypervolume']:.4f}" in shown.out
 
 
+def test_published_designs_walk_and_are_placed_beside_the_front(
+    gaitswarm: Gaitswarm, finished: Finished, write_json: WriteJson
+) -> None:
+    where = (finished.id, "--db", finished.db)
+    result = gaitswarm("front", *where, "--published")
+    assert result.code == 0, result.err
+    view = gaitswarm("front", *where, "--json").json
+    spec = gaitswarm("status", *where, "--json").json["spec"]
+    scenario = write_json(spec["scenarios"][0], "walk.json")
+    walk = gaitswarm("simulate", "--design", "published:A", "--scenario", scenario, "--json")
+    (line,) = [line for line in result.out.splitlines() if line.startswith("published A ")]
+    (own,) = [result["objectives"] for result in walk.json["scenarios"].values()]
+    fronts = [design["objectives"] for design in view["designs"]]
+    better = sum(all(front[name] <= own[name] for name in front) for front in fronts)
+    assert f"is dominated by {better} of {view['size']} designs of the front" in line
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (("--published", "--json"), "published: is for the table, not for --json"),
         (("--most", "0"), "most: must be 1 to 10000"),
         (("--output", "front.xlsx"), "output: front.xlsx must end in .csv"),
     ],
@@ -127,6 +145,9 @@ def test_a_job_in_worlds_trades_what_it_makes_of_all_of_them(
     )
     assert view["fits"][0]["rank"] == place
     assert view["certain"] == view["wins"]
+    refused = gaitswarm("front", job["id"], "--db", db, "--published")
+    assert refused.code == 2
+    assert "published: the job judges in worlds" in refused.err
 
 
 @pytest.mark.parametrize(

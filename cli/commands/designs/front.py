@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.options import Db, JobId, Json, Server
+
+if TYPE_CHECKING:
+    from cli.front_tables import Placed
+    from gaitswarm.jobs.port import Jobs
 
 
 def register(app: typer.Typer) -> None:
@@ -24,6 +28,10 @@ def front(
     most: Annotated[
         int, typer.Option(help="Designs to list, with --json and --output; of more, some.")
     ] = 1000,
+    published: Annotated[
+        bool,
+        typer.Option(help="Let the published designs of the controller walk, too, to place them."),
+    ] = False,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
@@ -34,15 +42,18 @@ def front(
     preference, and the hypervolume.
     """
     from cli.atomic_file import replacing
-    from cli.front_tables import front_csv, marked_table, summary
+    from cli.front_tables import front_csv, marked_table, placed_lines, summary
     from cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.errors import InvalidRequest
 
     if output is not None and output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
+    if published and as_json:
+        raise InvalidRequest("is for the table, not for --json", field="published")
     with open_jobs(server, db) as jobs:
         view = jobs.front(job_id, most=most)
+        placed = _published(jobs, job_id) if published else {}
     if output is not None:
         with replacing(output, "output") as file:
             file.write(front_csv(view))
@@ -52,5 +63,22 @@ def front(
         return
     console = stdout_console()
     console.print(marked_table(view))
-    for line in summary(view):
+    for line in (*summary(view), *placed_lines(placed)):
         console.print(line, markup=False)
+
+
+def _published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
+    """Where the published designs lie; raises InvalidRequest where they cannot be compared."""
+    from cli.comparison import published_walk
+    from cli.front_tables import placed
+    from services.optimizer.errors import InvalidRequest
+    from services.optimizer.jobs.kinds.tuning import JobSpec
+    from sim.controllers import CONTROLLERS
+
+    spec, view = jobs.job(job_id).spec, jobs.front(job_id, most=10_000)
+    if not isinstance(spec, JobSpec) or spec.worlds is not None:
+        raise InvalidRequest(
+            "the job judges in worlds, in which no published design has walked", field="published"
+        )
+    names = CONTROLLERS[spec.controller].published
+    return {name: placed(published_walk(spec, name), view) for name in names}

@@ -70,14 +70,14 @@ class _Rates:
 
     Attributes:
         path: Of the evolution path, c_c.
-        one: Of the path's update, c_1.
-        many: Of all samples' update, c_mu.
+        rank_one: Of the path's update, c_1.
+        rank_mu: Of all samples' update, c_mu.
         weights: (n,) of the samples in order, negative in the worse half (active CMA).
     """
 
     path: float
-    one: float
-    many: float
+    rank_one: float
+    rank_mu: float
     weights: Floats
 
 
@@ -131,11 +131,11 @@ class NormalDistribution:
         better = [max(w, 0.0) for w in raw]
         worse = [min(w, 0.0) for w in raw]
         self._better: Final = np.array(better) / math.fsum(better)
-        self._mass: Final = 1.0 / math.fsum(self._better**2)
+        self._mu_eff: Final = 1.0 / math.fsum(self._better**2)
         self._worse: Final = np.array(worse) / -math.fsum(worse)
-        self._worse_mass: Final = 1.0 / math.fsum(self._worse**2)
-        self._of_correlation: Final = self._rates(d * (d + 1) / 2.0)
-        self._of_scale: Final = self._rates(float(d))
+        self._worse_mu_eff: Final = 1.0 / math.fsum(self._worse**2)
+        self._correlation_rates: Final = self._rates(d * (d + 1) / 2.0)
+        self._scale_rates: Final = self._rates(float(d))
 
     def sample(self, random: RandomNumbers) -> Floats:
         """Draw a generation.
@@ -164,16 +164,16 @@ class NormalDistribution:
         z, y = self._steps(random)
         choices = self._choices(random)[order] if self._chosen else None
         z, y = z[order], y[order]
-        step = product(self._better[np.newaxis], y)[0]
-        self._mean = self._mean + self._sigma * self._scale * step
-        steady = self._adapt_sigma(product(self._better[np.newaxis], z)[0])
-        moved = steady * self._scale * step
+        shift = product(self._better[np.newaxis], y)[0]
+        self._mean = self._mean + self._sigma * self._scale * shift
+        h_sigma = self._adapt_sigma(product(self._better[np.newaxis], z)[0])
+        path_step = h_sigma * self._scale * shift
         squares = np.ascontiguousarray(np.square(z).T).sum(axis=0)
         # Worse samples far away would take more variance than there is, so each counts as d / |z|^2
         # (active CMA); one nearby that would count for more than four does for four.
-        kept = np.minimum(4.0, self._space.dimension / np.maximum(squares, 1e-12))
-        correlation = self._learned_correlation(moved, y, kept)
-        change = self._learned_scale(moved, z, kept)
+        weight_factor = np.minimum(4.0, self._space.dimension / np.maximum(squares, 1e-12))
+        correlation = self._learned_correlation(path_step, y, weight_factor)
+        change = self._learned_scale(path_step, z, weight_factor)
         slowed = 1.0 / max(1.0, root.condition - _NEARLY_DIAGONAL + 1.0)
         factor = np.array([math.exp(c) for c in (0.5 * slowed * change).tolist()])
         spread = np.sqrt(np.maximum(np.diag(correlation), 1e-20))
@@ -235,13 +235,14 @@ class NormalDistribution:
 
     def _rates(self, parameters: float) -> _Rates:
         """Rates of a part of so many parameters (Akimoto and Hansen 2020, table 1)."""
-        d, n, mass = self._space.dimension, self._size, self._mass
-        half = math.sqrt(d + 1.0)
-        one = 1.0 / (2.0 * (parameters / d + 1.0) * half * math.sqrt(half) + 0.5 * mass)
-        gain = mass + 1.0 / mass - 2.0 + 0.5 * n / (n + 5.0)
-        many = min(gain * one, 1.0 - one)
-        negative = min(1.0 + one / many, 1.0 + 2.0 * self._worse_mass / (mass + 2.0))
-        return _Rates(math.sqrt(0.5 * gain * one), one, many, self._better + negative * self._worse)
+        d, n, mu_eff = self._space.dimension, self._size, self._mu_eff
+        root = math.sqrt(d + 1.0)
+        c_1 = 1.0 / (2.0 * (parameters / d + 1.0) * root * math.sqrt(root) + 0.5 * mu_eff)
+        gain = mu_eff + 1.0 / mu_eff - 2.0 + 0.5 * n / (n + 5.0)
+        c_mu = min(gain * c_1, 1.0 - c_1)
+        negative = min(1.0 + c_1 / c_mu, 1.0 + 2.0 * self._worse_mu_eff / (mu_eff + 2.0))
+        weights = self._better + negative * self._worse
+        return _Rates(math.sqrt(0.5 * gain * c_1), c_1, c_mu, weights)
 
     def _root(self) -> _Root:
         """Of the correlations; decomposed once after they have changed."""
@@ -270,12 +271,12 @@ class NormalDistribution:
         return np.array(columns, dtype=np.float64).T
 
     def _adapt_sigma(self, step: Floats) -> float:
-        """Lengthen or shorten steps (CSA); tells how much of a step the other paths take."""
-        d, mass = self._space.dimension, self._mass
-        rate = (mass + 2.0) / (d + mass + 5.0)
-        damping = 1.0 + rate + 2.0 * max(0.0, math.sqrt((mass - 1.0) / (d + 1.0)) - 1.0)
+        """Lengthen or shorten steps (CSA); returns h_sigma, 0 while the other paths wait, or 1."""
+        d, mu_eff = self._space.dimension, self._mu_eff
+        rate = (mu_eff + 2.0) / (d + mu_eff + 5.0)
+        damping = 1.0 + rate + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (d + 1.0)) - 1.0)
         self._sigma_path = (1.0 - rate) * self._sigma_path + math.sqrt(
-            rate * (2.0 - rate) * mass
+            rate * (2.0 - rate) * mu_eff
         ) * step
         self._reached[0] = (1.0 - rate) ** 2 * self._reached[0] + rate * (2.0 - rate)
         length = math.fsum(self._sigma_path**2)
@@ -284,40 +285,42 @@ class NormalDistribution:
         self._sigma = min(_WIDEST, self._sigma * math.exp(rate / damping * excess))
         return 1.0 if length / self._reached[0] < (2.0 + 4.0 / (d + 1.0)) * d else 0.0
 
-    def _learned_correlation(self, moved: Floats, y: Floats, kept: Floats) -> Floats:
+    def _learned_correlation(self, path_step: Floats, y: Floats, weight_factor: Floats) -> Floats:
         """The covariance of y after this generation; its diagonal has left 1."""
-        rates = self._of_correlation
+        rates = self._correlation_rates
         self._correlation_path, self._reached[1] = self._path(
-            rates, self._correlation_path, moved, self._reached[1]
+            rates, self._correlation_path, path_step, self._reached[1]
         )
         path = self._correlation_path / self._scale
-        weights = np.where(rates.weights < 0.0, rates.weights * kept, rates.weights)
+        weights = np.where(rates.weights < 0.0, rates.weights * weight_factor, rates.weights)
         rank_one = path[:, np.newaxis] * path - self._reached[1] * self._correlation
-        rank_many = (
+        rank_mu = (
             product((y * weights[:, np.newaxis]).T, y) - math.fsum(weights) * self._correlation
         )
-        return self._correlation + rates.one * rank_one + rates.many * rank_many
+        return self._correlation + rates.rank_one * rank_one + rates.rank_mu * rank_mu
 
-    def _learned_scale(self, moved: Floats, z: Floats, kept: Floats) -> Floats:
+    def _learned_scale(self, path_step: Floats, z: Floats, weight_factor: Floats) -> Floats:
         """(d,) by how much the logarithm of each variance is to change."""
-        rates = self._of_scale
+        rates = self._scale_rates
         self._scale_path, self._reached[2] = self._path(
-            rates, self._scale_path, moved, self._reached[2]
+            rates, self._scale_path, path_step, self._reached[2]
         )
         path = product((self._scale_path / self._scale)[np.newaxis], self._root().inverse)[0]
-        weights = np.where(rates.weights < 0.0, rates.weights * kept, rates.weights)
-        rank_many = product(weights[np.newaxis], np.square(z))[0] - math.fsum(weights)
-        change: Floats = rates.one * (np.square(path) - self._reached[2]) + rates.many * rank_many
+        weights = np.where(rates.weights < 0.0, rates.weights * weight_factor, rates.weights)
+        rank_mu = product(weights[np.newaxis], np.square(z))[0] - math.fsum(weights)
+        change: Floats = (
+            rates.rank_one * (np.square(path) - self._reached[2]) + rates.rank_mu * rank_mu
+        )
         return change
 
     def _path(
-        self, rates: _Rates, path: Floats, moved: Floats, reached: float
+        self, rates: _Rates, path: Floats, step: Floats, reached: float
     ) -> tuple[Floats, float]:
         """An evolution path after this generation, and how much of its steady state it has."""
-        kept, taken = 1.0 - rates.path, rates.path * (2.0 - rates.path)
-        paused = not moved.any()
-        reached = kept * kept * reached + (0.0 if paused else taken)
-        return kept * path + math.sqrt(taken * self._mass) * moved, reached
+        decay, added = 1.0 - rates.path, rates.path * (2.0 - rates.path)
+        stalled = not step.any()
+        reached = decay * decay * reached + (0.0 if stalled else added)
+        return decay * path + math.sqrt(added * self._mu_eff) * step, reached
 
     def _keep_trying_integers(self) -> None:
         """Widen integers' scales, so that some samples still have other values."""
@@ -334,7 +337,7 @@ class NormalDistribution:
 
     def _learn_choices(self, choices: Floats) -> None:
         """Move chances towards the better samples' choices, and keep the least one."""
-        rate = min(1.0, self._of_scale.one + self._of_scale.many)
+        rate = min(1.0, self._scale_rates.rank_one + self._scale_rates.rank_mu)
         for column, chances in zip(choices.T, self._chances, strict=True):
             taken = [math.fsum(self._better[column == choice]) for choice in range(len(chances))]
             least = min(_OTHERS / self._size, 0.5) / (len(chances) - 1)

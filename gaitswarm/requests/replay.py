@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from pydantic import Field
 
 from gaitswarm.requests.walk import WorldRequest, resolved
 from gaitswarm.views.replay import encoded_replay
+from services.optimizer.errors import InvalidRequest
 from sim.outcome import Status
 from sim.replay import CONTROL_RATE, replay
 from sim.robot import load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES, ScenarioChoice, with_gait
+
+MOST_POSES: Final = 1_000_000
+"""Poses of links in a replay; one of 40 s at 500 Hz has half as many of a shipped robot."""
 
 
 class ReplayRequest(WorldRequest):
@@ -38,13 +44,20 @@ def run_replay(request: ReplayRequest) -> bytes:
         The walk as `encoded_replay` writes it; one that failed is shown up to its end.
 
     Raises:
-        InvalidRequest: The design cannot be compiled, or the gait leaves the legs' reach; names
-            the field.
+        InvalidRequest: The design cannot be compiled, the gait leaves the legs' reach, or there
+            would be too many poses; names the field.
     """
     scenario = resolved(request.scenario)
     request.check_design()
     request.check_reach(scenario, field="scenario")
     robot = load_robot(request.robot)
+    poses = request.rate * request.simulated_seconds([scenario]) * len(robot.urdf.links)
+    if poses > MOST_POSES:
+        raise InvalidRequest(
+            f"the replay would have {poses:.3g} poses of links, more than {MOST_POSES}; choose"
+            " fewer frames a second or cycles",
+            field="rate",
+        )
     walk = request.walk(scenario, log=True)
     (log,) = walk.logs
     if log is None:

@@ -13,6 +13,7 @@ import pytest
 from sim.outcome import OBJECTIVE_NAMES
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
+from tests.examples.hostile import TOML, chain
 from tests.examples.paths import QUADRUPED
 from tests.examples.servers import unframed
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, quadruped_files
@@ -186,3 +187,11 @@ def test_a_request_that_makes_no_sense_is_refused_by_field(
     problem = refused(client, **change)
     assert field in [error["field"] for error in problem["errors"]]
     assert hint in problem["detail"]
+
+
+def test_a_replay_of_more_poses_than_fit_is_refused_before_the_walk(client: httpx2.Client) -> None:
+    walk = {"name": "long", "cycle_time": 1.0, "radius": 0.16, "hip_height": 0.15, "cycles": 39}
+    robot = {"toml": TOML, "urdf": chain(200)}
+    problem = refused(client, robot=robot, scenario=walk, rate=500)
+    assert problem["errors"][0]["field"] == "rate"
+    assert "more than 1000000; choose fewer frames" in problem["detail"]

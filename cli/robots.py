@@ -44,7 +44,7 @@ def robot_data(text: str | None) -> str | dict[str, Any]:
     if text.lstrip().startswith("{"):
         try:
             data: dict[str, Any] = json.loads(text)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InvalidRequest(f"not JSON: {error}", field="robot") from error
         return data
     folder = Path(text)
@@ -105,6 +105,6 @@ def _scenario_entry(entry: str) -> str | dict[str, Any]:
         return entry
     try:
         data: dict[str, Any] = json.loads(Path(entry).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidRequest(f"cannot read {entry}: {error}", field="scenario") from error
     return data

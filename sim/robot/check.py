@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-import threading
-from collections import OrderedDict
 from typing import Final
 
 from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
 from sim.limited_process import Document, LimitedProcesses, serve
 from sim.robot import bounds
+from sim.robot.digests import PASSED, digest_of
 from sim.robot.limbs import limbs_of
 from sim.robot.robot import parse_robot
 from sim.robot.shapes import visible_links
@@ -22,36 +20,9 @@ CPU_SECONDS: Final = 10
 MEMORY: Final = 2 << 30
 """Address space of a process that checks [B]; it takes a tenth of that."""
 
-_REMEMBERED: Final = 1024
-"""Robots that need not be checked again, by their digests."""
-
 PROCESSES: Final = LimitedProcesses(
     "sim.robot.check", count=2, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
 )
-
-
-class _Checked:
-    """Digests of robots that have passed, those that were asked for last at the end."""
-
-    def __init__(self) -> None:
-        self._digests: OrderedDict[bytes, None] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def knows(self, digest: bytes) -> bool:
-        with self._lock:
-            known = digest in self._digests
-            if known:
-                self._digests.move_to_end(digest)
-            return known
-
-    def add(self, digest: bytes) -> None:
-        with self._lock:
-            self._digests[digest] = None
-            if len(self._digests) > _REMEMBERED:
-                self._digests.popitem(last=False)
-
-
-_checked: Final = _Checked()
 
 
 def check_files(toml: str, urdf: str) -> None:
@@ -67,8 +38,8 @@ def check_files(toml: str, urdf: str) -> None:
     """
     bounds.check_toml(toml)
     bounds.check_urdf(urdf)
-    digest = hashlib.sha256(b"%d %s%s" % (len(toml), toml.encode(), urdf.encode())).digest()
-    if _checked.knows(digest):
+    digest = digest_of(toml, urdf)
+    if PASSED.has(digest):
         return
     try:
         PROCESSES.ask({"toml": toml, "urdf": urdf})
@@ -76,7 +47,7 @@ def check_files(toml: str, urdf: str) -> None:
         raise RobotFileError(f"the robot cannot be used: checking it {error}") from error
     except SimulationInputError as error:
         raise RobotFileError(str(error)) from error
-    _checked.add(digest)
+    PASSED.add(digest)
 
 
 def _answer(request: Document) -> Document:

@@ -22,6 +22,7 @@ from sim.robot.bounds import (
     MOST_VALUES,
 )
 from sim.robot.description import Actuator, ContactLaw, Leg, PlannedSoles
+from sim.robot.digests import PASSED, READ, digest_of
 from sim.robot.robot import Robot, parse_robot
 from sim.robot.shipped import DEFAULT_ROBOT, RobotName, shipped_robot
 
@@ -75,7 +76,11 @@ class RobotFiles(BaseModel):
 
     @model_validator(mode="after")
     def _is_a_robot(self) -> RobotFiles:
-        _load_files(self)
+        digest = digest_of(self.toml, self.urdf)
+        # A list of jobs reads all their robots, each time that it is asked for.
+        if not (PASSED.has(digest) or READ.has(digest)):
+            _load_files(self)
+            READ.add(digest)
         return self
 
 

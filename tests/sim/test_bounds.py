@@ -7,6 +7,7 @@ import time
 import pytest
 
 from sim.errors import RobotFileError
+from sim.robot import RobotFiles, variant
 from sim.robot.bounds import (
     DEEPEST,
     LONGEST_NAME,
@@ -113,3 +114,14 @@ def test_an_error_is_found_on_its_line_in_no_time_whatever_the_lines_before_are(
         parse_robot(f'described = """\n{line}\n"""\n{TOML}', URDF)
     # By expressions that go back, a line of 400 blanks takes as long as this one may.
     assert time.process_time() - begun < 0.5
+
+
+def test_a_robot_whose_files_were_read_once_is_not_read_again_to_be_told_from_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robots = [{"toml": f"# {k}\n{TOML}", "urdf": URDF} for k in range(40)]
+    for robot in robots:
+        RobotFiles.model_validate(robot)
+    monkeypatch.setattr(variant, "parse_robot", None)
+    for robot in robots:
+        RobotFiles.model_validate(robot)

@@ -117,6 +117,8 @@ class LimitedProcesses:
                 text=True,
                 encoding="utf-8",
                 env=os.environ | {"PYTHONPATH": path} | threads,
+                # Ctrl-C is this process's to hear: a job must not fail by it.
+                start_new_session=True,
             )
         except OSError as error:
             raise SimulationError(f"no process can be started: {error}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -85,6 +86,10 @@ def test_a_process_that_is_not_kept_answers_once() -> None:
     processes = hungry(kept=False)
     pids = [processes.ask({"do": "echo"})["pid"] for _ in range(2)]
     assert pids[0] != pids[1]
+
+
+def test_a_process_does_not_hear_the_terminal(processes: LimitedProcesses) -> None:
+    assert os.getsid(processes.ask({"do": "echo"})["pid"]) != os.getsid(0)
 
 
 def test_a_process_can_write_no_file(processes: LimitedProcesses, tmp_path: Path) -> None:

@@ -35,12 +35,13 @@ class Posted:
     """What came back for each body, and what the server was doing.
 
     busy: seconds that the event loop's thread computed meanwhile; lags: seconds that requests took
-    that asked for next to nothing.
+    that asked for next to nothing; idle: the same before the first body.
     """
 
     server: ServerProcess
     answers: list[tuple[Body, httpx2.Response]] = field(default_factory=list)
     busy: list[tuple[float, str]] = field(default_factory=list)
+    idle: list[float] = field(default_factory=list)
     lags: list[float] = field(default_factory=list)
     memory: tuple[int, int] = (0, 0)
 
@@ -51,14 +52,19 @@ def posted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Posted]:
     found = Posted(server)
     ended = threading.Event()
 
+    def lag(client: httpx2.Client) -> float:
+        ended.wait(0.05)
+        begun = time.perf_counter()
+        assert client.get("/v1/healthz").status_code == 200
+        return time.perf_counter() - begun
+
     def ask() -> None:
         with httpx2.Client(base_url=server.url, timeout=60.0) as client:
-            while not ended.wait(0.05):
-                begun = time.perf_counter()
-                assert client.get("/v1/healthz").status_code == 200
-                found.lags.append(time.perf_counter() - begun)
+            while not ended.is_set():
+                found.lags.append(lag(client))
 
     asking = threading.Thread(target=ask)
+    found.idle += [lag(server.client) for _ in range(40)]
     asking.start()
     try:
         pid = server.process.pid
@@ -127,11 +133,14 @@ def test_no_body_keeps_the_event_loop_busy(posted: Posted) -> None:
 
 
 def test_others_are_answered_meanwhile(posted: Posted) -> None:
-    lags = sorted(posted.lags)
-    assert len(lags) > 50
-    # Machines are noisy; the longest lags are those of its other processes.
-    assert lags[len(lags) * 95 // 100] < BLOCKED
-    assert lags[-1] < 2.0
+    assert len(posted.lags) > 50
+    # A machine has other work, too, which delays answers of an idle server as much.
+    assert _common(posted.lags) < _common(posted.idle) + BLOCKED
+
+
+def _common(lags: list[float]) -> float:
+    """What 19 of 20 do not exceed."""
+    return sorted(lags)[len(lags) * 95 // 100]
 
 
 @LINUX

@@ -12,7 +12,7 @@ from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.kinds.certificate import CertificateSpec, certificate_scenarios
 from sim.worlds import PERTURBATIONS
 
-_PLAIN: Final = ("worlds", "seed", "preference", "precision", "name")
+_PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 """Options that are fields of the spec."""
 
 
@@ -23,7 +23,7 @@ def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> C
         design: As the command names it.
         db: The database to look for a job in, as `--db` names it.
         given: Options that were given: controller, worlds, seed, scenarios, ranges, fixed, only,
-            robot, preference, precision, name.
+            robot, preference, precision, engines, name.
 
     Returns:
         The spec, checked.

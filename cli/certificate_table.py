@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from cli.engines_table import engine_table
 from cli.output import note, print_text, stdout_console
 from cli.tables import number
 
@@ -14,7 +15,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView
+    from gaitswarm.views.certificate import (
+        CertificateView,
+        ProportionView,
+        SpreadView,
+    )
     from services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 _STRONGEST = 5
@@ -40,6 +45,8 @@ def show_certificate(view: CertificateView, place: str) -> None:
         console.print(f"see the worst again: {view.worst[0].replay}{place}", markup=False)
     if view.influences:
         console.print(_influences(view))
+    for name, engine in view.engines.items():
+        console.print(engine_table(name, engine))
     note(f"job {view.job}; its walks: gaitswarm history {view.job}{place}")
 
 

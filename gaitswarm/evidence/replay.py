@@ -6,13 +6,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaitswarm.views.verification import DifferenceView
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.runtime import open_evaluator
 from sim.identification.recorded_walk import Recordings
+from sim.mujoco.engines import ENGINE
 from sim.outcome import Outcome, Status
 from sim.provenance import provenance_of
 
@@ -34,6 +37,22 @@ def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
             " times as long"
         )
     return None
+
+
+def has_same_bits_anywhere(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.bool_]:
+    """Say which evaluations have the same bits on any machine.
+
+    Args:
+        spec: Of the job.
+        columns: Its evaluations.
+
+    Returns:
+        (r,): all but those of a certificate's other engines, which compute with libraries that suit
+        the processor.
+    """
+    if not isinstance(spec, CertificateSpec) or not spec.engines:
+        return np.ones(len(columns), dtype=np.bool_)
+    return np.asarray(columns.designs[:, spec.design_space().names.index(ENGINE)] == 0.0)
 
 
 def simulated_differences(

@@ -24,7 +24,7 @@ from gaitswarm.evidence.archive import (
 )
 from gaitswarm.evidence.contents import BEST, best_of, row_of
 from gaitswarm.evidence.reading import Evidence, by_iteration, read_evidence
-from gaitswarm.evidence.replay import simulated_differences, why_no_replay
+from gaitswarm.evidence.replay import has_same_bits_anywhere, simulated_differences, why_no_replay
 from gaitswarm.views import BestView
 from gaitswarm.views.verification import CheckView, DifferenceView, VerificationView
 from services.optimizer.analysis.search_path import retraced
@@ -270,19 +270,21 @@ def _replay(evidence: Evidence, found: _Found, replay: int, seed: int) -> Answer
     refused = why_no_replay(spec)
     if refused is not None:
         return refused
-    drawn = np.random.default_rng(seed).permutation(len(columns))[:replay]
+    repeatable = has_same_bits_anywhere(spec, columns)
+    drawn = np.random.default_rng(seed).permutation(np.flatnonzero(repeatable))[:replay]
     row, judged = _best_row(evidence)
     best = drawn[:0]
     if row is not None:
         where = (int(judged.iteration[row]), int(judged.particle[row]))
-        best = np.array([row_of(columns, *where)])
+        at = np.array([row_of(columns, *where)])
+        best = at[repeatable[at]]
     rows = np.unique(np.concatenate([drawn, best]))
     tables = [(spec, columns.rows(rows))]
-    if evidence.reevaluated is not None and row is not None:
+    if evidence.reevaluated is not None and len(best):
         tables.append((spec.in_double(), evidence.reevaluated.rows(np.array([row]))))
     found.differences = simulated_differences(tables, evidence.recordings)
     found.replayed = len(rows)
-    among = ", the best among them," if row is not None else ""
+    among = ", the best among them," if len(best) else ""
     what = f"{len(rows)} evaluations{among} in {len(spec.case_names)} cases"
     if not found.differences:
         return True, f"{what}: every bit is the same"

@@ -16,8 +16,14 @@ from services.optimizer.analysis.robustness.certificate import (
     Spread,
     WorldOutcome,
 )
+from services.optimizer.analysis.robustness.engines import (
+    Compared,
+    ComparedCase,
+    ComparedEngine,
+)
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.preference import Preference
+from sim.mujoco.engines import ENGINES
 from sim.robot import RobotSource
 
 
@@ -192,6 +198,92 @@ class InfluenceView(View):
         return cls(name=found.name, correlation=found.correlation, low=found.low, high=found.high)
 
 
+class ComparedView(View):
+    """One quantity in the nominal world, by our engine and by another one."""
+
+    ours: float | None = Field(
+        description="By our engine; null if the walk failed there.", examples=[7.805]
+    )
+    theirs: float | None = Field(
+        description="By the other engine; null if the walk failed there.", examples=[7.803]
+    )
+    difference: float | None = Field(
+        description="By which the other engine's is greater, as a share of ours [1]; null if"
+        " either is, or if ours is 0.",
+        examples=[-0.0003],
+    )
+
+    @classmethod
+    def from_compared(cls, found: Compared) -> ComparedView:
+        """Make a view of a comparison.
+
+        Args:
+            found: of one quantity.
+        """
+        return cls(
+            ours=finite(found.ours),
+            theirs=finite(found.theirs),
+            difference=finite(found.difference),
+        )
+
+
+class ComparedScenarioView(View):
+    """One scenario in the nominal world, by our engine and by another one."""
+
+    ours: StatusName = Field(description="How the walk ended by our engine.", examples=["ok"])
+    theirs: StatusName = Field(
+        description="How the walk ended by the other engine.", examples=["ok"]
+    )
+    utility: ComparedView = Field(description="By the job's preference (eq. 3.8, 4.1) [1].")
+    objectives: dict[str, ComparedView] = Field(
+        description="By name, in the units of the job's `objectives`; height_loss by its size."
+    )
+
+    @classmethod
+    def from_case(cls, case: ComparedCase, names: list[str]) -> ComparedScenarioView:
+        """Make a view of a scenario.
+
+        Args:
+            case: of an engine.
+            names: of its objectives.
+        """
+        return cls(
+            ours=case.ours.label,
+            theirs=case.theirs.label,
+            utility=ComparedView.from_compared(case.utility),
+            objectives={
+                name: ComparedView.from_compared(found)
+                for name, found in zip(names, case.objectives, strict=True)
+            },
+        )
+
+
+class ComparedEngineView(View):
+    """What another engine makes of the design in the nominal world."""
+
+    description: str = Field(description="What is this engine's own.", examples=[ENGINES["mujoco"]])
+    fitness: ComparedView = Field(description="Over all scenarios (eq. 4.2) [1].")
+    scenarios: dict[str, ComparedScenarioView] = Field(
+        description="By name of the scenario, in the job's order."
+    )
+
+    @classmethod
+    def from_engine(cls, engine: ComparedEngine, names: list[str]) -> ComparedEngineView:
+        """Make a view of an engine.
+
+        Args:
+            engine: of the certificate.
+            names: of the objectives.
+        """
+        return cls(
+            description=ENGINES[engine.name],
+            fitness=ComparedView.from_compared(engine.fitness),
+            scenarios={
+                case.name: ComparedScenarioView.from_case(case, names) for case in engine.cases
+            },
+        )
+
+
 class CertificateView(View):
     """What a design came to in all worlds; nothing here is a guarantee for other worlds."""
 
@@ -224,6 +316,11 @@ class CertificateView(View):
     )
     influences: list[InfluenceView] = Field(
         description="Which perturbations go with the outcome, the strongest first."
+    )
+    engines: dict[str, ComparedEngineView] = Field(
+        default_factory=dict,
+        description="What other engines make of the nominal world, by name; those of the job's"
+        " `engines`.",
     )
 
     @classmethod
@@ -259,4 +356,8 @@ class CertificateView(View):
             },
             worst=[WorldView.from_world(world, job_id) for world in found.worst],
             influences=[InfluenceView.from_influence(i) for i in found.influences],
+            engines={
+                engine.name: ComparedEngineView.from_engine(engine, names)
+                for engine in found.engines
+            },
         )

@@ -80,7 +80,8 @@ class Task:
         """
         begun = time.perf_counter()
         for robots, precision in {(case.robots, case.precision) for case in self.cases}:
-            here = provenance_of(*robots, precision=precision)
+            libraries = tuple(self.provenance.libraries)
+            here = provenance_of(*robots, precision=precision, libraries=libraries)
             if here != self.provenance:
                 return Answer(here, None, platform.node())
         kernel_time = KernelTime()

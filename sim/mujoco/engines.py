@@ -15,6 +15,9 @@ EngineName = Literal["mujoco", "mujoco-contacts"]
 OWN: Final = "gaitswarm"
 """The engine of all other walks: the compiled kernel, or its interpreter."""
 
+ENGINE: Final = "engine"
+"""Name of the column of worlds that says which engine computes them."""
+
 ENGINES: Final[Mapping[EngineName, str]] = MappingProxyType(
     {
         "mujoco": "MuJoCo's rigid bodies and integrator, under our laws of contact",
@@ -40,7 +43,7 @@ def engine_variable(engines: Sequence[EngineName] = tuple(ENGINES)) -> Variable:
         A categorical variable; ours is its first choice and its default.
     """
     return Variable(
-        name="engine",
+        name=ENGINE,
         kind="categorical",
         choices=(OWN, *engines),
         default=0.0,

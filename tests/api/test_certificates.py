@@ -49,6 +49,22 @@ def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: SqlStore) ->
     assert (longer["spec"]["worlds"], longer["evaluations_planned"]) == (15, 16)
 
 
+@pytest.mark.slow
+def test_other_engines_are_part_of_the_summary(client: httpx2.Client, store: SqlStore) -> None:
+    path = finished(client, store, scenarios=[SHORT_WALK], worlds=3, engines=["mujoco"])
+    job = client.get(path).json()
+    assert (job["evaluations"], job["spec"]["engines"]) == (5, ["mujoco"])
+    found = client.get(f"{path}/certificate").json()
+    items = client.get(f"{path}/iterations/0/evaluations").json()["items"]
+    assert [item["design"]["engine"] for item in items[:3]] == ["gaitswarm", "mujoco", "gaitswarm"]
+    engine = found["engines"]["mujoco"]
+    assert engine["fitness"]["theirs"] == items[1]["fitness"]
+    assert engine["fitness"]["ours"] == items[0]["fitness"] == found["fitness"]["nominal"]
+    energy = engine["scenarios"]["short"]["objectives"]["energy"]
+    assert abs(energy["difference"]) < 0.02
+    assert found["worlds"] == 3 and "engine" not in found["worst"][0]["values"]
+
+
 def test_a_world_is_looked_at_by_its_values(client: httpx2.Client, store: SqlStore) -> None:
     path = finished(client, store, scenarios=[SHORT_WALK])
     (worst,) = client.get(f"{path}/certificate", params={"most": 1}).json()["worst"]

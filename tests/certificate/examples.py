@@ -46,13 +46,15 @@ def columns(
     failed = ended != Status.OK
     objectives = np.repeat(values[:, :, np.newaxis], N_OBJECTIVES, axis=2)
     objectives[failed] = np.nan
-    space = spec.design_space()
-    positions = spec.create_search().ask()[:1]
-    drawn = np.array([list(spec.world(k).values()) for k in range(n - 1)])
+    space, search = spec.design_space(), spec.create_search()
+    positions: list[Floats] = []
+    while search.evaluations < n:
+        positions.append(search.ask(n - search.evaluations))
+        search.tell(np.ones(len(positions[-1])))
     return EvaluationColumns(
         iteration=np.arange(n) // spec.optimizer.particles,
         particle=np.arange(n) % spec.optimizer.particles,
-        designs=np.concatenate([space.designs(positions), drawn.reshape(n - 1, len(space.names))]),
+        designs=space.designs(np.concatenate(positions)),
         objectives=objectives,
         statuses=ended.astype(np.uint8),
         fitness=spec.judge(objectives, failed).fitness,

@@ -60,6 +60,30 @@ def test_the_summary_says_how_often_it_fails_how_bad_it_gets_and_where(files: Pa
         assert words in shown.out
 
 
+@pytest.mark.slow
+def test_another_engine_is_compared_by_scenario_and_objective(files: Path) -> None:
+    asked = ("--worlds", 5, "--engine", "mujoco", "--engine", "mujoco-contacts")
+    result = certify(files, *asked, "--json")
+    assert result.code == 0, result.err
+    assert list(result.json["engines"]) == ["mujoco", "mujoco-contacts"]
+    for engine, most in (("mujoco", 0.04), ("mujoco-contacts", 0.25)):
+        scenarios = result.json["engines"][engine]["scenarios"]
+        assert list(scenarios) == ["short", "uphill"]
+        for name, found in scenarios.items():
+            assert (found["ours"], found["theirs"]) == ("ok", "ok")
+            nominal = result.json["scenarios"][name]["utility"]["nominal"]
+            assert found["utility"]["ours"] == nominal
+            torque = found["objectives"]["torque"]
+            expected = torque["theirs"] / torque["ours"] - 1.0
+            assert torque["difference"] == pytest.approx(expected, rel=1e-9)
+            for quantity in list(found["objectives"].values())[:5]:
+                assert 0.0 < abs(quantity["difference"]) < most
+    shown = certify(files, *asked)
+    assert "iteration" not in shown.err
+    for words in ("The nominal world in mujoco-contacts", "difference", "ang.acc."):
+        assert words in shown.out
+
+
 def test_the_same_command_walks_nothing_again_and_more_worlds_only_the_rest(files: Path) -> None:
     first = certify(files, "--worlds", 20, "--json").json
     again = certify(files, "--worlds", 20, "--json")
@@ -166,8 +190,10 @@ def test_bad_input_names_the_option(
 
 @pytest.mark.slow
 def test_a_certificate_that_is_killed_and_goes_on_has_the_same_numbers(files: Path) -> None:
-    whole = certify(files, "--worlds", 240, "--json").json
-    killed = [*arguments(files)[:-1], str(files / "killed.db"), "--worlds", "240", "--json"]
+    asked = ("--worlds", "240", "--engine", "mujoco", "--json")
+    whole = certify(files, *asked).json
+    assert whole["engines"]["mujoco"]["scenarios"]["short"]["theirs"] == "ok"
+    killed = [*arguments(files)[:-1], str(files / "killed.db"), *asked]
     for number in (signal.SIGKILL, signal.SIGINT):
         process = start_python(*COMMAND_LINE, *killed, start_new_session=True)
         for line in output(process.stderr):

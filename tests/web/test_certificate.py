@@ -25,6 +25,7 @@ CERTIFICATE: Final[dict[str, Any]] = {
     "scenarios": [SHORT_WALK, UPHILL_WALK],
     "variables": ["friction_factor", "efficiency_factor"],
     "worlds": 12,
+    "engines": ["mujoco"],
     "optimizer": {"name": "random", "particles": 5},
 }
 
@@ -46,7 +47,7 @@ def test_it_has_the_parts_that_make_sense_for_one_design(
     expect(tabs.get_by_role("link")).to_have_text(
         ["Overview", "Certificate", "Variables", "Iterations", "Spec"]
     )
-    expect(page.get_by_role("progressbar", name="13 of 13 designs")).to_be_visible()
+    expect(page.get_by_role("progressbar", name="14 of 14 designs")).to_be_visible()
 
 
 def test_tables_show_what_the_design_comes_to_and_worlds_are_a_click_away(
@@ -71,6 +72,29 @@ def test_tables_show_what_the_design_comes_to_and_worlds_are_a_click_away(
     objective = page.get_by_role("table", name="Objectives").or_(page.locator("table")).first
     expect(objective).to_be_visible()
     assert f"particle={worst['particle']}" in page.url
+
+
+def test_what_another_engine_makes_of_it_is_a_table_of_its_own(
+    server: ServerProcess, certificate: str, visit: Callable[..., Visit]
+) -> None:
+    found = server.client.get(f"/v1/jobs/{certificate}/certificate").json()["engines"]["mujoco"]
+    page = visit(server.url).go(f"/jobs/{certificate}/certificate")
+    expect(page.get_by_role("heading", name="The nominal world in mujoco")).to_be_visible()
+    expect(page.locator("[data-engine=mujoco]")).to_contain_text("walks in 2 of 2 scenarios")
+    table = page.get_by_role("table", name="Scenarios and objectives in mujoco")
+    first = table.locator("tbody tr").first
+    torque = found["scenarios"]["short"]["objectives"]["torque"]
+    shown = first.locator("td.numeric").all_inner_texts()
+    assert [float(text) for text in shown[:2]] == pytest.approx(
+        [torque["ours"], torque["theirs"]], rel=1e-3
+    )
+    expect(first).to_contain_text("%")
+    # By the size of the difference, the greatest first.
+    table.get_by_role("button", name="Difference").click()
+    expect(table.locator("tbody tr").first).to_be_visible()
+
+    page = visit(server.url).go(f"/walk?job={certificate}&iteration=0&particle=1&scenario=short")
+    expect(page.get_by_text("this walk was computed by mujoco")).to_be_visible()
 
 
 def test_a_certificate_that_waits_says_so(

@@ -69,6 +69,16 @@ def certify(
         str | None, typer.Option(help="A, B, C or chapter-3: how objectives are weighed.")
     ] = None,
     precision: Precision = None,
+    engines: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--engine",
+            metavar="mujoco|mujoco-contacts",
+            help="Let the design walk in the nominal world in this engine, too, and tell the"
+            " differences: in MuJoCo under our laws of contact, or with its own contacts. May be"
+            " repeated; needs pip install 'gaitswarm[mujoco]'.",
+        ),
+    ] = None,
     name: JobName = None,
     most: Annotated[int, typer.Option(min=0, max=1000, help="Worst worlds to name.")] = 5,
     replay: Annotated[
@@ -121,6 +131,7 @@ def certify(
         "robot": robot,
         "preference": preference,
         "precision": precision,
+        "engines": engines,
         "name": name,
     }
     spec = certificate_spec(design, workers.db, given)

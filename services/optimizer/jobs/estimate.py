@@ -210,7 +210,8 @@ def _kind_of_walk(spec: Spec) -> str:
     if isinstance(spec, TournamentSpec):
         return spec.model_dump_json(include={"method", "problems", "evaluations"})
     if isinstance(spec, CertificateSpec):
-        return f"world {spec.model_dump_json(include={'controller', 'robot', 'precision'})}"
+        fields = {"controller", "robot", "precision", "engines"}
+        return f"world {spec.model_dump_json(include=fields)}"
     controller = spec.controller if isinstance(spec, JobSpec) else _fitted_walks(spec)
     return f"{controller} {spec.model_dump_json(include={'robot', 'precision'})}"
 

@@ -11,7 +11,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from services.optimizer.jobs.spec import Spec
-from sim.provenance import Provenance, provenance_of, source_digest, version_changes
+from sim.provenance import LIBRARIES, Provenance, provenance_of, source_digest, version_changes
 
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
@@ -97,7 +97,11 @@ def job_provenance(spec: Spec) -> JobProvenance:
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
         search_libraries=spec.search_libraries,
-        simulation=provenance_of(*spec.described, precision=spec.precision),
+        simulation=provenance_of(
+            *spec.described,
+            precision=spec.precision,
+            libraries=(*LIBRARIES, *spec.further_libraries),
+        ),
     )
 
 

@@ -46,7 +46,6 @@ from sim.variables import VariableChoice, VariableName, VariableValue
 
 Floats = NDArray[np.float64]
 
-
 DECISIVE: Final = 0.05
 """Distance from the best fitness, as a share of it, within which designs count as good as it."""
 
@@ -314,6 +313,11 @@ class Spec(BaseModel):
         return METHODS[self.search.name].versions()
 
     @property
+    def further_libraries(self) -> tuple[str, ...]:
+        """Distributions that its walks compute with beside those of all walks."""
+        return ()
+
+    @property
     def described(self) -> tuple[RobotSource, ...]:
         """The robots that may walk, as they are described; `robot` alone for most kinds."""
         return (self.robot,)
@@ -365,8 +369,7 @@ class Spec(BaseModel):
     def resolved(self) -> Self:
         """The same job with presets written out, so that it stays what it was when they change.
 
-        Scenarios, preference, variables and an `auto` optimizer are; robot and controller stay as
-        they were named.
+        Scenarios, preference, variables and an `auto` optimizer are; robot and controller are not.
         """
 
 

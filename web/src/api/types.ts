@@ -48,6 +48,8 @@ export type AnySpec =
   | CertificateSpec
 export type Certificate = Schemas['CertificateView']
 export type CertifiedScenario = Schemas['CertifiedScenarioView']
+export type ComparedEngine = Schemas['ComparedEngineView']
+export type Compared = Schemas['ComparedView']
 export type Spread = Schemas['SpreadView']
 export type Proportion = Schemas['ProportionView']
 export type World = Schemas['WorldView']

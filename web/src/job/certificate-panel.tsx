@@ -16,6 +16,7 @@ import { type Column, Table } from '../components/table'
 import { change, formatCount, formatNumber, percent } from '../format/number'
 import { inWords } from '../format/words'
 import { withQuery } from '../router/routes'
+import { OtherEngine } from './other-engine'
 
 /** How often the certificate of a job that runs is asked for again [ms]. */
 const RENEW_MS = 15_000
@@ -63,6 +64,9 @@ function Certified({ job }: { job: Job }) {
       {found.data && (
         <>
           <Scenarios found={found.data} />
+          {Object.entries(found.data.engines ?? {}).map(([name, engine]) => (
+            <OtherEngine key={name} name={name} engine={engine} objectives={job.objectives} />
+          ))}
           <Worlds job={job} worlds={found.data.worst} />
           <Influences influences={found.data.influences} />
         </>

@@ -67,12 +67,23 @@ async function ofJob(
         : `${name}, design ${evaluation.particle} of iteration ${evaluation.iteration}`,
     // The evaluations of a certificate are worlds, in which its one design walks.
     ...(spec.kind === 'certificate'
-      ? { design: spec.design, world: evaluation.design as Readonly<Record<string, number>> }
+      ? { design: spec.design, world: worldOf(evaluation) }
       : { design: evaluation.design }),
     robot: spec.robot,
     controller: named(controllers, spec.controller),
     scenarios: spec.scenarios.filter((entry) => typeof entry !== 'string'),
   }
+}
+
+/** Values of a certificate's perturbations, where our own engine has walked. */
+function worldOf(evaluation: Evaluation): Readonly<Record<string, number>> {
+  const { engine = 'gaitswarm', ...world } = evaluation.design
+  if (engine === 'gaitswarm') return world as Readonly<Record<string, number>>
+  throw new ApiProblem(
+    422,
+    `this walk was computed by ${engine}, which keeps no record of it; the design before it, the` +
+      ' first of the job, is the same walk by gaitswarm',
+  )
 }
 
 async function evaluationOf(

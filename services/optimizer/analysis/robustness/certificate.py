@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.analysis.ranks import spearman
+from services.optimizer.analysis.robustness.engines import ComparedEngine, compared_engines
 from services.optimizer.errors import Conflict
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
@@ -150,6 +151,7 @@ class Certificate:
         failed: How often a walk failed in one scenario at least.
         worst: The worst worlds, first those in which most scenarios failed.
         influences: Of the perturbations that are drawn, the strongest first.
+        engines: What other engines make of the nominal world.
     """
 
     worlds: int
@@ -159,6 +161,7 @@ class Certificate:
     failed: Proportion
     worst: tuple[WorldOutcome, ...]
     influences: tuple[Influence, ...]
+    engines: tuple[ComparedEngine, ...] = ()
 
 
 def certificate(
@@ -168,7 +171,8 @@ def certificate(
 
     Args:
         spec: Of the job.
-        columns: Its evaluations, in order: the nominal world, then those that were drawn.
+        columns: Its evaluations, in order: the nominal world, by our engine and then by the others
+            that the spec names, then the worlds that were drawn.
         worlds: Drawn worlds to take, the first ones; None for all that have walked.
         most: Worst worlds to name.
 
@@ -178,7 +182,10 @@ def certificate(
     Raises:
         Conflict: No drawn world has walked yet.
     """
-    taken = columns.rows(slice(None if worlds is None else worlds + 1))
+    first = spec.nominal_rows
+    nominal = columns.rows(slice(first))
+    walked = columns.rows(slice(None if worlds is None else first + worlds))
+    taken = walked.rows(np.delete(np.arange(len(walked)), slice(1, first)))
     if len(taken) < 2:
         raise Conflict("no drawn world has walked yet; ask again after the first iteration")
     values = taken.objectives.copy()
@@ -198,6 +205,7 @@ def certificate(
         failed=proportion(np.asarray(drawn.failed.any(axis=1))),
         worst=_worst(spec, taken, judged.log_utilities, judged.fitness, most),
         influences=_influences(spec, drawn.designs, judged.fitness[1:]),
+        engines=compared_engines(spec, nominal),
     )
 
 
@@ -284,6 +292,7 @@ def _worst(
     # The last key sorts first; the earlier of equals is first.
     order = np.lexsort((-fitness[1:], -failed.sum(axis=1)))[:most]
     space, names = spec.design_space(), spec.case_names
+    drawn = set(spec.world_space().names)
     nominal = np.where(np.isfinite(log_utilities[0]), log_utilities[0], 0.0)
     found = []
     for index in order.tolist():
@@ -301,7 +310,11 @@ def _worst(
                 scenario=failures[0][0]
                 if failures
                 else names[int(np.argmax(log_utilities[row] - nominal))],
-                values=space.shown(taken.designs[row].tolist()),
+                values={
+                    name: value
+                    for name, value in space.shown(taken.designs[row].tolist()).items()
+                    if name in drawn
+                },
             )
         )
     return tuple(found)
@@ -310,7 +323,7 @@ def _worst(
 def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> tuple[Influence, ...]:
     """worlds: (n, v) as they were drawn."""
     found = []
-    for j, variable in enumerate(spec.design_space().variables):
+    for j, variable in enumerate(spec.world_space().variables):
         if variable.name == _SEED:
             continue
         correlation = spearman(worlds[:, j], fitness)

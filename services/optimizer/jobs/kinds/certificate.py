@@ -12,6 +12,11 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_vali
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.kinds.certified_worlds import (
+    with_engine,
+    world_positions,
+    world_space,
+)
 from services.optimizer.jobs.kinds.walks import WalksSpec
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.jobs.preference import PreferenceChoice
@@ -23,11 +28,11 @@ from sim.catalogue import check_design, design_numbers, design_shown
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import Recordings
+from sim.mujoco.engines import ENGINES, LIBRARY, EngineName, check_installed
 from sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice
 from sim.simulate import check_reach
 from sim.variables import VariableName, VariableValue
-from sim.worlds import PERTURBATIONS, WorldWalk, check_worlds, sample_worlds
-from sim.worlds.perturbations import NOMINAL
+from sim.worlds import EngineWalk, WorldWalk, check_worlds, sample_worlds
 
 Floats = NDArray[np.float64]
 
@@ -62,8 +67,8 @@ def certificate_scenarios(tuned: Sequence[Scenario] = SCENARIOS) -> tuple[Scenar
 class CertificateSpec(WalksSpec):
     """A certificate: one design, in worlds that differ in all that a model may get wrong.
 
-    A design of the job is a world: a value of every perturbation. The first is the nominal world,
-    the others are drawn, each by its number alone.
+    A design of the job is a world: a value of every perturbation. The first is the nominal world;
+    it is walked again in each of the `engines`. The others are drawn, each by its number alone.
     """
 
     model_config = ConfigDict(
@@ -81,7 +86,7 @@ class CertificateSpec(WalksSpec):
         },
     )
 
-    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference", "worlds"}
+    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference", "worlds", "engines"}
 
     searches = False
 
@@ -114,6 +119,15 @@ class CertificateSpec(WalksSpec):
         description="How many worlds are drawn; the nominal one, which differs in nothing, is"
         " walked before them. `iterations` follow from it.",
     )
+    engines: tuple[EngineName, ...] = Field(
+        default=(),
+        max_length=len(ENGINES),
+        description="Other engines that compute the design's walks in the nominal world, too, so"
+        " that the certificate shows what depends on ours: `mujoco` (its rigid bodies and"
+        " integrator, our laws of contact) and `mujoco-contacts` (its own contacts, too). A walk"
+        " takes some hundred times as long; they need the extra `mujoco`.",
+        examples=[["mujoco"]],
+    )
     optimizer: OptimizerChoice = Field(
         default=RandomSearchSettings(particles=BATCH),
         description="What draws the worlds: `random`, whose `particles` are an iteration's.",
@@ -136,13 +150,15 @@ class CertificateSpec(WalksSpec):
             return document
         if iterations is not None and iterations < 1:
             return document
+        engines = document.get("engines", ())
+        nominal = 1 + (len(engines) if isinstance(engines, list | tuple) else 0)
         if worlds is None and iterations is not None:
-            worlds, iterations = max(1, iterations * batch - 1), None
+            worlds, iterations = max(1, iterations * batch - nominal), None
         elif worlds is None:
             worlds = cls.model_fields["worlds"].default
         if worlds < 1:
             return document
-        needed = math.ceil((worlds + 1) / batch)
+        needed = math.ceil((worlds + nominal) / batch)
         if iterations not in (None, needed):
             raise ValueError(
                 f"iterations: follow from worlds; {worlds} in batches of {batch} are {needed}"
@@ -154,6 +170,9 @@ class CertificateSpec(WalksSpec):
     def _can_be_run(self) -> Self:
         if self.optimizer.name != "random":
             raise ValueError("optimizer: worlds are drawn by random")
+        for name in self.engines:
+            if self.engines.count(name) > 1:
+                raise ValueError(f"engines: {name!r} is named twice")
         check_design(self.controller, self.design)
         self.design_space()
         return self
@@ -165,8 +184,13 @@ class CertificateSpec(WalksSpec):
 
     @property
     def budget(self) -> int:
-        """The nominal world and those that are drawn."""
-        return self.worlds + 1
+        """The nominal world, in every engine, and those that are drawn."""
+        return self.nominal_rows + self.worlds
+
+    @property
+    def nominal_rows(self) -> int:
+        """How many evaluations are of the nominal world: by our engine first, then by `engines`."""
+        return 1 + len(self.engines)
 
     def with_budget(self, iterations: int) -> Self:
         """The same job with as many worlds as so many iterations hold.
@@ -177,28 +201,26 @@ class CertificateSpec(WalksSpec):
         Returns:
             The spec of a job that was extended to it.
         """
-        worlds = iterations * self.optimizer.particles - 1
+        worlds = iterations * self.optimizer.particles - self.nominal_rows
         return self.model_copy(update={"iterations": iterations, "worlds": worlds})
 
     def design_space(self) -> DesignSpace:
+        """The perturbations, and which of the `engines` computes the walk, if there are any."""
+        return with_engine(self.world_space(), self.engines)
+
+    def world_space(self) -> DesignSpace:
         """The perturbations; what is neither drawn nor fixed is as the robot has it."""
-        chosen = self.variables
-        if chosen is None:
-            chosen = tuple(v for v in PERTURBATIONS if v.name not in self.fixed)
-        return DesignSpace.build(
-            required=(), optional=PERTURBATIONS, chosen=chosen, fixed=self.fixed
-        )
+        return world_space(self.variables, self.fixed)
 
     def create_search(self) -> Optimizer:
         """What asks for the worlds: the nominal one, then those of `sample_worlds`."""
-        variables = self.design_space().variables
-        nominal = [[min(max(NOMINAL[v.name], v.low), v.high) for v in variables]]
-
-        def positions(start: int, stop: int) -> Floats:
-            drawn = sample_worlds(stop - 1, self.seed, variables)
-            return np.concatenate([np.array(nominal), drawn])[start:]
-
+        positions = world_positions(self.world_space(), self.engines, self.seed)
         return Enumeration(self.optimizer.name, self.optimizer.particles, positions)
+
+    @property
+    def further_libraries(self) -> tuple[str, ...]:
+        """MuJoCo, if it is among the engines."""
+        return (LIBRARY,) if self.engines else ()
 
     def world(self, index: int) -> dict[str, float]:
         """One of the worlds that are drawn.
@@ -209,7 +231,7 @@ class CertificateSpec(WalksSpec):
         Returns:
             Value of every perturbation that is drawn or fixed, by name.
         """
-        space = self.design_space()
+        space = self.world_space()
         drawn = sample_worlds(index + 1, self.seed, space.variables)[index:]
         (values,) = space.simulated(space.designs(drawn)).tolist()
         return dict(zip(space.names, values, strict=True))
@@ -222,6 +244,7 @@ class CertificateSpec(WalksSpec):
         """
         self.check_optimizer()
         self.check_precision()
+        self._check_engines()
         try:
             CONTROLLERS[self.controller].compile(self.numbers)
         except SimulationInputError as error:
@@ -232,12 +255,19 @@ class CertificateSpec(WalksSpec):
                 check_reach(scenario, names, values, robot=self.robot)
             except SimulationInputError as error:
                 raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
-        space = self.design_space()
+        space = self.world_space()
         corners = np.stack([space.low, space.high])
         try:
             check_worlds(space.names, space.simulated(space.designs(corners)))
         except SimulationInputError as error:
             raise space.refusal(error) from error
+
+    def _check_engines(self) -> None:
+        if self.engines:
+            try:
+                check_installed()
+            except SimulationInputError as error:
+                raise InvalidRequest(str(error), field="engines") from error
 
     @property
     def held_out(self) -> tuple[str, ...]:
@@ -254,15 +284,18 @@ class CertificateSpec(WalksSpec):
         Returns:
             The walks, in the order of `case_names`.
         """
-        names, design = self.design_space().names, tuple(self.numbers.items())
-        return tuple(
-            WorldWalk(self.robot, self.controller, design, scenario, names, self.precision)
+        space, design = self.world_space(), tuple(self.numbers.items())
+        walks = tuple(
+            WorldWalk(self.robot, self.controller, design, scenario, space.names, self.precision)
             for scenario in self.resolved_scenarios()
         )
+        if not self.engines:
+            return walks
+        return tuple(EngineWalk(walk, len(space.variables)) for walk in walks)
 
     def resolved(self) -> Self:
         """The same job with scenarios, preference, design and perturbations written out."""
-        space = self.design_space()
+        space = self.world_space()
         return self.model_copy(
             update={
                 "scenarios": self.resolved_scenarios(),

@@ -1,0 +1,87 @@
+"""The worlds of a certificate: their space and their order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.jobs.design_space import DesignSpace
+from sim.mujoco.engines import EngineName, engine_variable
+from sim.variables import Variable
+from sim.worlds import PERTURBATIONS, sample_worlds
+from sim.worlds.perturbations import NOMINAL
+
+Floats = NDArray[np.float64]
+
+
+def world_space(
+    variables: Sequence[str | Variable] | None, fixed: Mapping[str, float | str]
+) -> DesignSpace:
+    """The perturbations that are drawn or held.
+
+    Args:
+        variables: Those that are drawn; None for all that are not held.
+        fixed: Values of those that are held, by name.
+
+    Returns:
+        The space; what is neither drawn nor held is as the robot has it.
+
+    Raises:
+        ValueError: The choice makes no sense; names the perturbation and the way out.
+    """
+    if variables is None:
+        variables = tuple(v for v in PERTURBATIONS if v.name not in fixed)
+    return DesignSpace.build(required=(), optional=PERTURBATIONS, chosen=variables, fixed=fixed)
+
+
+def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpace:
+    """The same worlds, each with the engine that computes its walks.
+
+    Args:
+        space: Of the worlds.
+        engines: Beside ours; the space stays as it is without any.
+
+    Returns:
+        The space with the engine as the last of its variables.
+    """
+    if not engines:
+        return space
+    drawn = len(space.variables)
+    return replace(
+        space,
+        variables=(*space.variables, engine_variable(engines)),
+        catalogue=(*space.catalogue[:drawn], engine_variable(), *space.catalogue[drawn:]),
+    )
+
+
+def world_positions(
+    space: DesignSpace, engines: Sequence[EngineName], seed: int
+) -> Callable[[int, int], Floats]:
+    """The order of a certificate's walks.
+
+    Args:
+        space: Of the worlds, without the engine.
+        engines: Beside ours.
+        seed: Of the worlds that are drawn.
+
+    Returns:
+        Positions start <= k < stop of `with_engine`: first the nominal world by our engine, then by
+        each of the others, then the worlds that are drawn, by ours.
+    """
+    first = [[min(max(NOMINAL[v.name], v.low), v.high) for v in space.variables]]
+    nominal = np.array(first * (1 + len(engines)))
+    box = with_engine(space, engines).box
+
+    def positions(start: int, stop: int) -> Floats:
+        drawn = sample_worlds(max(0, stop - len(nominal)), seed, space.variables)
+        worlds = np.concatenate([nominal, drawn])[:stop]
+        if engines:
+            engine = np.zeros((len(worlds), 1))
+            engine[: len(nominal), 0] = np.arange(len(nominal))[: len(worlds)]
+            worlds = box.positions(np.hstack([worlds, engine]))
+        return worlds[start:]
+
+    return positions

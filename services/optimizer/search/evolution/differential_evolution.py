@@ -9,6 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, FiniteFloat, NonNegativeInt, model_validator
 
+from services.optimizer.search.evolution.variation import (
+    crossed,
+    indices,
+    latin_hypercube,
+    with_choices,
+    without_duplicates,
+)
 from services.optimizer.search.generational import (
     Generational,
     GenerationState,
@@ -22,7 +29,6 @@ from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _EVOLVE: Final = 4
 """Purpose of random streams: never renumbered, or stored jobs would change their future."""
@@ -32,9 +38,6 @@ _SPREAD: Final = 0.1
 
 _DRAWS: Final = 6
 """Scales that are drawn, of which the first positive one is taken."""
-
-_ANY_CHOICE: Final = 0.1
-"""Chance that a changed categorical variable takes any of its choices, not another member's."""
 
 _CONVERGED: Final = 1e-9
 """Extent of a population, as a share of each variable's range, below which it starts anew."""
@@ -161,10 +164,10 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         """
         random = self._random()
         if not len(self._members):
-            return self._scattered(random)
+            return latin_hypercube(self.space, self.settings.population, random)
         scale, crossover = self._parameters(random)
-        mutants = self._mutants(random, scale)
-        return self._without_duplicates(random, self._crossed(random, mutants, crossover))
+        trials = crossed(self._members, self._mutants(random, scale), crossover, random)
+        return without_duplicates(self.space, self._members, trials, random)
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
         """Replace each member by its trial, if that is no worse.
@@ -240,16 +243,10 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         """Numbers of this generation, from the first on."""
         return RandomNumbers(self.seed, _EVOLVE, iteration=self.generations)
 
-    def _scattered(self, random: RandomNumbers) -> Floats:
-        """A Latin hypercube."""
-        n, d = self.settings.population, self.space.dimension
-        cells = np.array([random.permutation(n) for _ in range(d)], dtype=np.float64).T
-        return self.space.evenly((cells + random.uniform(n, d)) / n)
-
     def _parameters(self, random: RandomNumbers) -> tuple[Floats, Floats]:
         """(n,) scale and (n,) crossover of each trial; the first numbers of a generation."""
         n = len(self._members)
-        chosen = _index(random.uniform(n), self.settings.memory)
+        chosen = indices(random.uniform(n), self.settings.memory)
         scales, crossovers = self._scales[chosen], self._crossovers[chosen]
         if self.settings.adaptation == "none":
             return scales, crossovers
@@ -266,10 +263,10 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         n, me = len(members), np.arange(len(members))
         order = np.argsort(self._fitness_of_members, kind="stable")
         best_count = min(n, max(2, round(self.settings.best_share * n)))
-        best = members[order[_index(random.uniform(n), best_count)]]
-        one = (me + 1 + _index(random.uniform(n), n - 1)) % n
+        best = members[order[indices(random.uniform(n), best_count)]]
+        one = (me + 1 + indices(random.uniform(n), n - 1)) % n
         pool = np.concatenate([members, self._archive])
-        other = _index(random.uniform(n), len(pool) - 2)
+        other = indices(random.uniform(n), len(pool) - 2)
         # Neither the member itself nor the first of the two.
         other += other >= np.minimum(me, one)
         other += other >= np.maximum(me, one)
@@ -278,30 +275,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         mutants = members + factor * (best - members) + factor * (first - second)
         mutants = np.where(mutants < space.low, 0.5 * (space.low + members), mutants)
         mutants = np.where(mutants > space.high, 0.5 * (space.high + members), mutants)
-        # Choices have no differences: take another member's, or now and then any.
-        lot, share = random.uniform(n, space.dimension), (1.0 - _ANY_CHOICE) / 3.0
-        givers = [lot < share, lot < 2.0 * share, lot < 3.0 * share]
-        anything = space.from_unit((lot - 3.0 * share) / _ANY_CHOICE)
-        choices = np.select(givers, [best, first, second], anything)
-        return np.where(space.categorical, choices, mutants)
-
-    def _crossed(self, random: RandomNumbers, mutants: Floats, crossover: Floats) -> Floats:
-        """Binomial crossover: of the mutant, at least one variable."""
-        n, d = mutants.shape
-        changed = random.uniform(n, d) < crossover[:, np.newaxis]
-        changed[np.arange(n), _index(random.uniform(n), d)] = True
-        return np.where(changed, mutants, self._members)
-
-    def _without_duplicates(self, random: RandomNumbers, trials: Floats) -> Floats:
-        """Draw one variable anew of a trial whose design is another's, too."""
-        n, d = trials.shape
-        variable, anything = _index(random.uniform(n), d), self.space.evenly(random.uniform(n, d))
-        seen = {design.tobytes() for design in self.space.designs(self._members)}
-        for i, design in enumerate(self.space.designs(trials)):
-            if design.tobytes() in seen:
-                trials[i, variable[i]] = anything[i, variable[i]]
-            seen.add(self.space.designs(trials[i : i + 1]).tobytes())
-        return trials
+        return with_choices(space, mutants, (best, first, second), random)
 
     def _select(self, trials: Floats, fitness: Floats) -> None:
         """Let trials that are no worse take their members' places."""
@@ -367,8 +341,3 @@ def lehmer_mean(values: Floats, weights: Floats) -> float:
     """
     total = math.fsum(weights * values)
     return math.fsum(weights * values * values) / total if total > 0.0 else 0.0
-
-
-def _index(uniform: Floats, count: int) -> Indices:
-    """Indices 0 to count - 1 of numbers in [0, 1)."""
-    return (uniform * count).astype(np.intp)

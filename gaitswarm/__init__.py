@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from services.optimizer.search.evolution.cma_es import CmaEsSettings
     from services.optimizer.search.evolution.differential_evolution import DeSettings
     from services.optimizer.search.evolution.genetic import GaSettings
+    from services.optimizer.search.evolution.hype import HypeSettings
     from services.optimizer.search.local.annealing import AnnealingSettings
     from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
     from services.optimizer.search.local.mads import MadsSettings
@@ -152,6 +153,7 @@ __all__ = [
     "GlobalUnirandiSettings",
     "GsaSettings",
     "HistoryIterationView",
+    "HypeSettings",
     "IdempotencyConflict",
     "IdentifiabilityView",
     "IdentificationSpec",
@@ -275,6 +277,7 @@ _MODULES: Final = {
     "services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
     "services.optimizer.search.evolution.differential_evolution": ("DeSettings",),
     "services.optimizer.search.evolution.genetic": ("GaSettings",),
+    "services.optimizer.search.evolution.hype": ("HypeSettings",),
     "services.optimizer.search.local.annealing": ("AnnealingSettings",),
     "services.optimizer.search.local.directed_tabu": ("DirectedTabuSettings",),
     "services.optimizer.search.local.mads": ("MadsSettings",),

@@ -82,3 +82,15 @@ def test_the_benchmark_of_known_walks_tells_what_the_cache_adds() -> None:
     seconds = json.loads(done.stdout)
     parts = seconds["keys"] + seconds["query"] + seconds["index"]
     assert seconds["added"] == pytest.approx(parts)
+
+
+@pytest.mark.slow
+def test_the_trade_offs_benchmark_judges_as_many_designs_by_every_method() -> None:
+    done = python("-m", "benchmarks.trade_offs", "--seeds", "1", "--evaluations", "50", "--json")
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)
+    assert [row["method"] for row in rows][:3] == ["hype", "cma-es", "random"]
+    for row in rows:
+        assert 0.0 < row["hypervolume_early"] == row["hypervolume"] < 1.0
+        # The published optimum A is worth 20.93.
+        assert 16.0 < row["A"] < 25.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -15,11 +15,13 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.search.registry import METHODS, OPTIMIZERS, missing_of
 from services.optimizer.tournament.functions import FUNCTIONS
 from services.optimizer.tournament.methods import (
+    is_multi_objective,
     libraries_of,
     method_names,
     named_settings,
     random_ranges,
     settings_models,
+    why_unknown,
 )
 from services.optimizer.tournament.race import default_checkpoints
 from services.optimizer.tournament.rivals import RIVALS
@@ -86,9 +88,15 @@ _ROBOT: Final[dict[str, dict[str, Any]]] = {
 PROBLEMS: Final = (*FUNCTIONS, *_ROBOT)
 """Names of all problems."""
 
+
+def _of_jobs(names: Iterable[str]) -> tuple[str, ...]:
+    """Methods that jobs may name and that can take part."""
+    return tuple(name for name in names if not is_multi_objective(name))
+
+
 PRESETS: Final[dict[PresetName, Preset]] = {
-    "thesis": Preset(tuple(FUNCTIONS), tuple(METHODS), 100, 2500, "random"),
-    "robot": Preset(tuple(_ROBOT), (*OPTIMIZERS, *RIVALS), 20, 625, "default"),
+    "thesis": Preset(tuple(FUNCTIONS), _of_jobs(METHODS), 100, 2500, "random"),
+    "robot": Preset(tuple(_ROBOT), (*_of_jobs(OPTIMIZERS), *RIVALS), 20, 625, "default"),
 }
 
 
@@ -130,6 +138,8 @@ def chosen_methods(
         chosen = [] if document else [m for m in preset.methods if _is_installed(m)]
     else:
         chosen = _names(names)
+    for name in filter(is_multi_objective, chosen):
+        raise InvalidRequest(why_unknown(name, ()), field="methods")
     _check(chosen, method_names(), "methods")
     own = dict(document or {})
     for label in own:

@@ -253,9 +253,9 @@ def by_iteration(evidence: Evidence, column: Floats) -> Sequence[Floats]:
 
     Args:
         evidence: Whose iterations count.
-        column: (r,) of every evaluation.
+        column: (r, ...) of every evaluation.
 
     Returns:
-        (n,) of each iteration.
+        (n, ...) of each iteration.
     """
     return np.split(column, np.cumsum([len(positions) for positions in evidence.asked])[:-1])

@@ -229,7 +229,8 @@ def _search(evidence: Evidence) -> Answer:
     method = METHODS[spec.search.name]
     if method.missing:
         return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
-    told = by_iteration(evidence, evidence.columns.fitness)
+    columns = evidence.columns
+    told = by_iteration(evidence, spec.told(columns.objectives, columns.failed, columns.fitness))
     try:
         retraced(spec, evidence.job.budgets, evidence.asked, told)
     except ValueError as error:

@@ -12,7 +12,8 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite
 from services.optimizer.jobs.iteration import Evaluation
-from services.optimizer.jobs.spec import Spec, exponential
+from services.optimizer.jobs.judgement import exponential
+from services.optimizer.jobs.spec import Spec
 from sim.kernel.walk import Precision
 from sim.outcome import OBJECTIVES, Objective, Status
 

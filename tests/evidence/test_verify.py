@@ -252,3 +252,22 @@ def test_a_file_that_is_not_there_and_a_negative_count_are_errors(tmp_path: Path
     for given in ({"replay": -1}, {"seed": -1}):
         with pytest.raises(gaitswarm.InvalidRequest):
             gaitswarm.verify(b"", **given)
+
+
+def test_what_a_multi_objective_search_was_told_is_checked_too(tmp_path: Path) -> None:
+    torque_alone = {"bias": [0.0] * 5, "exponent": [1.0, 0.0, 0.0, 0.0, 0.0]}
+    optimizer = {"name": "hype", "particles": 4, "population": 4, "offspring": 4}
+    given = {"optimizer": optimizer, "preference": torque_alone, "iterations": 6}
+    job = {name: value for name, value in JOB.items() if name != "particles"} | given
+    run = gaitswarm.optimize(db=tmp_path / "jobs.db", **job)
+    with gaitswarm.open(tmp_path / "jobs.db") as jobs:
+        content = jobs.evidence(run.job.id)
+    assert gaitswarm.verify(content, replay=3).verified
+
+    def change(columns: Columns) -> None:
+        # The energy has no part in the fitness, but the search was told of it.
+        for row in range(4):
+            columns["short.energy"][row] = 1.0 / columns["short.energy"][row]
+
+    found = gaitswarm.verify(tampered(content, {EVALUATIONS: with_cells(change)}), replay=0)
+    assert failed(found) == ["search"]

@@ -10,8 +10,8 @@ import pytest
 from services.optimizer.analysis.fits.identifiability import Trust
 from services.optimizer.errors import Conflict, InvalidRequest
 from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.jobs.spec import Judgement
 from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore

@@ -99,3 +99,16 @@ class FormulaEvaluator:
 
     def close(self) -> None:
         pass
+
+
+class TradeOff(FormulaEvaluator):
+    """Walks that are the faster the greater the gains, whatever else that costs."""
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        outcomes = super().evaluate(request, should_stop)
+        gains = request.designs.sum(axis=1, keepdims=True)
+        for outcome in outcomes:
+            outcome.objectives[:, 4:5] = 1.0 / (0.1 + gains)
+        return outcomes

@@ -80,6 +80,18 @@ class Knows(SqlStore):
         return {key: self.told[key] for key in keys if key in self.told}
 
 
+def test_a_multi_objective_job_under_another_preference_needs_no_walk(store: Store) -> None:
+    by_a, by_c = (
+        JobSpec.model_validate(SPEC.model_dump() | {"optimizer": "hype", "preference": name})
+        for name in ("A", "C")
+    )
+    first, walked = run(store, by_a)
+    assert (walked, first.progress.evaluations_saved) == (by_a.budget, 0)
+    again, walked = run(store, by_c)
+    assert (walked, again.progress.evaluations_saved) == (0, by_c.budget)
+    assert again.progress.best_fitness != first.progress.best_fitness
+
+
 def test_a_job_that_was_run_before_needs_no_walk_and_has_the_same_bits(store: Store) -> None:
     first, walked = run(store)
     assert (walked, first.progress.evaluations_saved) == (SPEC.budget, 0)

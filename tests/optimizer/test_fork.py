@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -16,29 +15,15 @@ from services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistor
 from services.optimizer.jobs.job import Job, JobState, time_left
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
-from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Outcome, Status
+from sim.outcome import Status
 from tests.examples.jobs import history
-from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator
+from tests.optimizer.formula import HERE, SINGLE, SPEC, TradeOff
 
 PARTICLES = SPEC.optimizer.particles
 
 REPLAYED = ["de", "nelder-mead", "pso-ps", "random", "sa"]
-
-
-class TradeOff(FormulaEvaluator):
-    """Walks that are the faster the greater the gains, whatever else that costs."""
-
-    def evaluate(
-        self, request: EvaluationRequest, should_stop: Callable[[], bool]
-    ) -> tuple[Outcome, ...]:
-        outcomes = super().evaluate(request, should_stop)
-        gains = request.designs.sum(axis=1, keepdims=True)
-        for outcome in outcomes:
-            outcome.objectives[:, 4:5] = 1.0 / (0.1 + gains)
-        return outcomes
 
 
 SPEED = {"bias": [0.0] * 5, "exponent": [0.0, 0.0, 0.0, 0.0, 1.0]}
@@ -75,7 +60,7 @@ def objectives(store: SqlStore, job: Job, iterations: int) -> list[bytes]:
     return [row.design.tobytes() + row.objectives.tobytes() for row in rows]
 
 
-@pytest.mark.parametrize("method", ["pso", *REPLAYED])
+@pytest.mark.parametrize("method", ["pso", "hype", *REPLAYED])
 @pytest.mark.parametrize("iteration", [1, 3, 6])
 def test_a_fork_with_the_same_settings_goes_on_bit_for_bit_as_its_parent(
     store: SqlStore, method: str, iteration: int

@@ -66,8 +66,24 @@ def fitness_of(positions: Floats, space: str = "mixed") -> Floats:
     return fitness
 
 
+def answer(method: MethodName, positions: Floats, space: str = "mixed") -> Floats:
+    """What a method is told: fitness, or two bowls that are in each other's way."""
+    fitness = fitness_of(positions, space)
+    if not METHODS[method].multi_objective:
+        return fitness
+    box = SPACES[space]
+    other = np.square(box.to_unit(box.designs(positions)) - 0.6).sum(axis=1)
+    return np.column_stack([fitness, np.where(np.isfinite(fitness), other, math.inf)])
+
+
+def alike(method: MethodName, values: Floats) -> Floats:
+    """Given values, as a method is told them."""
+    return np.column_stack([values] * 2) if METHODS[method].multi_objective else values
+
+
 def path(
     optimizer: Optimizer,
+    method: MethodName,
     space: str = "mixed",
     *,
     evaluations: int | None = None,
@@ -79,13 +95,13 @@ def path(
         left = evaluations - optimizer.evaluations
         positions = optimizer.ask(left if most is None else min(most, left))
         yield from positions
-        optimizer.tell(fitness_of(positions, space))
+        optimizer.tell(answer(method, positions, space))
 
 
 @cache
 def whole_path(method: MethodName, space: str = "mixed", seed: int = SEED) -> Floats:
     """Of a search that nothing interrupts; walked once for all tests."""
-    found = np.array(list(path(search(method, space, seed=seed), space)))
+    found = np.array(list(path(search(method, space, seed=seed), method, space)))
     found.flags.writeable = False
     return found
 
@@ -115,13 +131,13 @@ def test_every_position_is_finite_and_inside_the_bounds(method: MethodName, spac
 @METHOD
 def test_a_budget_is_kept_to_the_last_evaluation(method: MethodName) -> None:
     optimizer = search(method)
-    assert len(list(path(optimizer, evaluations=47))) == optimizer.evaluations == 47
+    assert len(list(path(optimizer, method, evaluations=47))) == optimizer.evaluations == 47
 
 
 @METHOD
 def test_the_same_seed_gives_the_same_bits_and_another_one_others(method: MethodName) -> None:
     first = bits(whole_path(method))
-    assert bits(path(search(method))) == first
+    assert bits(path(search(method), method)) == first
     assert bits(whole_path(method, seed=SEED + 1)) != first
 
 
@@ -144,7 +160,7 @@ def test_a_dump_loaded_between_any_ask_and_tell_changes_no_bit(
         reloaded.load(state)
         assert reloaded.ask().tobytes() == positions.tobytes()
         found += [position.tobytes() for position in positions]
-        reloaded.tell(fitness_of(positions, space))
+        reloaded.tell(answer(method, positions, space))
     assert found == bits(whole_path(method, space))[: len(found)]
 
 
@@ -154,7 +170,7 @@ from tests.optimizer.test_optimizer_contract import bits, path, search
 for method, state in json.load(sys.stdin).items():
     optimizer = search(method)
     optimizer.load(state)
-    print(json.dumps([method, *(row.hex() for row in bits(path(optimizer)))]))
+    print(json.dumps([method, *(row.hex() for row in bits(path(optimizer, method)))]))
 """
 
 
@@ -162,7 +178,7 @@ def test_another_process_goes_on_with_the_same_bits() -> None:
     given, expected = {}, list[list[str]]()
     for method in INSTALLED:
         stopped = search(method)
-        done = list(path(stopped, evaluations=BUDGET // 2))
+        done = list(path(stopped, method, evaluations=BUDGET // 2))
         given[method] = stopped.dump()
         expected.append([method, *(row.hex() for row in bits(whole_path(method)[len(done) :]))])
     printed = subprocess.run(
@@ -178,7 +194,7 @@ def test_another_process_goes_on_with_the_same_bits() -> None:
 @METHOD
 def test_the_path_does_not_depend_on_how_much_is_asked_at_once(method: MethodName) -> None:
     for most in (1, 4):
-        assert bits(path(search(method), most=most)) == bits(whole_path(method))
+        assert bits(path(search(method), method, most=most)) == bits(whole_path(method))
 
 
 @METHOD
@@ -187,7 +203,7 @@ def test_no_ask_gives_more_than_the_settings_or_the_caller_allow(method: MethodN
     for most in (None, 3, 100, 1) * 5:
         positions = optimizer.ask(most)
         assert 1 <= len(positions) <= min(PARTICLES, most or PARTICLES)
-        optimizer.tell(fitness_of(positions))
+        optimizer.tell(answer(method, positions))
 
 
 @METHOD
@@ -207,7 +223,7 @@ def test_tells_and_evaluations_are_counted(method: MethodName) -> None:
         assert (optimizer.iteration, optimizer.evaluations) == (k, evaluations)
         positions = optimizer.ask()
         evaluations += len(positions)
-        optimizer.tell(fitness_of(positions))
+        optimizer.tell(answer(method, positions))
 
 
 @METHOD
@@ -217,7 +233,7 @@ def test_a_search_of_which_everything_fails_keeps_searching(method: MethodName) 
         positions = optimizer.ask()
         assert np.isfinite(positions).all()
         seen |= {row.tobytes() for row in positions}
-        optimizer.tell(np.full(len(positions), math.inf))
+        optimizer.tell(alike(method, np.full(len(positions), math.inf)))
     assert len(seen) > BUDGET // 2
 
 
@@ -226,7 +242,7 @@ def test_a_search_of_which_everything_fails_keeps_searching(method: MethodName) 
 def test_a_search_goes_on_when_all_is_equal(method: MethodName, space: str) -> None:
     optimizer = search(method, space)
     while optimizer.evaluations < BUDGETS[space]:
-        optimizer.tell(np.ones(len(optimizer.ask())))
+        optimizer.tell(alike(method, np.ones(len(optimizer.ask()))))
 
 
 @METHOD
@@ -234,9 +250,14 @@ def test_a_search_goes_on_when_all_is_equal(method: MethodName, space: str) -> N
 def test_a_fitness_that_is_none_is_refused(method: MethodName, worst: float) -> None:
     optimizer = search(method)
     with pytest.raises(ValueError, match="before ask"):
-        optimizer.tell(np.zeros(PARTICLES))
+        optimizer.tell(alike(method, np.zeros(PARTICLES)))
     asked = len(optimizer.ask())
-    for fitness in (np.zeros(asked + 1), np.zeros((asked, 1)), np.full(asked, worst)):
+    wrong = np.zeros(asked) if METHODS[method].multi_objective else np.zeros((asked, 1))
+    for fitness in (
+        alike(method, np.zeros(asked + 1)),
+        wrong,
+        alike(method, np.full(asked, worst)),
+    ):
         with pytest.raises(ValueError, match="fitness"):
             optimizer.tell(fitness)
     assert optimizer.iteration == 0
@@ -245,7 +266,7 @@ def test_a_fitness_that_is_none_is_refused(method: MethodName, worst: float) -> 
 @METHOD
 def test_a_damaged_state_is_refused_by_name_and_leaves_the_state_before(method: MethodName) -> None:
     optimizer = search(method)
-    optimizer.tell(fitness_of(optimizer.ask()))
+    optimizer.tell(answer(method, optimizer.ask()))
     before = through_json(optimizer)
     optimizer.ask()
     later = through_json(optimizer)

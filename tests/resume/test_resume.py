@@ -19,9 +19,9 @@ from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
+from services.optimizer.search.evolution.hype import HypeSettings
 from services.optimizer.store.base import Store
 from services.runtime import open_evaluator, open_store, run_embedded
-from sim.kernel.walk import Precision
 from tests.examples.jobs import history
 from tests.examples.processes import output, start_python
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
@@ -100,11 +100,19 @@ def kill_group(process: subprocess.Popen[str]) -> None:
     output(process.stdout).close()
 
 
-@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"precision": "double"},
+        {"precision": "single"},
+        {"optimizer": HypeSettings(particles=5, population=8, offspring=8)},
+    ],
+    ids=["double", "single", "multi-objective"],
+)
 def test_resumed_job_equals_one_never_killed(
-    store: Store, url: str, evaluator: Evaluator, precision: Precision
+    store: Store, url: str, evaluator: Evaluator, given: dict[str, Any]
 ) -> None:
-    spec = SPEC.model_copy(update={"precision": precision})
+    spec = SPEC.model_copy(update=given)
     begun = time.monotonic()
     whole = run_alone(store, evaluator, spec)
     one_iteration = (time.monotonic() - begun) / SPEC.iterations

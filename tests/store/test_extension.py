@@ -92,7 +92,7 @@ def test_a_runner_that_begins_under_an_older_budget_is_told_so_too(store: SqlSto
     store.begin(current, ask(0))
 
 
-def test_who_claims_an_extended_job_gets_the_last_ask_with_its_fitness(
+def test_who_claims_an_extended_job_gets_the_last_ask_with_its_evaluations(
     store: SqlStore, clock: Clock
 ) -> None:
     claim = begun(store)
@@ -103,7 +103,7 @@ def test_who_claims_an_extended_job_gets_the_last_ask_with_its_fitness(
     assert again.answered.ask.iteration == 0
     assert again.answered.ask.state == ask(0).state
     np.testing.assert_array_equal(again.answered.ask.positions, ask(0).positions)
-    assert again.answered.fitness.tolist() == [4.0, math.inf]
+    assert again.answered.columns.fitness.tolist() == [4.0, math.inf]
 
 
 def test_the_same_key_still_means_the_job_as_it_was_submitted(store: SqlStore) -> None:

@@ -17,6 +17,7 @@ from cli.tournament.plan import PRESETS, Size, tournament_jobs
 from cli.tournament.runs import read_runs
 from services.optimizer.jobs.kinds.problem import TuningProblem
 from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.tournament.methods import method_names
 from tests.examples.commands import Result, run_command
 from tests.examples.processes import COMMAND_LINE, output, python, start_python
 
@@ -136,6 +137,7 @@ def test_ranks_are_compared_with_those_of_an_earlier_report(tmp_path: Path) -> N
     ("options", "field", "words"),
     [
         (("--methods", "annealing"), "methods", "unknown 'annealing'; known are"),
+        (("--methods", "pso,hype"), "methods", "hype is multi-objective; a tournament ranks"),
         (("--methods", "pso,pso"), "methods", "named twice"),
         (("--problems", "D5"), "problems", "unknown 'D5'; known are D4C0R0I0"),
         (("--settings", "mine"), "settings", "neither random nor default"),
@@ -179,6 +181,11 @@ def test_a_tournament_that_is_killed_and_goes_on_has_the_same_numbers(tmp_path: 
     last = python(*arguments)
     assert last.returncode == 0, last.stderr
     assert numbers(killed) == numbers(whole)
+
+
+def test_methods_that_cannot_take_part_are_in_no_preset() -> None:
+    for preset in PRESETS.values():
+        assert set(preset.methods) <= set(method_names())
 
 
 def test_the_robot_races_on_chapter_4_and_on_chapter_3_with_its_gait() -> None:

@@ -58,17 +58,30 @@ class Parent:
     columns: EvaluationColumns
     asked: Callable[[], tuple[Floats, ...]]
 
-    def by_iteration(self, fitness: Floats) -> tuple[Floats, ...]:
+    def by_iteration(self, column: Floats) -> tuple[Floats, ...]:
         """Cut a column.
 
         Args:
-            fitness: (r,) of every evaluation.
+            column: (r, ...) of every evaluation.
 
         Returns:
-            (n,) of each iteration.
+            (n, ...) of each iteration.
         """
         ends = np.flatnonzero(np.diff(self.columns.iteration)) + 1
-        return tuple(np.split(fitness, ends))
+        return tuple(np.split(column, ends))
+
+    def told(self, spec: AnySpec, fitness: Floats) -> tuple[Floats, ...]:
+        """What the search of a job with this history is told.
+
+        Args:
+            spec: Of the job.
+            fitness: (r,) of every evaluation, by its measure.
+
+        Returns:
+            As `Spec.told`, of each iteration.
+        """
+        told = spec.told(self.columns.objectives, self.columns.failed, fitness)
+        return self.by_iteration(told)
 
 
 def budgets_of(job: Job) -> tuple[int, ...]:
@@ -183,10 +196,10 @@ def _search_state(parent: Parent, spec: AnySpec, anew: Floats | None) -> dict[st
 
     anew: (r,) fitness by another preference; None: by the parent's. Raises ValueError.
     """
-    asked, told = parent.asked(), parent.by_iteration(parent.columns.fitness)
+    asked, told = parent.asked(), parent.told(parent.job.spec, parent.columns.fitness)
     if anew is None:
         return _dumped(retraced(spec, budgets_of(parent.job), asked, told))
-    told_anew = parent.by_iteration(anew)
+    told_anew = parent.told(spec, anew)
     try:
         # Whatever the method is, if it would have asked for the same, it is where it would be.
         return _dumped(retraced(spec, budgets_of(parent.job), asked, told_anew))

@@ -23,8 +23,7 @@ def retraced(
         budgets: Iterations that the job was to run, in the order in which it was given them. A
             method may ask for other designs under another budget.
         asked: (n, d) positions of every iteration, at least one.
-        told: (n,) fitness of every iteration, +inf for a design that failed; that of the last is
-            left out.
+        told: What it was told of every iteration, see `Spec.told`; that of the last is left out.
 
     Returns:
         The search, which has asked for the last of these positions.

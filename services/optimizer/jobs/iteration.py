@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.jobs.columns import EvaluationColumns
 from sim.kernel.walk import Precision
 from sim.outcome import Outcome
 
@@ -106,11 +107,11 @@ class Answered:
 
     Attributes:
         ask: what was asked.
-        fitness: (particles,) of its designs, +inf for one that failed.
+        columns: what its designs came to.
     """
 
     ask: Ask
-    fitness: NDArray[np.float64]
+    columns: EvaluationColumns
 
 
 @dataclass(frozen=True, slots=True, eq=False)

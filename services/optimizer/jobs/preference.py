@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
-from services.optimizer.jobs.spec import Judgement, exponential
+from services.optimizer.jobs.judgement import Judgement, exponential
 from sim.choice import NAME, OWN, alternatives
 
 _FIELDS: Final = (

@@ -11,10 +11,8 @@ Spec
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, ClassVar, Final, Literal, Self
 
 import numpy as np
@@ -23,6 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.judgement import Judgement, by_design
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.jobs.start import EarlierJobs, StartChoice
 from services.optimizer.search.automatic import AutoSettings, chosen_method
@@ -40,7 +39,7 @@ from sim.case import Case
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 from sim.kernel.walk import Precision
-from sim.outcome import Objective, Outcome, Status
+from sim.outcome import Objective, Outcome
 from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
 from sim.variables import VariableChoice, VariableName, VariableValue
 
@@ -48,41 +47,6 @@ Floats = NDArray[np.float64]
 
 DECISIVE: Final = 0.05
 """Distance from the best fitness, as a share of it, within which designs count as good as it."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Judgement:
-    """What n designs are worth after K cases; all to be minimized.
-
-    Attributes:
-        fitness: (n,), +inf where a case failed.
-        log_utilities: (n, K) logarithm of what a design is worth in each case, +inf where it
-            failed.
-    """
-
-    fitness: Floats
-    log_utilities: Floats
-
-    @property
-    def utilities(self) -> Floats:
-        """(n, K), +inf where the case failed or the number is too great."""
-        rows = [[exponential(u) for u in row] for row in self.log_utilities.tolist()]
-        return np.array(rows, dtype=np.float64).reshape(self.log_utilities.shape)
-
-
-def exponential(logarithm: float) -> float:
-    """The exponential function. Python's, as numpy's differs in the last bit between processors.
-
-    Args:
-        logarithm: any number but NaN.
-
-    Returns:
-        Its exponential, +inf where a double ends.
-    """
-    try:
-        return math.exp(logarithm)
-    except OverflowError:
-        return math.inf
 
 
 class Spec(BaseModel):
@@ -108,6 +72,9 @@ class Spec(BaseModel):
     searches: ClassVar[bool] = True
     """Whether designs are searched for, so that the best ones of another job are a start. Else they
     are drawn, and what is said of them holds for draws alone."""
+
+    has_objective_vectors: ClassVar[bool] = False
+    """Whether designs of this kind have objectives to trade, see `objective_vectors`."""
 
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
     name: str = Field(default="", max_length=200, description="For people; need not be unique.")
@@ -185,6 +152,16 @@ class Spec(BaseModel):
             raise ValueError(
                 f"iterations: {name} is replayed when a job is resumed, and so"
                 f" judges {LONGEST_REPLAY} designs at most, not {self.budget}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_told(self) -> Self:
+        name = self.optimizer.name
+        if name != "auto" and METHODS[name].multi_objective and not self.has_objective_vectors:
+            raise ValueError(
+                f"optimizer: {name} is multi-objective, and designs of this kind of job have no"
+                " objectives to trade; choose another method"
             )
         return self
 
@@ -339,6 +316,33 @@ class Spec(BaseModel):
             Fitness and utilities of the n designs.
         """
 
+    def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
+        """What designs come to in each objective, over all cases; only if there are objectives.
+
+        Args:
+            objectives: (n, K, m) raw objectives, in their units.
+            failed: (n, K), true for a case without a result.
+
+        Returns:
+            (n, M), minimized; a row is +inf throughout for a design that failed.
+        """
+        raise NotImplementedError
+
+    def told(self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats) -> Floats:
+        """What the search is told of designs. It follows from what is stored of them.
+
+        Args:
+            objectives: (n, K, m) raw objectives, in their units; what is not finite may be NaN.
+            failed: (n, K), true for a case without a result.
+            fitness: (n,) as `judge` has it.
+
+        Returns:
+            The fitness; of a multi-objective method (n, M) objective vectors.
+        """
+        if METHODS[self.search.name].multi_objective:
+            return self.objective_vectors(objectives, failed)
+        return fitness
+
     def figure_of_merit(self, fitness: float) -> float | None:  # noqa: ARG002 - kinds may have one
         """What a fitness is in a figure that is maximized, where the job has one.
 
@@ -383,9 +387,7 @@ def judge_outcomes(spec: Spec, outcomes: tuple[Outcome, ...]) -> Judgement:
     Returns:
         Fitness and utilities of the n designs.
     """
-    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
-    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
-    return spec.judge(objectives, failed)
+    return spec.judge(*by_design(outcomes))
 
 
 def create_optimizer(spec: Spec) -> Optimizer:

@@ -43,6 +43,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration, Reevaluation
 from services.optimizer.jobs.job import Job, JobState, refusal
+from services.optimizer.jobs.judgement import by_design
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
 from services.optimizer.jobs.walk_keys import walk_keys
@@ -232,7 +233,9 @@ def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Act
 def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
     """From the last answered ask if there is one, under the job's present budget."""
     if state.answered is not None:
-        first = _following(job.spec, state.answered.ask, state.answered.fitness)
+        came = state.answered.columns
+        told = job.spec.told(came.objectives, came.failed, came.fitness)
+        first = _following(job.spec, state.answered.ask, told)
     else:
         first = _ask(job.spec, create_optimizer(job.spec))
     if first is None:
@@ -278,7 +281,8 @@ def _commit(
     state: Coordination, done: CompletedIteration
 ) -> tuple[Coordination, tuple[Action, ...]]:
     job, ask = _current(state)
-    following = _following(job.spec, ask, done.fitness)
+    told = job.spec.told(*by_design(done.outcomes), done.fitness)
+    following = _following(job.spec, ask, told)
     state = replace(state, phase=Phase.COMMITTING, done=done, following=following)
     return state, (Commit(done, following),)
 
@@ -356,11 +360,11 @@ def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> 
     return Evaluate(request, walk_keys(spec, request.provenance, request.designs))
 
 
-def _following(spec: Spec, ask: Ask, fitness: NDArray[np.float64]) -> Ask | None:
+def _following(spec: Spec, ask: Ask, told: NDArray[np.float64]) -> Ask | None:
     """The ask after one that was answered; None at the end of the budget."""
     optimizer = create_optimizer(spec)
     optimizer.load(ask.state)
-    optimizer.tell(fitness)
+    optimizer.tell(told)
     return _ask(spec, optimizer)
 
 

@@ -95,7 +95,7 @@ class Generational(ABC, Generic[S, G]):
         self._evaluations = 0
         self.generations = 0
         self.positions: Floats = np.empty((0, space.dimension))
-        self._fitness: list[float] = []
+        self._fitness: Floats = np.empty(0)
         self._asked = 0
         self._start: Floats = np.empty((0, space.dimension))
 
@@ -141,7 +141,7 @@ class Generational(ABC, Generic[S, G]):
         if not self._asked:
             if told == len(self.positions):
                 self.positions = self.propose() if self.generations else self._first()
-                self._fitness, told = [], 0
+                self._fitness, told = np.empty(0), 0
             limit = self.settings.particles if most is None else min(most, self.settings.particles)
             self._asked = min(limit, len(self.positions) - told)
         return self.positions[told : told + self._asked].copy()
@@ -155,15 +155,15 @@ class Generational(ABC, Generic[S, G]):
         Raises:
             ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
         """
-        values = checked_fitness(fitness, self._asked)
-        self._fitness.extend(values.tolist())
+        values = self.checked(fitness, self._asked)
+        self._fitness = np.concatenate([self._fitness, values]) if len(self._fitness) else values
         self._iteration += 1
         self._evaluations += self._asked
         self._asked = 0
         if len(self._fitness) == len(self.positions):
             if not self.generations and len(self._start) > self.first_size:
                 self._keep_the_best()
-            self.learn(self.positions, np.array(self._fitness))
+            self.learn(self.positions, self._fitness)
             self.generations += 1
 
     def dump(self) -> dict[str, Any]:
@@ -180,7 +180,7 @@ class Generational(ABC, Generic[S, G]):
             "evaluations": self._evaluations,
             "generations": self.generations,
             "positions": self.positions.tolist(),
-            "fitness": worth(self._fitness),
+            "fitness": self.written(self._fitness),
             "asked": self._asked,
             **self.memory(),
         }
@@ -206,10 +206,11 @@ class Generational(ABC, Generic[S, G]):
         positions = self.inside(matrix(dumped.positions, shape, "positions"), "positions")
         if len(dumped.fitness) + dumped.asked > len(positions):
             raise ValueError("asked: more than what is left of the positions")
+        fitness = self.read(dumped.fitness)
         self.recall(dumped)  # type: ignore[arg-type]
         self._iteration, self._evaluations = dumped.iteration, dumped.evaluations
         self.generations, self._asked = dumped.generations, dumped.asked
-        self.positions, self._fitness = positions, of_worth(dumped.fitness).tolist()
+        self.positions, self._fitness = positions, fitness
 
     def _first(self) -> Floats:
         """The first generation with the start positions in it."""
@@ -218,10 +219,8 @@ class Generational(ABC, Generic[S, G]):
 
     def _keep_the_best(self) -> None:
         """Of more start positions than members; the earlier of equals, in their order."""
-        order = np.argsort(np.array(self._fitness), kind="stable")[: self.first_size]
-        kept = np.sort(order)
-        self.positions = self.positions[kept]
-        self._fitness = [self._fitness[k] for k in kept.tolist()]
+        kept = np.sort(self.best(self._fitness, self.first_size))
+        self.positions, self._fitness = self.positions[kept], self._fitness[kept]
 
     def inside(self, positions: Floats, name: str) -> Floats:
         """Check positions of a dumped state.
@@ -239,6 +238,58 @@ class Generational(ABC, Generic[S, G]):
         if (positions < self.space.low).any() or (positions > self.space.high).any():
             raise ValueError(f"{name}: outside the bounds of this job")
         return positions
+
+    def checked(self, fitness: Floats, asked: int) -> Floats:
+        """Check what is told.
+
+        Args:
+            fitness: Of the positions last asked for.
+            asked: How many those are, 0 if there are none.
+
+        Returns:
+            (asked,), a copy.
+
+        Raises:
+            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
+        """
+        return checked_fitness(fitness, asked)
+
+    def best(self, fitness: Floats, count: int) -> NDArray[np.intp]:
+        """Choose the best of more start positions than there are members.
+
+        Args:
+            fitness: (n,) of each, +inf for a failed evaluation.
+            count: How many, < n.
+
+        Returns:
+            (count,) their indices; the earlier of equals.
+        """
+        return np.argsort(fitness, kind="stable")[:count]
+
+    def written(self, fitness: Floats) -> list[Any]:
+        """Write what was told as JSON takes it.
+
+        Args:
+            fitness: (n,), +inf for a failed evaluation.
+
+        Returns:
+            One entry for each.
+        """
+        return worth(fitness)
+
+    def read(self, values: list[Any]) -> Floats:
+        """Read back what `written` gave.
+
+        Args:
+            values: The entries.
+
+        Returns:
+            (n,), +inf for a failed evaluation.
+
+        Raises:
+            ValueError: `written` gives no such entries.
+        """
+        return of_worth(values)
 
     @abstractmethod
     def propose(self) -> Floats:

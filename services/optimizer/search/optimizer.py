@@ -75,7 +75,9 @@ class Optimizer(Protocol):
         """Take what the positions last asked for are worth.
 
         Args:
-            fitness: (n,) of each of them, minimized; +inf for a failed evaluation.
+            fitness: (n,) of each of them, minimized; +inf for a failed evaluation. A method that is
+                multi-objective (see `registry.Method`) is told (n, M) objective vectors, each
+                number minimized; one with any +inf is that of a failed evaluation.
 
         Raises:
             ValueError: nothing was asked for, the shape is another, or a value is NaN or -inf.
@@ -121,23 +123,29 @@ class Rejudging(Optimizer, Protocol):
         """
 
 
-def checked_fitness(fitness: NDArray[np.float64], asked: int) -> NDArray[np.float64]:
+def checked_fitness(
+    fitness: NDArray[np.float64], asked: int, objectives: int | None = None
+) -> NDArray[np.float64]:
     """Check what is told.
 
     Args:
         fitness: Of the positions last asked for.
         asked: How many those are, 0 if there are none.
+        objectives: Numbers of an objective vector; None for a method that is told one fitness.
 
     Returns:
-        (asked,), a copy.
+        (asked,), or (asked, objectives); a copy.
 
     Raises:
         ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
     """
     if not asked:
         raise ValueError("tell() before ask(): there are no positions that this belongs to")
-    if fitness.shape != (asked,):
-        raise ValueError(f"fitness has shape {fitness.shape}; {asked} positions were asked for")
+    shape = (asked,) if objectives is None else (asked, objectives)
+    if fitness.shape != shape:
+        raise ValueError(
+            f"fitness has shape {fitness.shape}, not {shape}; {asked} positions were asked for"
+        )
     if np.isnan(fitness).any() or np.isneginf(fitness).any():
         raise ValueError("fitness must be finite, or +inf for a failed evaluation")
     return np.array(fitness, dtype=np.float64)

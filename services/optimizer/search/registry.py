@@ -16,6 +16,7 @@ from services.optimizer.search.evolution.differential_evolution import (
     DifferentialEvolution,
 )
 from services.optimizer.search.evolution.genetic import GaSettings
+from services.optimizer.search.evolution.hype import Hype, HypeSettings
 from services.optimizer.search.local.annealing import AnnealingSettings
 from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
 from services.optimizer.search.local.mads import MadsSettings
@@ -49,6 +50,7 @@ OptimizerSettings = (
     | GlobalNelderMeadSettings
     | GlobalUnirandiSettings
     | GsaSettings
+    | HypeSettings
     | MadsSettings
     | NelderMeadSettings
     | PatternSearchSettings
@@ -69,6 +71,7 @@ MethodName = Literal[
     "global-nelder-mead",
     "global-unirandi",
     "gsa",
+    "hype",
     "mads",
     "nelder-mead",
     "ps",
@@ -96,6 +99,7 @@ class Method:
         settings: Model of its settings.
         summary: What it is, with its source.
         create: Makes one.
+        multi_objective: Whether it is told objective vectors in place of fitness.
         replays: Whether its state is all that it was told, so that a job of it is bounded.
         uses_start: Whether it learns from the designs that a job starts from. One that does not
             evaluates them first, and then goes on as if there had been none.
@@ -107,6 +111,7 @@ class Method:
     settings: type[OptimizerSettings]
     summary: str
     create: Create
+    multi_objective: bool = False
     replays: bool = False
     uses_start: bool = False
     extra: str = ""
@@ -235,6 +240,13 @@ METHODS: Final[dict[MethodName, Method]] = {
         GsaSettings,
         "Gravitational search algorithm (Rashedi, Nezamabadi-pour and Saryazdi 2009)",
         "swarm.gsa:gsa",
+    ),
+    "hype": Method(
+        HypeSettings,
+        "Multi-objective: what trades best by hypervolume, HypE (Bader and Zitzler 2011)",
+        Hype,
+        multi_objective=True,
+        uses_start=True,
     ),
     "mads": _generator(
         MadsSettings,

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import re
 import secrets
 from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, Final
 
-import numpy as np
 from sqlalchemy import Connection, insert, select, update
 
 from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.provenance import JobProvenance, with_record
+from services.optimizer.store.columns import select_columns
 from services.optimizer.store.job_rows import provenance_document, provenance_records, to_job
 from services.optimizer.store.rows import (
     Row,
@@ -121,7 +120,7 @@ def outstanding_ask(connection: Connection, job: Row) -> Ask | None:
 
 
 def answered_ask(connection: Connection, job: Row) -> Answered | None:
-    """Read the last committed ask with its fitness, from which the next one follows.
+    """Read the last committed ask with its evaluations, from which the next one follows.
 
     Args:
         connection: An open transaction.
@@ -137,13 +136,8 @@ def answered_ask(connection: Connection, job: Row) -> Answered | None:
     row = connection.execute(query).mappings().first()
     if row is None:
         return None
-    of_swarm = (
-        select(evaluations.c.fitness)
-        .where(evaluations.c.job_id == job["id"], evaluations.c.iteration == last)
-        .order_by(evaluations.c.particle)
-    )
-    fitness = [math.inf if f is None else f for f in connection.execute(of_swarm).scalars()]
-    return Answered(to_ask(row), np.array(fitness, dtype=np.float64))
+    columns = select_columns(connection, job["id"], last, last + 1)
+    return None if columns is None else Answered(to_ask(row), columns)
 
 
 def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now: datetime) -> None:

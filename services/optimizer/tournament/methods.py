@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from functools import partial
 from typing import Any, Final
 
@@ -22,8 +23,38 @@ _SWITCH: Final = ("no", "yes")
 
 
 def method_names() -> tuple[str, ...]:
-    """Names that a method may be given by: what a job may name, then rivals."""
-    return (*CHOICES, *RIVALS)
+    """Names that a method may be given by: what a job may name, then rivals.
+
+    A multi-objective method is none: methods are ranked by the one number that they are told.
+    """
+    return (*(name for name in CHOICES if not is_multi_objective(name)), *RIVALS)
+
+
+def is_multi_objective(name: str) -> bool:
+    """Whether a method of the registry is told objective vectors, and so cannot take part.
+
+    Args:
+        name: Of a method, or anything else.
+
+    Returns:
+        True for a multi-objective method.
+    """
+    return any(name == known and method.multi_objective for known, method in METHODS.items())
+
+
+def why_unknown(name: str, known: Iterable[str]) -> str:
+    """Say why a name is none of a method that may take part.
+
+    Args:
+        name: That was given.
+        known: Those that there are.
+
+    Returns:
+        The reason, for people.
+    """
+    if is_multi_objective(name):
+        return f"{name} is multi-objective; a tournament ranks methods by a single number"
+    return f"unknown method {name!r}; known are {', '.join(known)}"
 
 
 def named_settings(name: str) -> SearchSettings:
@@ -38,16 +69,18 @@ def named_settings(name: str) -> SearchSettings:
     Raises:
         ValueError: There is none of that name; names those that there are.
     """
-    if name in CHOICES:
-        return CHOICES[name]
     if name in RIVALS:
         return RIVALS[name].settings()
-    raise ValueError(f"unknown method {name!r}; known are {', '.join(method_names())}")
+    if name in method_names():
+        return CHOICES[name]
+    raise ValueError(why_unknown(name, method_names()))
 
 
 def settings_models() -> dict[str, type[SearchSettings]]:
     """Settings of every method that may take part, by their `name`."""
-    own: dict[str, type[SearchSettings]] = {name: m.settings for name, m in METHODS.items()}
+    own: dict[str, type[SearchSettings]] = {
+        name: method.settings for name, method in METHODS.items() if not method.multi_objective
+    }
     rivals = {name: rival.settings for name, rival in RIVALS.items()}
     return {"auto": AutoSettings, **own, **rivals}
 

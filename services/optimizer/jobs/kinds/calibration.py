@@ -12,8 +12,9 @@ from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.kinds.misfit import difference, quantity, root_mean_square
-from services.optimizer.jobs.spec import Judgement, Spec
+from services.optimizer.jobs.spec import Spec
 from sim.calibration.catalogue import robot_variables, varied_robot, walk_variables
 from sim.calibration.targets import QUANTITIES, Target, TargetWalk
 from sim.calibration.walk import RESULTS, CalibrationWalk

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.spec import Judgement, Spec
+from services.optimizer.jobs.judgement import Judgement
+from services.optimizer.jobs.spec import Spec
 from sim.case import Case
 from sim.errors import SimulationInputError
 from sim.identification.current_fit import LINK_CURRENTS, CurrentFit

@@ -22,11 +22,12 @@ from pydantic import (
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.kinds.problem import ProblemChoice, TuningProblem
 from services.optimizer.jobs.kinds.race_case import SEED, RaceCase, settings_of_run
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.jobs.provenance import optimizer_digest
-from services.optimizer.jobs.spec import Judgement, Spec, create_optimizer
+from services.optimizer.jobs.spec import Spec, create_optimizer
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_search import RandomSearchSettings
 from services.optimizer.search.registry import missing_of, versions_of
@@ -37,6 +38,7 @@ from services.optimizer.tournament.methods import (
     named_settings,
     settings_models,
     settings_variables,
+    why_unknown,
 )
 from services.optimizer.tournament.race import Terms, default_checkpoints
 from sim.case import Case
@@ -58,8 +60,7 @@ def _method_settings(choice: object) -> object:
         return named_settings(choice)
     name = choice.get("name") if isinstance(choice, Mapping) else None
     if isinstance(name, str) and name not in settings_models():
-        known = ", ".join(settings_models())
-        raise ValueError(f"unknown method {name!r}; those with settings are {known}")
+        raise ValueError(why_unknown(name, settings_models()))
     return choice
 
 

@@ -12,10 +12,10 @@ from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
+from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.kinds.walks import WalksSpec
-from services.optimizer.jobs.preference import PreferenceChoice
-from services.optimizer.jobs.spec import Judgement
+from services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
@@ -56,6 +56,8 @@ class JobSpec(WalksSpec):
             ]
         },
     )
+
+    has_objective_vectors = True
 
     unwalked = (WalksSpec.unwalked or frozenset()) | {"preference"}
 
@@ -183,6 +185,24 @@ class JobSpec(WalksSpec):
         """
         judged = super().judge(objectives, failed)
         return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
+
+    def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
+        """What designs come to in f1 to f5, over all scenarios, without any bias.
+
+        They depend on no preference: a multi-objective search goes the same way whatever preference
+        its designs are judged by.
+
+        Args:
+            objectives: (n, K, 6) raw objectives, in their units.
+            failed: (n, K), true for a walk without a result.
+
+        Returns:
+            (n, 5) geometric means over the scenarios, of the aggregates where there are worlds; a
+            row is +inf throughout where they cannot be given.
+        """
+        if self.worlds is None:
+            return objective_vectors(objectives, failed)
+        return self.worlds.objective_vectors(objectives, failed)
 
     def resolved(self) -> JobSpec:
         """The same job with scenarios, preference, variables and optimizer written out."""

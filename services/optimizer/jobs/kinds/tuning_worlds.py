@@ -11,14 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from services.optimizer.jobs.preference import geometric_mean
-from services.optimizer.jobs.spec import Judgement
+from services.optimizer.jobs.judgement import Judgement
+from services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
 from sim.variables import Variable, VariableChoice
 from sim.worlds import PERTURBATIONS, sample_worlds
 
 Floats = NDArray[np.float64]
 
 Aggregate = Literal["mean", "quantile", "worst", "cvar"]
+
+_ALONE: Final = tuple(
+    Preference(bias=(0.0,) * 5, exponent=tuple(exponent)) for exponent in np.eye(5).tolist()
+)
+"""Preferences for one objective each."""
 
 _EDGE: Final = 1e-9
 """Of a world: a share that is nearer to a whole number of worlds is one."""
@@ -107,6 +112,27 @@ class TuningWorlds(BaseModel):
         by_scenario = log_utilities.reshape(len(log_utilities), -1, self.count)
         rows = [[self._aggregate(worlds) for worlds in row] for row in by_scenario.tolist()]
         return np.array(rows, dtype=np.float64).reshape(by_scenario.shape[:2])
+
+    def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
+        """What each design comes to in each of f1 to f5, over all worlds and scenarios.
+
+        Objective m is the fitness under a preference that weighs it alone and has no bias. So each
+        objective is aggregated over worlds of its own: its worst world may be another one's best.
+
+        Args:
+            objectives: (n, K W, 6) raw objectives, worlds the fastest, in their units.
+            failed: (n, K W), true where a walk failed.
+
+        Returns:
+            (n, 5), minimized; a row is +inf throughout where an objective has no value.
+        """
+        columns = [
+            geometric_mean(self.aggregated(log_utilities(objectives, failed, alone)))
+            for alone in _ALONE
+        ]
+        vectors = np.stack(columns, axis=1)
+        vectors[~np.isfinite(vectors).all(axis=1)] = math.inf
+        return vectors
 
     def _aggregate(self, logarithms: Sequence[float]) -> float:
         ordered = sorted(logarithms, reverse=True)

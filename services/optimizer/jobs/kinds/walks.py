@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
+from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import (
     PREFERENCES,
     Preference,
@@ -15,7 +16,7 @@ from services.optimizer.jobs.preference import (
     figure_of_merit,
     judge,
 )
-from services.optimizer.jobs.spec import Judgement, Spec
+from services.optimizer.jobs.spec import Spec
 from sim.outcome import OBJECTIVES, Objective
 from sim.scenario import Scenario, ScenarioChoice, find_scenario
 

@@ -1,0 +1,62 @@
+"""What designs are worth, from what the simulator says of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.outcome import Outcome, Status
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judgement:
+    """What n designs are worth after K cases; all to be minimized.
+
+    Attributes:
+        fitness: (n,), +inf where a case failed.
+        log_utilities: (n, K) logarithm of what a design is worth in each case, +inf where it
+            failed.
+    """
+
+    fitness: Floats
+    log_utilities: Floats
+
+    @property
+    def utilities(self) -> Floats:
+        """(n, K), +inf where the case failed or the number is too great."""
+        rows = [[exponential(u) for u in row] for row in self.log_utilities.tolist()]
+        return np.array(rows, dtype=np.float64).reshape(self.log_utilities.shape)
+
+
+def exponential(logarithm: float) -> float:
+    """The exponential function. Python's, as numpy's differs in the last bit between processors.
+
+    Args:
+        logarithm: any number but NaN.
+
+    Returns:
+        Its exponential, +inf where a double ends.
+    """
+    try:
+        return math.exp(logarithm)
+    except OverflowError:
+        return math.inf
+
+
+def by_design(outcomes: tuple[Outcome, ...]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Turn outcomes by case to numbers by design.
+
+    Args:
+        outcomes: K, one per case, of the same n designs each.
+
+    Returns:
+        (n, K, m) raw objectives, in their units; (n, K), true for a case without a result.
+    """
+    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
+    return objectives, failed

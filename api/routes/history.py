@@ -9,7 +9,6 @@ from fastapi.responses import StreamingResponse
 
 from api.dependencies import LARGEST_INDEX, AfterIteration, ExistingJob, JobId, Service
 from api.documentation import binary, problems
-from gaitswarm.evidence.archive import MEDIA_TYPE as ZIP
 from gaitswarm.evidence.contents import evidence
 from gaitswarm.tables import MEDIA_TYPES, TableFormat, encoded_table
 from gaitswarm.views import (
@@ -21,6 +20,7 @@ from gaitswarm.views import (
     PageView,
     evaluation_views,
 )
+from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from services.optimizer.errors import NotFound
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
@@ -115,8 +115,9 @@ def export_job(
     responses=binary("The archive.", ZIP) | problems(404, 409, 422),
 )
 def get_evidence(job: ExistingJob, service: Service) -> Response:
-    """One file that proves the run: spec, robot, provenance, every evaluation, pictures, and a page
-    that opens offline; `gaitswarm verify` checks it anywhere. 409 before the first iteration.
+    """One file that proves the run: spec, robot, provenance, every evaluation, the finished
+    certificates of its designs, pictures, and a page that opens offline; `gaitswarm verify` checks
+    it anywhere. 409 before the first iteration.
     """
     return Response(
         evidence(service, job.id),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import resources
 from typing import Any, Final
 
@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 
 from gaitswarm.errors import Conflict
 from gaitswarm.evidence.archive import archived
-from gaitswarm.evidence.page import page
+from gaitswarm.evidence.certificates import FOLDER, SUMMARY, certificates_of, summary
+from gaitswarm.evidence.page import CertificateOnPage, page
 from gaitswarm.evidence.pictures import bars, convergence, heat_map
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.tables import encoded_table
 from gaitswarm.views import BestView, IterationView
+from gaitswarm.views.certificate import CertificateView
 from services.optimizer.analysis.fork import budgets_of
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.service import JobService
@@ -45,14 +48,14 @@ _PIECE: Final = 1000
 
 
 def evidence(service: JobService, job_id: str) -> bytes:
-    """Write the evidence of a job.
+    """Write the evidence of a job, with the finished certificates of its designs.
 
     Args:
         service: Where the job is.
         job_id: Its id.
 
     Returns:
-        The archive: the same bytes for the same stored job and the same gaitswarm.
+        The archive: the same bytes for the same stored jobs and the same gaitswarm.
 
     Raises:
         NotFound: There is no such job.
@@ -61,10 +64,46 @@ def evidence(service: JobService, job_id: str) -> bytes:
     job = service.job(job_id)
     if not job.progress.iterations:
         raise Conflict(f"job {job_id} has committed no iteration yet, so there is no evidence")
-    return archived(dict(_members(service, job)))
+    run = _run(service, job)
+    files = dict(run.files)
+    shown = [] if run.summary is None else [CertificateOnPage(run.summary, None)]
+    for certified in certificates_of(service, job, run.columns, run.place):
+        own = _run(service, certified.job)
+        files |= {f"{FOLDER}/{certified.job.id}/{name}": c for name, c in own.files.items()}
+        if own.summary is not None:
+            shown.append(CertificateOnPage(own.summary, certified))
+    pictures = dict(_pictures(job.spec, run.best, run.iterations))
+    files |= {f"figures/{name}.svg": picture.encode() for name, picture in pictures.items()}
+    files[PAGE] = page(job, run.best, run.provenance, pictures, shown, tuple(files)).encode()
+    return archived(files)
 
 
-def _members(service: JobService, job: Job) -> Iterator[tuple[str, bytes]]:
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What is stored of one job.
+
+    Attributes:
+        files: Members by name, those for people left out.
+        columns: Evaluations.
+        iterations: At a glance.
+        provenance: As `provenance_document` has it.
+        best: The best design, with its `place`: iteration and particle.
+        summary: Of a certificate in which a drawn world has walked.
+    """
+
+    files: Mapping[str, bytes]
+    columns: EvaluationColumns
+    iterations: Sequence[IterationView]
+    provenance: Mapping[str, Any]
+    best: BestView | None
+    summary: CertificateView | None
+
+    @property
+    def place(self) -> tuple[int, int] | None:
+        return None if self.best is None else (self.best.iteration, self.best.particle)
+
+
+def _run(service: JobService, job: Job) -> _Run:
     spec, columns = job.spec, _committed(service.columns(job), job)
     anew = None
     if spec.precision != "double":
@@ -73,13 +112,18 @@ def _members(service: JobService, job: Job) -> Iterator[tuple[str, bytes]]:
     best = best_of(columns, anew)
     iterations = list(_iterations(service, job))
     view = None if best is None else BestView.from_evaluation(best, spec)
+    provenance = provenance_document(job)
     documents: dict[str, Any] = {
         JOB: _job(job, best),
         SPEC: json.loads(spec.model_dump_json()),
-        PROVENANCE: provenance_document(job),
+        PROVENANCE: provenance,
         BEST: None if view is None else json.loads(view.model_dump_json()),
         ITERATIONS: [json.loads(iteration.model_dump_json()) for iteration in iterations],
     }
+    certified = None
+    if isinstance(spec, CertificateSpec) and len(columns) > spec.nominal_rows:
+        certified = summary(job.id, spec, columns)
+        documents[SUMMARY] = json.loads(certified.model_dump_json())
     files: dict[str, bytes] = {name: _json(document) for name, document in documents.items()}
     files[EVALUATIONS] = b"".join(encoded_table("parquet", spec, [columns]))
     files[ASKS] = _asks(spec, service.asked(job))
@@ -90,10 +134,7 @@ def _members(service: JobService, job: Job) -> Iterator[tuple[str, bytes]]:
         files[f"recordings/{name}.json"] = service.recording(name).model_dump_json().encode()
     for number, robot in enumerate(spec.described):
         files |= _robot(f"robots/{number}", robot)
-    pictures = dict(_pictures(spec, view, iterations))
-    files |= {f"figures/{name}.svg": picture.encode() for name, picture in pictures.items()}
-    files[PAGE] = page(job, view, documents[PROVENANCE], pictures, tuple(files)).encode()
-    yield from files.items()
+    return _Run(files, columns, iterations, provenance, view, certified)
 
 
 def provenance_document(job: Job) -> dict[str, Any]:

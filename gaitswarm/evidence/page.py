@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Any, Final
 
 from gaitswarm.evidence.archive import FORMAT, MANIFEST, VERSION
+from gaitswarm.evidence.certificates import Certified, how_to_make_one
 from gaitswarm.views import BestView
+from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView, WorldView
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from sim.robot import load_robot
 
 _STYLE: Final = """
 :root { color-scheme: light dark; }
@@ -22,12 +27,29 @@ code { font-size: 0.9em; overflow-wrap: anywhere; } .failed { color: #d1495b; }
 
 _DIGITS: Final = 6
 
+_SHOWN: Final = 10
+"""Worst worlds of a certificate; its member names more."""
+
+
+@dataclass(frozen=True, slots=True)
+class CertificateOnPage:
+    """A certificate as the page shows it.
+
+    Attributes:
+        view: What it comes to.
+        certified: Which design of the job it is of; None for the job that the page is of.
+    """
+
+    view: CertificateView
+    certified: Certified | None
+
 
 def page(
     job: Job,
     best: BestView | None,
     provenance: Mapping[str, Any],
     pictures: Mapping[str, str],
+    certificates: Sequence[CertificateOnPage],
     files: Sequence[str],
 ) -> str:
     """Write the page.
@@ -37,6 +59,7 @@ def page(
         best: Its best design; None while there is none.
         provenance: As `provenance_document` has it.
         pictures: SVG by name, "convergence" among them.
+        certificates: Of the job's designs, or the job itself.
         files: Names of the other members of the archive.
 
     Returns:
@@ -49,6 +72,7 @@ def page(
             *_result(job, best),
             *(f"<figure>{picture}</figure>" for picture in pictures.values()),
             *([] if best is None else _scenarios(job, best)),
+            *_certificates(job, certificates),
             *_provenance(provenance),
             *_contents(files),
         ]
@@ -104,6 +128,89 @@ def _scenarios(job: Job, best: BestView) -> Iterator[str]:
         for name, result in best.scenarios.items()
     ]
     yield from _table(heads, rows)
+
+
+def _certificates(job: Job, certificates: Sequence[CertificateOnPage]) -> Iterator[str]:
+    if certificates:
+        for certificate in certificates:
+            yield from _certificate(certificate)
+    elif isinstance(job.spec, JobSpec):
+        yield "<h2>Certificates</h2>"
+        yield f"<p>There is none of a design of this job. {_code(how_to_make_one(job.id))}.</p>"
+
+
+def _certificate(certificate: CertificateOnPage) -> Iterator[str]:
+    view, certified = certificate.view, certificate.certified
+    yield f"<h2>Certificate: {view.worlds} worlds</h2>"
+    facts = {"Job": view.job, "Worlds": f"{view.worlds}, drawn by seed {view.seed}"}
+    if certified is not None:
+        place = f"particle {certified.particle} of iteration {certified.iteration}"
+        facts["Design"] = f"the best, {place}" if certified.of_best else f"{place}, not the best"
+    facts["Robot"] = _robot_name(view)
+    facts["A walk failed in"] = _chance(view.failed)
+    facts["The robot fell in"] = _chance(view.fell)
+    yield from _table(["", ""], facts.items())
+    yield (
+        "<p>Utility by scenario, minimized; a failed walk is worse than any other. The probability"
+        " of one is at most so much, at 95 %. CVaR is the mean of the worst 5 %, a lower bound"
+        " where some failed. Scenarios with a star are held out: none of table 4.2.</p>"
+    )
+    heads = ["scenario", "failed", "at most", "nominal", "median", "95 %", "CVaR 95 %", "worst"]
+    rows = [
+        [f"{name} *" if found.held_out else name, *_spread(found.failed, found.utility)]
+        for name, found in view.scenarios.items()
+    ]
+    yield from _table(heads, [*rows, ["all", *_spread(view.failed, view.fitness)]])
+    yield "<h3>Worst worlds</h3>"
+    heads = ["world", "fitness", "failed in, or worst in", "walks again by"]
+    worst = view.worst[:_SHOWN]
+    yield from _table(heads, map(_world, worst))
+    if worst:
+        yield "<details><summary>Values of these worlds</summary>"
+        rows = [
+            [name, *(_shown(world.values.get(name)) for world in worst)] for name in worst[0].values
+        ]
+        yield from _table(["perturbation", *(f"world {world.world}" for world in worst)], rows)
+        yield "</details>"
+
+
+def _world(world: WorldView) -> list[str]:
+    failures = ", ".join(f"{name} ({status})" for name, status in world.failures.items())
+    where = failures or world.scenario
+    return [str(world.world), _shown(world.fitness), where, world.replay]
+
+
+def _spread(failed: ProportionView, spread: SpreadView) -> list[str]:
+    quantiles = ["failed" if q is None else _shown(q) for q in spread.quantiles]
+    cvar = _shown(spread.cvar)
+    return [
+        str(failed.count),
+        f"{100.0 * failed.high:.2g} %",
+        _shown(spread.nominal),
+        quantiles[2],
+        quantiles[4],
+        f"> {cvar}" if spread.tail_failed else cvar,
+        _shown(spread.worst),
+    ]
+
+
+def _chance(found: ProportionView) -> str:
+    return (
+        f"{found.count} ({100.0 * found.share:.3g} %; 95 % interval {100.0 * found.low:.2g} to"
+        f" {100.0 * found.high:.2g} %)"
+    )
+
+
+def _robot_name(view: CertificateView) -> str:
+    return load_robot(view.robot).description.name
+
+
+def _code(text: str) -> str:
+    """Text with code between backticks."""
+    parts = [escape(part) for part in text.split("`")]
+    return "".join(
+        f"<code>{part}</code>" if number % 2 else part for number, part in enumerate(parts)
+    )
 
 
 def _provenance(document: Mapping[str, Any]) -> Iterator[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from gaitswarm.evidence.archive import BadArchive, parsed_json
+from gaitswarm.evidence.archive import parsed_json
 from gaitswarm.evidence.contents import (
     ASKS,
     EVALUATIONS,
@@ -20,6 +20,7 @@ from gaitswarm.evidence.contents import (
     SPEC,
 )
 from gaitswarm.tables import EvaluationTable
+from gaitswarm.zip_archive import BadArchive
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.fork import Lineage

@@ -56,13 +56,16 @@ def has_same_bits_anywhere(spec: AnySpec, columns: EvaluationColumns) -> NDArray
 
 
 def simulated_differences(
-    tables: Sequence[tuple[AnySpec, EvaluationColumns]], recordings: Recordings
+    tables: Sequence[tuple[AnySpec, EvaluationColumns]],
+    recordings: Recordings,
+    certificate: str | None = None,
 ) -> list[DifferenceView]:
     """Simulate evaluations, and list what is not the same to the bit.
 
     Args:
         tables: Evaluations, with a spec that says in which cases and precision they were made.
         recordings: Recorded walks that the cases need.
+        certificate: Id of the one that they are of; None for the job itself.
 
     Returns:
         Every objective and status that differs, in the order of the tables and their cases.
@@ -82,7 +85,7 @@ def simulated_differences(
             outcomes = evaluator.evaluate(request, lambda: False)
             for number, (case, outcome) in enumerate(zip(spec.case_names, outcomes, strict=True)):
                 found += _different(spec, columns, number, case, outcome)
-    return found
+    return [one.model_copy(update={"certificate": certificate}) for one in found]
 
 
 def _different(

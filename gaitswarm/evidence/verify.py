@@ -3,48 +3,38 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import secrets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gaitswarm.errors import InvalidRequest, NotFound, Unavailable
-from gaitswarm.evidence.archive import (
-    LARGEST_ARCHIVE,
-    BadArchive,
-    check_hashes,
-    parsed_json,
-    read_archive,
+from gaitswarm.evidence.archive import check_hashes
+from gaitswarm.evidence.certificates import (
+    SUMMARY,
+    by_certificate,
+    certified_at,
+    how_to_make_one,
 )
-from gaitswarm.evidence.contents import BEST, best_of, row_of
-from gaitswarm.evidence.reading import Evidence, by_iteration, read_evidence
+from gaitswarm.evidence.checks import (
+    Answer,
+    best_row,
+    changes_of_provenance,
+    checks_of,
+)
+from gaitswarm.evidence.contents import JOB, row_of
+from gaitswarm.evidence.reading import Evidence, read_evidence
 from gaitswarm.evidence.replay import has_same_bits_anywhere, simulated_differences, why_no_replay
-from gaitswarm.views import BestView
 from gaitswarm.views.verification import CheckView, DifferenceView, VerificationView
-from services.optimizer.analysis.search_path import retraced
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.iteration import best_particle
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.search.registry import METHODS
-from sim.kernel.source import kernel_identity
-from sim.robot import load_robot
-
-Floats = NDArray[np.float64]
+from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
+from services.optimizer.jobs.kinds.tuning import JobSpec
 
 _SHOWN: Final = 100
 """Differences that are listed."""
-
-_DIGITS: Final = 32
-
-Answer = tuple[bool | None, str]
-"""Whether a check passed, None where the job rules it out; and what was found."""
 
 
 @dataclass(slots=True)
@@ -55,8 +45,12 @@ class _Found:
     job: str | None = None
     replayed: int = 0
 
-    def add(self, name: str, passed: bool | None, detail: str) -> None:
-        self.checks.append(CheckView(name=name, passed=passed, detail=detail))
+    def add(
+        self, name: str, passed: bool | None, detail: str, certificate: str | None = None
+    ) -> None:
+        self.checks.append(
+            CheckView(name=name, passed=passed, detail=detail, certificate=certificate)
+        )
 
 
 def verify(
@@ -68,14 +62,14 @@ def verify(
 
     Args:
         evidence: The file's name, or its content as `Jobs.evidence` writes it.
-        replay: Evaluations to draw and simulate anew, besides the best one; 0 for no walk at all.
+        replay: Evaluations to draw and simulate anew, besides the best one, of the job and of each
+            certificate in its evidence; 0 for no walk at all.
         seed: By which they are drawn; None for one that nobody can foresee.
 
     Returns:
         What was checked, and what differs.
 
     Raises:
-        NotFound: There is no such file.
         NotFound: There is no such file.
         InvalidRequest: The file cannot be opened, or `replay` or `seed` is negative.
         EvaluatorUnavailable: Walks cannot be run here.
@@ -113,28 +107,77 @@ def _content(path: Path) -> bytes:
 
 
 def _check(content: bytes, found: _Found, replay: int, seed: int) -> None:
-    members = read_archive(content)
+    members = unzipped(content)
     wrong = check_hashes(members)
     found.add("archive", True, f"{len(members)} members, none compressed or hidden")
     hashes = f"SHA-256 of {len(members) - 1} members are those of the manifest"
     found.add("hashes", not wrong, "; ".join(wrong[:5]) or hashes)
-    evidence = read_evidence(members)
+    evidence = _check_run(members, found, replay, np.random.default_rng(seed))
     found.job = evidence.job.id
+    certificates = by_certificate(members)
+    for number, (job_id, own) in enumerate(sorted(certificates.items())):
+        drawn = np.random.default_rng((seed, number))
+        try:
+            _check_certificate(evidence, job_id, own, found, replay, drawn)
+        except BadArchive as error:
+            found.add("contents", False, str(error), job_id)
+    if isinstance(evidence.spec, JobSpec):
+        said = f"{len(certificates)} of designs of this job"
+        none = f"there is none; {how_to_make_one(evidence.job.id)}"
+        passed = True if certificates else None
+        found.add("certificates", passed, said if certificates else none)
+
+
+def _check_certificate(
+    evidence: Evidence,
+    job_id: str,
+    members: Mapping[str, bytes],
+    found: _Found,
+    replay: int,
+    drawn: np.random.Generator,
+) -> None:
+    """evidence: of the job that tried the design. Raises BadArchive."""
+    if SUMMARY not in members:
+        raise BadArchive(f"it has no {SUMMARY}")
+    certificate = _check_run(members, found, replay, drawn, job_id)
+    if certificate.job.id != job_id:
+        raise BadArchive(f"{JOB} is of another certificate than its folder")
+    passed, detail = _tried(lambda: _design(evidence, certificate))
+    found.add("design", passed, detail, job_id)
+
+
+def _design(evidence: Evidence, certificate: Evidence) -> Answer:
+    """The design that is certified is one of those that the job tried."""
+    best, spec, place = evidence.job.best, evidence.spec, None
+    if isinstance(spec, JobSpec):
+        place = certified_at(spec, evidence.columns, certificate.spec)
+    if place is None:
+        return False, "it is of no design that this job tried"
+    is_best = best is not None and place == (best.iteration, best.particle)
+    what = "the best" if is_best else "not the best"
+    return True, f"it is of particle {place[1]} of iteration {place[0]}, {what}"
+
+
+def _check_run(
+    members: Mapping[str, bytes],
+    found: _Found,
+    replay: int,
+    drawn: np.random.Generator,
+    certificate: str | None = None,
+) -> Evidence:
+    """certificate: id of the one that the members are of. Raises BadArchive."""
+    evidence = read_evidence(members)
     rows = f"{len(evidence.columns)} evaluations in {len(evidence.asked)} iterations"
-    found.add("contents", True, f"{rows}, all as the spec has them")
-    for name, check in (
-        ("robot", lambda: _robot(evidence, members)),
-        ("fitness", lambda: _fitness(evidence)),
-        ("best", lambda: _best(evidence, members)),
-        ("designs", lambda: _designs(evidence)),
-        ("search", lambda: _search(evidence)),
-    ):
+    found.add("contents", True, f"{rows}, all as the spec has them", certificate)
+    for name, check in checks_of(evidence, members).items():
         passed, detail = _tried(check)
-        found.add(name, passed, detail)
-    found.provenance += _provenance(evidence)
+        found.add(name, passed, detail, certificate)
+    whose = "" if certificate is None else f"certificate {certificate}: "
+    found.provenance += [f"{whose}{change}" for change in changes_of_provenance(evidence)]
     if replay:
-        passed, detail = _tried(lambda: _replay(evidence, found, replay, seed))
-        found.add("replay", passed, detail)
+        passed, detail = _tried(lambda: _replay(evidence, found, replay, drawn, certificate))
+        found.add("replay", passed, detail, certificate)
+    return evidence
 
 
 def _tried(check: Callable[[], Answer]) -> Answer:
@@ -146,148 +189,36 @@ def _tried(check: Callable[[], Answer]) -> Answer:
         return False, f"cannot be computed: {type(error).__name__}: {str(error)[:200]}"
 
 
-def _tables(evidence: Evidence) -> Iterator[tuple[AnySpec, EvaluationColumns]]:
-    yield evidence.spec, evidence.columns
-    if evidence.reevaluated is not None:
-        yield evidence.spec.in_double(), evidence.reevaluated
-
-
-def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """The robots' files are those of which the provenance has the digest."""
-    if not evidence.provenance.records:
-        return None, "the job was stored before digests of robots were recorded"
-    content = b""
-    for number in range(len(evidence.spec.described)):
-        folder = f"robots/{number}"
-        for name in (f"{folder}/description.json", f"{folder}/robot.urdf"):
-            if name not in members:
-                return False, f"it has no {name}"
-            content += members[name]
-    expected = evidence.provenance.records[-1].provenance.simulation.robot_digest
-    if hashlib.sha256(content).hexdigest()[:_DIGITS] != expected:
-        return False, "the robot's files are not those that the provenance names"
-    return True, f"its files have the digest {expected} of the provenance"
-
-
-def _fitness(evidence: Evidence) -> Answer:
-    """Fitness follows from raw objectives."""
-    wrong, count = 0, 0
-    for spec, columns in _tables(evidence):
-        judged = _judged(spec, columns)
-        wrong += int((judged.view(np.uint64) != columns.fitness.view(np.uint64)).sum())
-        count += len(columns)
-    if wrong:
-        return False, f"{wrong} of {count} do not follow from the raw objectives"
-    return True, f"{count} of {count} follow from the raw objectives, to the bit"
-
-
-def _judged(spec: AnySpec, columns: EvaluationColumns) -> Floats:
-    # What is not finite is stored as nothing, and was infinite where the walk succeeded.
-    lost = ~columns.failed[:, :, np.newaxis] & np.isnan(columns.objectives)
-    with np.errstate(all="ignore"):
-        objectives = np.where(lost, np.inf, columns.objectives)
-        return np.ascontiguousarray(spec.judge(objectives, columns.failed).fitness)
-
-
-def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """The best is the earliest of least fitness, in double precision, and is shown as it is."""
-    best, said = best_of(evidence.columns, evidence.reevaluated), evidence.job.best
-    if best is None or said is None:
-        return best is None and said is None, "no design has walked in every case"
-    where = (best.iteration, best.particle)
-    fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
-    if (said.iteration, said.particle, said.fitness) != (*where, fitness):
-        return False, (
-            f"particle {where[1]} of iteration {where[0]} is the best with {fitness!r}, not the one"
-            " that is named"
-        )
-    shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
-    if parsed_json(members.get(BEST, b""), BEST) != shown:
-        return False, f"{BEST} does not show particle {where[1]} of iteration {where[0]}"
-    return True, f"particle {where[1]} of iteration {where[0]}, {fitness!r}, is the least of all"
-
-
-def _best_row(evidence: Evidence) -> tuple[int | None, EvaluationColumns]:
-    """Its row in the table of what was judged in double."""
-    judged = evidence.columns if evidence.reevaluated is None else evidence.reevaluated
-    return (best_particle(judged.fitness) if len(judged) else None), judged
-
-
-def _designs(evidence: Evidence) -> Answer:
-    """Designs are those that the asks stand for."""
-    space = evidence.spec.design_space()
-    designs = space.designs(np.concatenate(evidence.asked))
-    wrong = int((designs != evidence.columns.designs).any(axis=1).sum())
-    if wrong:
-        return False, f"{wrong} of {len(designs)} are not what the search asked for"
-    return True, f"{len(designs)} of {len(designs)} are what the search asked for"
-
-
-def _search(evidence: Evidence) -> Answer:
-    """The search, told the same, asks for the same."""
-    spec, lineage = evidence.spec, evidence.job.lineage
-    method = METHODS[spec.search.name]
-    if method.missing:
-        return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
-    columns = evidence.columns
-    told = by_iteration(evidence, spec.told(columns.objectives, columns.failed, columns.fitness))
-    try:
-        retraced(spec, evidence.job.budgets, evidence.asked, told)
-    except ValueError as error:
-        if lineage is not None and lineage.carried == "search" and "preference" in lineage.changed:
-            return None, "its memory was judged anew by another preference when it was forked"
-        return False, f"{error}: other code, another seed, or numbers that it was never told"
-    return True, f"{spec.search.name} asks for the same designs in {len(told)} iterations"
-
-
-def _provenance(evidence: Evidence) -> Iterator[str]:
-    """What is different here, and what that means."""
-    spec, here = evidence.spec, job_provenance(evidence.spec)
-    found: list[str] = []
-    for record in evidence.provenance.records:
-        found += [
-            f"from iteration {record.from_iteration} on: {change}"
-            for change in record.provenance.changes(here)
-        ]
-    if not evidence.provenance.records:
-        found.append("the job was stored before gaitswarm recorded what numbers depend on")
-    yield from found
-    if not found:
-        return
-    kernels = tuple(kernel_identity(load_robot(r), spec.precision).hex() for r in spec.described)
-    if kernels == evidence.provenance.kernels:
-        yield (
-            "the kernels have the source that they had when the file was written: physics and"
-            " control loop are the same, and what differs lies around them"
-        )
-    else:
-        yield "kernels have another source than when the file was written: walks may differ"
-    yield "equal bits in the replay show that none of this matters for what was replayed"
-
-
-def _replay(evidence: Evidence, found: _Found, replay: int, seed: int) -> Answer:
+def _replay(
+    evidence: Evidence,
+    found: _Found,
+    replay: int,
+    drawn: np.random.Generator,
+    certificate: str | None,
+) -> Answer:
     """Evaluations that are drawn, and the best one, come to the same bits here."""
     spec, columns = evidence.spec, evidence.columns
     refused = why_no_replay(spec)
     if refused is not None:
         return refused
     repeatable = has_same_bits_anywhere(spec, columns)
-    drawn = np.random.default_rng(seed).permutation(np.flatnonzero(repeatable))[:replay]
-    row, judged = _best_row(evidence)
-    best = drawn[:0]
+    chosen = drawn.permutation(np.flatnonzero(repeatable))[:replay]
+    row, judged = best_row(evidence)
+    best = chosen[:0]
     if row is not None:
         where = (int(judged.iteration[row]), int(judged.particle[row]))
         at = np.array([row_of(columns, *where)])
         best = at[repeatable[at]]
-    rows = np.unique(np.concatenate([drawn, best]))
+    rows = np.unique(np.concatenate([chosen, best]))
     tables = [(spec, columns.rows(rows))]
     if evidence.reevaluated is not None and len(best):
         tables.append((spec.in_double(), evidence.reevaluated.rows(np.array([row]))))
-    found.differences = simulated_differences(tables, evidence.recordings)
-    found.replayed = len(rows)
+    differences = simulated_differences(tables, evidence.recordings, certificate)
+    found.differences += differences
+    found.replayed += len(rows)
     among = ", the best among them," if len(best) else ""
     what = f"{len(rows)} evaluations{among} in {len(spec.case_names)} cases"
-    if not found.differences:
+    if not differences:
         return True, f"{what}: every bit is the same"
-    evaluations = len({(d.iteration, d.particle) for d in found.differences})
-    return False, f"{what}: {len(found.differences)} numbers of {evaluations} of them differ"
+    evaluations = len({(d.iteration, d.particle) for d in differences})
+    return False, f"{what}: {len(differences)} numbers of {evaluations} of them differ"

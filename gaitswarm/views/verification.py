@@ -11,7 +11,8 @@ class CheckView(View):
     """One thing that was checked."""
 
     name: str = Field(
-        description="archive, hashes, contents, robot, fitness, best, designs, search, replay.",
+        description="archive, hashes, contents, robot, fitness, best, designs, search, replay,"
+        " certificates; of a certificate also summary, design.",
         examples=["fitness"],
     )
     passed: bool | None = Field(
@@ -21,6 +22,10 @@ class CheckView(View):
     detail: str = Field(
         description="What was compared, or what differs.",
         examples=["625 of 625 follow from the raw objectives, to the bit"],
+    )
+    certificate: str | None = Field(
+        default=None,
+        description="Identifier of the certificate that it is about; null for the job itself.",
     )
 
 
@@ -33,6 +38,9 @@ class DifferenceView(View):
     what: str = Field(description="Objective, or `status`.", examples=["torque"])
     stored: float | str | None = Field(description="As the evidence has it.", examples=[8.71])
     simulated: float | str | None = Field(description="As it is here and now.", examples=[8.72])
+    certificate: str | None = Field(
+        default=None, description="The certificate that it is of; null for the job itself."
+    )
 
 
 class VerificationView(View):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import MANIFEST, archived, read_archive
+from gaitswarm.evidence.archive import MANIFEST, archived
+from gaitswarm.zip_archive import unzipped
 from tests.examples.walks import SHORT_WALK
 
 JOB: dict[str, Any] = {
@@ -49,12 +51,54 @@ def proved(tmp_path_factory: pytest.TempPathFactory) -> Proved:
         return Proved(db, run.job.id, jobs.evidence(run.job.id))
 
 
+@dataclass(frozen=True, slots=True)
+class Certified:
+    """A database with a finished job and certificates of its designs, and the job's evidence."""
+
+    db: Path
+    id: str
+    of_best: str
+    of_another: str
+    content: bytes
+
+
+def certificate_of(design: Mapping[str, float | str], **changes: Any) -> dict[str, Any]:
+    """A certificate of five worlds of a step, as a document."""
+    return {
+        "kind": "certificate",
+        "controller": "pi",
+        "design": dict(design),
+        "scenarios": [SHORT_WALK],
+        "worlds": 5,
+        "optimizer": {"name": "random", "particles": 3},
+        **changes,
+    }
+
+
+@pytest.fixture(scope="session")
+def certified(proved: Proved, tmp_path_factory: pytest.TempPathFactory) -> Certified:
+    db = Path(shutil.copy(proved.db, tmp_path_factory.mktemp("certified") / "jobs.db"))
+    with gaitswarm.open(db) as jobs:
+        best = jobs.best(proved.id)
+        others = next(jobs.history(proved.id)).evaluations
+        other = next(e for e in others if e.design != best.design)
+        documents = (
+            certificate_of(best.design, name="<of the best>"),
+            certificate_of(other.design, precision="single"),
+            certificate_of({"P": 0.4, "I": 0.2}),
+        )
+        of_best, of_another, _ = (jobs.run(jobs.submit(d).id).id for d in documents)
+        # Neither finished nor of this job: left out.
+        jobs.submit(certificate_of(best.design))
+        return Certified(db, proved.id, of_best, of_another, jobs.evidence(proved.id))
+
+
 Change = Callable[[bytes], bytes]
 
 
 def tampered(content: bytes, changes: dict[str, Change]) -> bytes:
     """Evidence with other members, and a manifest that says so."""
-    members = read_archive(content)
+    members = unzipped(content)
     del members[MANIFEST]
     return archived(
         {name: changes[name](m) if name in changes else m for name, m in members.items()}
@@ -78,7 +122,7 @@ def with_cells(changes: Callable[[dict[str, list[Any]]], None]) -> Change:
 
 def with_manifest(content: bytes, manifest: dict[str, Any]) -> bytes:
     """An archive with a manifest of one's own."""
-    members = read_archive(content) | {MANIFEST: json.dumps(manifest).encode()}
+    members = unzipped(content) | {MANIFEST: json.dumps(manifest).encode()}
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name, member in members.items():

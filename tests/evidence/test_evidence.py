@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import read_archive
 from gaitswarm.evidence.contents import evidence
+from gaitswarm.zip_archive import unzipped
 from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
@@ -77,7 +77,7 @@ def test_every_file_but_the_manifest_has_its_hash_in_it(proved: Proved) -> None:
 
 
 def test_all_of_a_job_is_in_it(proved: Proved) -> None:
-    members = read_archive(proved.content)
+    members = unzipped(proved.content)
     job, spec = (json.loads(members[name]) for name in ("job.json", "spec.json"))
     assert (job["id"], job["iterations"], job["evaluations"]) == (proved.id, 3, 12)
     assert spec["name"] == JOB["name"]
@@ -93,7 +93,7 @@ def test_all_of_a_job_is_in_it(proved: Proved) -> None:
 
 
 def test_its_pictures_are_drawings_and_its_page_needs_no_network(proved: Proved) -> None:
-    members = read_archive(proved.content)
+    members = unzipped(proved.content)
     for name in ("figures/convergence.svg", "figures/scenarios.svg"):
         assert ET.fromstring(members[name]).tag.endswith("svg")  # noqa: S314
     page = members["index.html"].decode()

@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import MANIFEST, archived, read_archive
+from gaitswarm.evidence.archive import MANIFEST, archived
+from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import EVALUATIONS, Proved, tampered, with_manifest
 
 pytestmark = pytest.mark.slow
@@ -78,7 +79,7 @@ def test_names_that_occur_twice_are_refused() -> None:
 
 
 def test_every_member_that_counts_is_missed(proved: Proved) -> None:
-    members = read_archive(proved.content)
+    members = unzipped(proved.content)
     assert f"it has no {MANIFEST}" in refusal(zipped({"a": b""}))
     for name in ("job.json", "spec.json", "provenance.json", EVALUATIONS, "history/asks.parquet"):
         kept = {n: c for n, c in members.items() if n not in (name, MANIFEST)}
@@ -102,7 +103,7 @@ def test_documents_that_are_none_are_refused(proved: Proved, document: bytes) ->
 
 
 def test_a_manifest_that_is_none_is_refused(proved: Proved) -> None:
-    members = read_archive(proved.content)
+    members = unzipped(proved.content)
     for document, why in (
         (b"[]", "is none of"),
         (b"{}", "is none of"),
@@ -113,7 +114,7 @@ def test_a_manifest_that_is_none_is_refused(proved: Proved) -> None:
 
 
 def test_a_manifest_cannot_vouch_for_itself(proved: Proved) -> None:
-    manifest = json.loads(read_archive(proved.content)[MANIFEST])
+    manifest = json.loads(unzipped(proved.content)[MANIFEST])
     manifest["files"][MANIFEST] = {"sha256": "0" * 64, "bytes": 1}
     found = gaitswarm.verify(with_manifest(proved.content, manifest), replay=0)
     assert [check.detail for check in found.checks if check.passed is False] == [
@@ -162,7 +163,7 @@ def test_tables_that_are_not_of_the_job_are_refused(
 
 def test_flipped_bits_anywhere_never_end_in_anything_but_a_finding(proved: Proved) -> None:
     draw = random.Random(1)
-    members = read_archive(proved.content)
+    members = unzipped(proved.content)
     names = [n for n in members if n.startswith(("job", "spec", "prov", "history"))]
 
     def flipped(content: bytes) -> bytes:

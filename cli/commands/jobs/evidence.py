@@ -50,7 +50,10 @@ def verify(
     replay: Annotated[
         int,
         typer.Option(
-            min=0, metavar="N", help="Evaluations to draw and simulate anew, besides the best one."
+            min=0,
+            metavar="N",
+            help="Evaluations to draw and simulate anew, of the job and of each certificate,"
+            " besides the best one.",
         ),
     ] = 20,
     seed: Annotated[
@@ -96,13 +99,15 @@ def _print(found: VerificationView) -> None:
     said = {True: ("passed", "green"), False: ("FAILED", "red"), None: ("not checked", "yellow")}
     for check in found.checks:
         word, style = said[check.passed]
-        table.add_row(check.name, Text(word, style=style), Text(check.detail))
+        whose = "" if check.certificate is None else f"certificate {check.certificate}: "
+        table.add_row(Text(f"{whose}{check.name}"), Text(word, style=style), Text(check.detail))
     console.print(table)
     for difference in found.differences[:10]:
         values = (number(difference.stored, 17), number(difference.simulated, 17))
+        whose = "" if difference.certificate is None else f"certificate {difference.certificate}, "
         console.print(
-            f"iteration {difference.iteration}, particle {difference.particle}, {difference.case},"
-            f" {difference.what}: stored {values[0]}, simulated {values[1]}",
+            f"{whose}iteration {difference.iteration}, particle {difference.particle},"
+            f" {difference.case}, {difference.what}: stored {values[0]}, simulated {values[1]}",
             markup=False,
         )
     if found.provenance:

@@ -1,0 +1,200 @@
+"""What follows from what in the evidence of one run, computed again without a walk."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.evidence.archive import parsed_json
+from gaitswarm.evidence.certificates import SUMMARY, summary_differs
+from gaitswarm.evidence.contents import BEST, best_of
+from gaitswarm.evidence.reading import Evidence, by_iteration
+from gaitswarm.views import BestView
+from services.optimizer.analysis.search_path import retraced
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.iteration import best_particle
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.provenance import job_provenance
+from services.optimizer.search.registry import METHODS
+from sim.kernel.source import kernel_identity
+from sim.robot import load_robot
+
+Floats = NDArray[np.float64]
+
+_DIGITS: Final = 32
+
+Answer = tuple[bool | None, str]
+"""Whether a check passed, None where the job rules it out; and what was found."""
+
+
+def checks_of(evidence: Evidence, members: Mapping[str, bytes]) -> dict[str, Callable[[], Answer]]:
+    """List what can be checked of a run without a walk.
+
+    Args:
+        evidence: Of the run, as it was read.
+        members: That it was read from.
+
+    Returns:
+        Checks by name, in their order; each may raise whatever comes of numbers that make no sense.
+    """
+    found: dict[str, Callable[[], Answer]] = {
+        "robot": lambda: _robot(evidence, members),
+        "fitness": lambda: _fitness(evidence),
+        "best": lambda: _best(evidence, members),
+        "designs": lambda: _designs(evidence),
+        "search": lambda: _search(evidence),
+    }
+    if SUMMARY in members:
+        found["summary"] = lambda: _summary(evidence, members)
+    return found
+
+
+def _tables(evidence: Evidence) -> Iterator[tuple[AnySpec, EvaluationColumns]]:
+    yield evidence.spec, evidence.columns
+    if evidence.reevaluated is not None:
+        yield evidence.spec.in_double(), evidence.reevaluated
+
+
+def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+    """The robots' files are those of which the provenance has the digest."""
+    if not evidence.provenance.records:
+        return None, "the job was stored before digests of robots were recorded"
+    content = b""
+    for number in range(len(evidence.spec.described)):
+        folder = f"robots/{number}"
+        for name in (f"{folder}/description.json", f"{folder}/robot.urdf"):
+            if name not in members:
+                return False, f"it has no {name}"
+            content += members[name]
+    expected = evidence.provenance.records[-1].provenance.simulation.robot_digest
+    if hashlib.sha256(content).hexdigest()[:_DIGITS] != expected:
+        return False, "the robot's files are not those that the provenance names"
+    return True, f"its files have the digest {expected} of the provenance"
+
+
+def _fitness(evidence: Evidence) -> Answer:
+    """Fitness follows from raw objectives."""
+    wrong, count = 0, 0
+    for spec, columns in _tables(evidence):
+        judged = _judged(spec, columns)
+        wrong += int((judged.view(np.uint64) != columns.fitness.view(np.uint64)).sum())
+        count += len(columns)
+    if wrong:
+        return False, f"{wrong} of {count} do not follow from the raw objectives"
+    return True, f"{count} of {count} follow from the raw objectives, to the bit"
+
+
+def _judged(spec: AnySpec, columns: EvaluationColumns) -> Floats:
+    # What is not finite is stored as nothing, and was infinite where the walk succeeded.
+    lost = ~columns.failed[:, :, np.newaxis] & np.isnan(columns.objectives)
+    with np.errstate(all="ignore"):
+        objectives = np.where(lost, np.inf, columns.objectives)
+        return np.ascontiguousarray(spec.judge(objectives, columns.failed).fitness)
+
+
+def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+    """The best is the earliest of least fitness, in double precision, and is shown as it is."""
+    best, said = best_of(evidence.columns, evidence.reevaluated), evidence.job.best
+    if best is None or said is None:
+        return best is None and said is None, "no design has walked in every case"
+    where = (best.iteration, best.particle)
+    fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
+    if (said.iteration, said.particle, said.fitness) != (*where, fitness):
+        return False, (
+            f"particle {where[1]} of iteration {where[0]} is the best with {fitness!r}, not the one"
+            " that is named"
+        )
+    shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
+    if parsed_json(members.get(BEST, b""), BEST) != shown:
+        return False, f"{BEST} does not show particle {where[1]} of iteration {where[0]}"
+    return True, f"particle {where[1]} of iteration {where[0]}, {fitness!r}, is the least of all"
+
+
+def best_row(evidence: Evidence) -> tuple[int | None, EvaluationColumns]:
+    """Find the best evaluation.
+
+    Args:
+        evidence: Of the run.
+
+    Returns:
+        Its row, None where no design has walked in every case, in the table of what was judged in
+        double; and that table.
+    """
+    judged = evidence.columns if evidence.reevaluated is None else evidence.reevaluated
+    return (best_particle(judged.fitness) if len(judged) else None), judged
+
+
+def _designs(evidence: Evidence) -> Answer:
+    """Designs are those that the asks stand for."""
+    space = evidence.spec.design_space()
+    designs = space.designs(np.concatenate(evidence.asked))
+    wrong = int((designs != evidence.columns.designs).any(axis=1).sum())
+    if wrong:
+        return False, f"{wrong} of {len(designs)} are not what the search asked for"
+    return True, f"{len(designs)} of {len(designs)} are what the search asked for"
+
+
+def _search(evidence: Evidence) -> Answer:
+    """The search, told the same, asks for the same."""
+    spec, lineage = evidence.spec, evidence.job.lineage
+    method = METHODS[spec.search.name]
+    if method.missing:
+        return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
+    columns = evidence.columns
+    told = by_iteration(evidence, spec.told(columns.objectives, columns.failed, columns.fitness))
+    try:
+        retraced(spec, evidence.job.budgets, evidence.asked, told)
+    except ValueError as error:
+        if lineage is not None and lineage.carried == "search" and "preference" in lineage.changed:
+            return None, "its memory was judged anew by another preference when it was forked"
+        return False, f"{error}: other code, another seed, or numbers that it was never told"
+    return True, f"{spec.search.name} asks for the same designs in {len(told)} iterations"
+
+
+def _summary(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
+    """What a certificate says follows from its walks."""
+    spec = evidence.spec
+    if not isinstance(spec, CertificateSpec):
+        return False, f"a job of kind {spec.kind} has no {SUMMARY}"
+    where = summary_differs(evidence.job.id, spec, evidence.columns, members[SUMMARY])
+    if where is not None:
+        return False, f"{SUMMARY} says another {where} than follows from the evaluations"
+    return True, f"{SUMMARY} follows from {len(evidence.columns)} evaluations"
+
+
+def changes_of_provenance(evidence: Evidence) -> Iterator[str]:
+    """Say what numbers depend on that is different here, and what that means.
+
+    Args:
+        evidence: Of the run.
+
+    Returns:
+        Sentences; none if all is as it was.
+    """
+    spec, here = evidence.spec, job_provenance(evidence.spec)
+    found: list[str] = []
+    for record in evidence.provenance.records:
+        found += [
+            f"from iteration {record.from_iteration} on: {change}"
+            for change in record.provenance.changes(here)
+        ]
+    if not evidence.provenance.records:
+        found.append("the job was stored before gaitswarm recorded what numbers depend on")
+    yield from found
+    if not found:
+        return
+    kernels = tuple(kernel_identity(load_robot(r), spec.precision).hex() for r in spec.described)
+    if kernels == evidence.provenance.kernels:
+        yield (
+            "the kernels have the source that they had when the file was written: physics and"
+            " control loop are the same, and what differs lies around them"
+        )
+    else:
+        yield "kernels have another source than when the file was written: walks may differ"
+    yield "equal bits in the replay show that none of this matters for what was replayed"

@@ -114,7 +114,7 @@ def _lay_settings(chosen: dict[str, Any], asked: object) -> None:
     from services.optimizer.jobs.optimizer_choice import with_settings
 
     text, particles = chosen.pop("optimizer_settings", None), chosen.pop("particles", None)
-    settings = {} if text is None else _settings_object(text)
+    settings = {} if text is None else json_object(text, "optimizer-settings")
     if particles is not None:
         settings["particles"] = particles
     if not settings:
@@ -167,15 +167,17 @@ def preference_choice(text: str) -> str | dict[str, Any]:
     return chosen
 
 
-def _settings_object(text: str) -> dict[str, Any]:
-    """A JSON object as text, or that in FILE or @FILE. Raises InvalidRequest."""
-    field = "optimizer-settings"
+def json_object(text: str, what: str) -> dict[str, Any]:
+    """A JSON object as text, or that in FILE or @FILE.
+
+    what: name of the option, for messages. Raises InvalidRequest.
+    """
     if not text.lstrip().startswith("{"):
-        return read_json_object(Path(text.removeprefix("@")), field)
+        return read_json_object(Path(text.removeprefix("@")), what)
     try:
         value: dict[str, Any] = json.loads(text, object_pairs_hook=_without_repeats)
     except (ValueError, RecursionError) as error:
-        raise InvalidRequest(f"is not valid JSON: {error}", field=field) from error
+        raise InvalidRequest(f"is not valid JSON: {error}", field=what) from error
     return value
 
 

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.optimization import OptimizationResult, optimize, optimizers
     from gaitswarm.preferences import robust_preferences
+    from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation import robustness, simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
@@ -143,6 +144,7 @@ __all__ = [
     "EvaluationTable",
     "EvaluationView",
     "EvaluatorUnavailable",
+    "FirmwareOptions",
     "FirmwareView",
     "Forbidden",
     "FrontView",
@@ -243,6 +245,7 @@ _MODULES: Final = {
     "gaitswarm.jobs.server": ("ServerJobs",),
     "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
     "gaitswarm.preferences": ("robust_preferences",),
+    "gaitswarm.requests.firmware": ("FirmwareOptions",),
     "gaitswarm.requests.robustness": ("RobustnessOptions",),
     "gaitswarm.simulation": ("robustness", "simulate"),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),

@@ -10,13 +10,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from gaitswarm.errors import InvalidRequest, simulation_errors
-from gaitswarm.requests import arguments
+from gaitswarm.errors import InvalidRequest
+from gaitswarm.requests import design_arguments
+from gaitswarm.requests.firmware import FirmwareRequest, firmware_view, run_firmware
 from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views.firmware import FirmwareView
 from sim.controllers import ControllerName
-from sim.firmware import FORMAT, MANIFEST, check_table_bits, firmware_of
+from sim.firmware import FORMAT, MANIFEST
 from sim.robot import DEFAULT_ROBOT
 
 _BUILT: Final = "build"
@@ -59,46 +60,49 @@ def write_firmware(
             holds anything but firmware or cannot be written; names the argument.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    request = arguments.simulation(
+    request = design_arguments.firmware(
         design,
-        scenarios=scenarios,
-        controller=controller,
-        robot=robot,
-        preference="A",
-        precision="double",
-        log=False,
+        {
+            "scenarios": scenarios,
+            "controller": controller,
+            "robot": robot,
+            "label": label,
+            "table_bits": table_bits,
+        },
     )
-    request.check_walks()
-    target = Path(output)
-    _check_replaceable(target)
-    if table_bits is not None:
-        with simulation_errors("table_bits"):
-            check_table_bits(request.controller, table_bits)
-    with simulation_errors("scenarios"):
-        firmware = firmware_of(
-            request.robot,
-            request.controller,
-            request.numbers,
-            request.resolved_scenarios(),
-            label=label,
-            table_bits=table_bits,
-        )
-    with _replacing(target) as new:
-        for name, content in firmware.files.items():
-            path = new / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-    return FirmwareView.from_firmware(
-        firmware,
-        folder=str(output),
-        label=label,
-        controller=request.controller,
-        design=request.numbers,
-    )
+    return written_firmware(request, output)
 
 
-def _check_replaceable(folder: Path) -> None:
-    """Raises InvalidRequest unless all in the folder was written here, or built of it."""
+def written_firmware(request: FirmwareRequest, output: str | os.PathLike[str]) -> FirmwareView:
+    """Write firmware that is asked for into a folder.
+
+    Args:
+        request: The design and its scenarios.
+        output: Folder to write; one that holds firmware is replaced, as a whole or not at all.
+
+    Returns:
+        Files, their sizes, and what they take of the thesis's microcontroller.
+
+    Raises:
+        InvalidRequest: The design cannot be written, or the folder cannot; names the field.
+        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
+    """
+    check_replaceable(output)
+    firmware = run_firmware(request)
+    write_folder(output, firmware.files)
+    return firmware_view(request, firmware, str(output))
+
+
+def check_replaceable(output: str | os.PathLike[str]) -> None:
+    """Check that a folder is not there, is empty, or holds firmware and what was built of it.
+
+    Args:
+        output: The folder.
+
+    Raises:
+        InvalidRequest: It holds anything else, or is a file; names one.
+    """
+    folder = Path(output)
     if not folder.exists():
         return
     if not folder.is_dir():
@@ -114,6 +118,23 @@ def _check_replaceable(folder: Path) -> None:
             f"{folder} holds files that are no firmware, such as {foreign[0]}; name another folder",
             field="output",
         )
+
+
+def write_folder(output: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
+    """Write files into a folder of their own, in place of what is there.
+
+    Args:
+        output: The folder, as `check_replaceable` wants it; replaced as a whole or not at all.
+        files: Contents by path.
+
+    Raises:
+        InvalidRequest: It cannot be written.
+    """
+    with _replacing(Path(output)) as new:
+        for name, content in files.items():
+            path = new / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
 
 
 def _written_files(folder: Path) -> set[str]:

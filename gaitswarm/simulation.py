@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaitswarm.errors import InvalidRequest, simulation_errors
-from gaitswarm.requests import arguments
+from gaitswarm.requests import design_arguments
 from gaitswarm.requests.robustness import Progress, RobustnessOptions, run_robustness
 from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.simulation_result import SimulationResult
@@ -24,7 +24,7 @@ from services.optimizer.jobs.preference import judge
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.runtime import open_evaluator
 from sim.assembly import Backend
-from sim.case import MeasuredWalk
+from sim.case import Case, MeasuredWalk
 from sim.catalogue import design_catalogue
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.kernel.observation import WalkLog
@@ -33,7 +33,9 @@ from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.provenance import provenance_of
 from sim.robot import DEFAULT_ROBOT
 from sim.scenario import SCENARIOS, Scenario
+from sim.simulate import Simulation
 from sim.simulate import simulate as simulate_walk
+from sim.worlds import MeasuredPerturbedWalk
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +65,7 @@ def simulate(
     robot: RobotInput = DEFAULT_ROBOT,
     preference: PreferenceInput = "A",
     precision: Precision = "double",
+    world: Mapping[str, float] | None = None,
     log: bool = False,
     backend: Backend = "auto",
     cpus: int | None = None,
@@ -84,9 +87,11 @@ def simulate(
             `Preference`.
         precision: Of the physics' numbers: "double", or "single", which is about twice as fast and
             needs the compiled kernel.
+        world: What is different from the model, as `values` of a certificate's worlds: numbers by
+            perturbation, nominal where there is none; None for the model itself.
         log: Whether to record every walk at 500 Hz.
         backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
-            first that works on this machine.
+            first that works on this machine; `auto` alone in another world than the model's.
         cpus: Walks to compute at once, for many designs without a log; default all processors.
 
     Returns:
@@ -99,13 +104,14 @@ def simulate(
     columns = _columns(designs, controller)
     variables = tuple(columns)
     rows = np.stack(list(columns.values()), axis=1)
-    request = arguments.simulation(
+    request = design_arguments.simulation(
         dict(zip(variables, rows[0].tolist(), strict=True)),
         scenarios=scenarios,
         controller=controller,
         robot=robot,
         preference=preference,
         precision=precision,
+        world=world,
         log=log,
     )
     if not np.isfinite(rows).all():
@@ -117,6 +123,8 @@ def simulate(
         raise InvalidRequest(
             f"{backend!r} is none of {', '.join(get_args(Backend))}", field="backend"
         )
+    if request.world and backend != "auto":
+        raise InvalidRequest("walks of a world choose it themselves; leave it out", field="backend")
     if cpus is not None and cpus < 1:
         raise InvalidRequest("must be at least 1", field="cpus")
     with simulation_errors("designs"):
@@ -151,7 +159,7 @@ def robustness(
         InvalidRequest: An argument makes no sense; names it.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    request = arguments.robustness(design, options)
+    request = design_arguments.robustness(design, options)
     with simulation_errors("design"):
         return run_robustness(request, cpus=cpus, progress=progress)
 
@@ -220,16 +228,7 @@ def _simulated(
     if len(designs) == 1 or request.log or backend != "auto":
         parts = []
         for scenario in scenarios:
-            walk = simulate_walk(
-                scenario,
-                request.controller,
-                variables,
-                designs,
-                robot=request.robot,
-                log=request.log,
-                backend=backend,
-                precision=request.precision,
-            )
+            walk = _walked(request, scenario, variables, designs, backend)
             columns = [walk.outcome.objectives, walk.measurements.array()]
             parts.append(Outcome(np.concatenate(columns, axis=1), walk.outcome.statuses))
             if request.log:
@@ -258,6 +257,42 @@ def _simulated(
     )
 
 
+def _walked(
+    request: SimulationRequest,
+    scenario: Scenario,
+    variables: tuple[str, ...],
+    designs: Floats,
+    backend: Backend,
+) -> Simulation:
+    """All designs in one scenario, computed by this thread."""
+    if request.world:
+        return _in_world(request, scenario, variables).simulate(designs, log=request.log)
+    return simulate_walk(
+        scenario,
+        request.controller,
+        variables,
+        designs,
+        robot=request.robot,
+        log=request.log,
+        backend=backend,
+        precision=request.precision,
+    )
+
+
+def _in_world(
+    request: SimulationRequest, scenario: Scenario, variables: tuple[str, ...]
+) -> MeasuredPerturbedWalk:
+    return MeasuredPerturbedWalk(
+        scenario.name,
+        request.robot,
+        request.controller,
+        scenario,
+        tuple(request.world.items()),
+        variables,
+        request.precision,
+    )
+
+
 def _in_parallel(
     request: SimulationRequest,
     scenarios: Sequence[Scenario],
@@ -266,10 +301,14 @@ def _in_parallel(
     cpus: int | None,
 ) -> Sequence[Outcome]:
     """Objectives and measurements for every scenario, computed by threads of this process."""
-    cases = tuple(
-        MeasuredWalk(request.robot, request.controller, s, variables, request.precision)
-        for s in scenarios
-    )
+    cases: tuple[Case, ...]
+    if request.world:
+        cases = tuple(_in_world(request, scenario, variables) for scenario in scenarios)
+    else:
+        cases = tuple(
+            MeasuredWalk(request.robot, request.controller, s, variables, request.precision)
+            for s in scenarios
+        )
     with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
         provenance = provenance_of(request.robot, precision=request.precision)
         asked = EvaluationRequest("", cases, designs, provenance)

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import partial
+from typing import Annotated, Final
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Depends, Query, Response
 
-from api.dependencies import LARGEST_INDEX, AfterIteration, ExistingJob, JobId, Service
+from api.bodies import validated
+from api.dependencies import (
+    LARGEST_INDEX,
+    AfterIteration,
+    ExistingJob,
+    JobId,
+    ServerSettings,
+    Service,
+    Slots,
+    check_sampled_length,
+)
 from api.documentation import binary, problems
 from gaitswarm.requests.families import TOLERANCE, run_scenario_families
+from gaitswarm.requests.preferences import PreferencesRequest, run_preferences
 from gaitswarm.requests.trade_offs import (
     DESIGNS,
     MOST_DESIGNS,
@@ -25,7 +37,15 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.base import MEDIA_TYPE
 from gaitswarm.views.families import ScenarioFamiliesView
+from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.job import Job
+
+PreferencesBody = Annotated[PreferencesRequest, Depends(validated(PreferencesRequest, "request"))]
+
+MOST_RANKED: Final = 20_000_000
+"""Evaluations times preferences of one request: some seconds."""
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
 
@@ -169,6 +189,45 @@ def get_preference_for(
     409 for a design that fails in a scenario.
     """
     return run_preference_for(service, job_id, iteration, particle)
+
+
+@router.post(
+    "/preferences",
+    operation_id="find_robust_preferences",
+    summary="See whose winners are robust",
+    response_model=RobustPreferencesView,
+    responses=problems(400, 404, 409, 413, 422),
+)
+async def find_robust_preferences(
+    request: PreferencesBody,
+    job: ExistingJob,
+    service: Service,
+    settings: ServerSettings,
+    slots: Slots,
+) -> Response:
+    """Rank a job's designs under A, B, C and drawn preferences, and list who wins.
+
+    From stored objectives; with `samples` so many designs walk around each winner, by which its
+    robustness index (thesis 4.4.3) is estimated, and the most robust comes first. The answer waits
+    for these walks, so the time walked is limited; what is ranked is, too.
+    """
+    _check_ranked(request, job)
+
+    def found() -> Response:
+        check = partial(check_sampled_length, settings)
+        return _json(run_preferences(service, job.id, request, check=check))
+
+    return await slots.run(found)
+
+
+def _check_ranked(request: PreferencesRequest, job: Job) -> None:
+    """Raises InvalidRequest."""
+    most = max(1, MOST_RANKED // max(1, job.progress.evaluations))
+    if request.drawn > most:
+        raise InvalidRequest(
+            f"must be at most {most} for the {job.progress.evaluations} evaluations of this job",
+            field="drawn",
+        )
 
 
 def _json(view: View) -> Response:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import threading
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Self, TypeVar, Unpack
 
@@ -15,6 +16,7 @@ from gaitswarm.jobs.async_local_walks import AsyncLocalWalks
 from gaitswarm.jobs.async_port import AsyncJobs
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.port import JobEvent
+from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
@@ -34,7 +36,9 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
+from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
@@ -42,6 +46,7 @@ from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind
 from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.walk import Precision
 
 T = TypeVar("T")
 
@@ -250,6 +255,31 @@ class AsyncDatabaseJobs(AsyncLocalWalks, AsyncJobs):
         jobs = await self._jobs()
         return await to_thread.run_sync(partial(jobs.scenarios, job_id, tolerance=tolerance))
 
+    async def preferences(
+        self,
+        job_id: str,
+        *,
+        drawn: int = 512,
+        candidates: int = 8,
+        samples: int = 0,
+        radius: float = 0.02,
+        seed: int = 1,
+        precision: Precision = "double",
+    ) -> RobustPreferencesView:
+        """Rank a job's designs under many preferences, in a thread."""
+        jobs = await self._jobs()
+        asked = partial(
+            jobs.preferences,
+            job_id,
+            drawn=drawn,
+            candidates=candidates,
+            samples=samples,
+            radius=radius,
+            seed=seed,
+            precision=precision,
+        )
+        return await to_thread.run_sync(asked)
+
     async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
         """Find a job's front from what is stored."""
         jobs = await self._jobs()
@@ -308,6 +338,16 @@ class AsyncDatabaseJobs(AsyncLocalWalks, AsyncJobs):
         """Write evidence from what is stored."""
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.evidence, job_id)
+
+    async def write_firmware(
+        self,
+        design: Mapping[str, float | str] | str,
+        output: str | os.PathLike[str],
+        **options: Unpack[FirmwareOptions],
+    ) -> FirmwareView:
+        """Make firmware in a thread of this process."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.write_firmware, design, output, **options))
 
     async def record(self, walk: RecordedWalk) -> RecordingView:
         """Write a recorded walk into the database."""

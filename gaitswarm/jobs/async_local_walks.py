@@ -37,6 +37,7 @@ class AsyncLocalWalks(ABC):
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         precision: Precision = "double",
+        world: Mapping[str, float] | None = None,
         log: bool = False,
     ) -> SimulationResult:
         """Let a design walk in a thread of this process."""
@@ -49,6 +50,7 @@ class AsyncLocalWalks(ABC):
             robot=robot,
             preference=preference,
             precision=precision,
+            world=world,
             log=log,
         )
         return await to_thread.run_sync(call)
@@ -67,12 +69,19 @@ class AsyncLocalWalks(ABC):
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
+        world: Mapping[str, float] | None = None,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let a design walk in a thread of this process, to look at it."""
         jobs = await self._jobs()
         call = partial(
-            jobs.replay, design, scenario=scenario, controller=controller, robot=robot, rate=rate
+            jobs.replay,
+            design,
+            scenario=scenario,
+            controller=controller,
+            robot=robot,
+            world=world,
+            rate=rate,
         )
         return await to_thread.run_sync(call)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from types import TracebackType
@@ -14,6 +15,7 @@ from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
+    from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import (
@@ -37,7 +39,9 @@ if TYPE_CHECKING:
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
+    from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+    from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
@@ -176,6 +180,20 @@ class AsyncJobs(ABC):
         """See which scenarios of a job matter, from what is stored."""
 
     @abstractmethod
+    async def preferences(
+        self,
+        job_id: str,
+        *,
+        drawn: int = 512,
+        candidates: int = 8,
+        samples: int = 0,
+        radius: float = 0.02,
+        seed: int = 1,
+        precision: Precision = "double",
+    ) -> RobustPreferencesView:
+        """Find the preference whose winner among a job's designs is the most robust."""
+
+    @abstractmethod
     async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
         """See what designs of a job trade."""
 
@@ -239,6 +257,7 @@ class AsyncJobs(ABC):
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         precision: Precision = "double",
+        world: Mapping[str, float] | None = None,
         log: bool = False,
     ) -> SimulationResult:
         """Let one design walk where the jobs are."""
@@ -257,6 +276,7 @@ class AsyncJobs(ABC):
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
+        world: Mapping[str, float] | None = None,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let one design walk, to look at it: where every link is, frame by frame."""
@@ -272,6 +292,15 @@ class AsyncJobs(ABC):
         velocity_error: float = 0.0,
     ) -> SurfaceView:
         """Take the surfaces of a fuzzy controller, by its rules and by its table."""
+
+    @abstractmethod
+    async def write_firmware(
+        self,
+        design: Mapping[str, float | str] | str,
+        output: str | os.PathLike[str],
+        **options: Unpack[FirmwareOptions],
+    ) -> FirmwareView:
+        """Write a design, or a job's best, as C for the robot's microcontrollers."""
 
     @abstractmethod
     async def close(self) -> None:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import uuid
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from typing import TypeVar, Unpack
 
 import anyio
 import httpx2
+from anyio import to_thread
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import StoreUnavailable
-from gaitswarm.jobs import calls
+from gaitswarm.jobs import calls, design_calls
 from gaitswarm.jobs.async_port import AsyncJobs
+from gaitswarm.jobs.async_server_walks import AsyncServerWalks
 from gaitswarm.jobs.attempts import (
     BACKOFF,
     RECONNECT,
@@ -28,14 +31,11 @@ from gaitswarm.jobs.attempts import (
 from gaitswarm.jobs.call import Call
 from gaitswarm.jobs.port import JobEvent
 from gaitswarm.jobs.server import TIMEOUT
-from gaitswarm.requests import arguments
-from gaitswarm.requests.robustness import RobustnessOptions
-from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.requests import arguments, design_arguments
+from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
-    RobotInput,
-    ScenarioInput,
     SpecInput,
     SpecOptions,
     chosen_spec,
@@ -55,25 +55,22 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
+from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from gaitswarm.views.replay import WalkReplay
-from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
-from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
 
 
-class AsyncServerJobs(AsyncJobs):
+class AsyncServerJobs(AsyncServerWalks, AsyncJobs):
     """Jobs behind a server, over an `httpx2.AsyncClient`; attempts are those of `ServerJobs`."""
 
     def __init__(
@@ -226,6 +223,28 @@ class AsyncServerJobs(AsyncJobs):
         """Let the server judge a job's designs by fewer scenarios."""
         return await self._send(calls.scenarios(job_id, tolerance))
 
+    async def preferences(
+        self,
+        job_id: str,
+        *,
+        drawn: int = 512,
+        candidates: int = 8,
+        samples: int = 0,
+        radius: float = 0.02,
+        seed: int = 1,
+        precision: Precision = "double",
+    ) -> RobustPreferencesView:
+        """Let the server rank a job's designs under many preferences."""
+        request = arguments.preferences(
+            drawn=drawn,
+            candidates=candidates,
+            samples=samples,
+            radius=radius,
+            seed=seed,
+            precision=precision,
+        )
+        return await self._send(calls.preferences(job_id, request))
+
     async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
         """Let the server find a job's front."""
         return await self._send(calls.front(job_id, most))
@@ -282,6 +301,26 @@ class AsyncServerJobs(AsyncJobs):
         """Let the server write evidence, and download it."""
         return await self._send(calls.evidence(job_id))
 
+    async def write_firmware(
+        self,
+        design: Mapping[str, float | str] | str,
+        output: str | os.PathLike[str],
+        **options: Unpack[FirmwareOptions],
+    ) -> FirmwareView:
+        """Let the server make firmware, and write its files here."""
+        from gaitswarm.firmware import check_replaceable, write_folder
+
+        if isinstance(design, str):
+            spec, best = (await self.job(design)).spec, await self.best(design)
+            request = design_arguments.firmware_of_best(design, spec, best, options)
+        else:
+            request = design_arguments.firmware(design, options)
+        await to_thread.run_sync(check_replaceable, output)
+        view = await self._send(design_calls.firmware_summary(request))
+        files = await self._send(design_calls.firmware(request))
+        await to_thread.run_sync(write_folder, output, files)
+        return view.model_copy(update={"folder": str(output)})
+
     async def record(self, walk: RecordedWalk) -> RecordingView:
         """Send a recorded walk to the server."""
         return await self._send(calls.record(walk))
@@ -289,68 +328,6 @@ class AsyncServerJobs(AsyncJobs):
     async def recording(self, recording_id: str) -> RecordedWalk:
         """Ask the server for a recorded walk."""
         return await self._send(calls.recording(recording_id))
-
-    async def simulate(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        preference: PreferenceInput = "A",
-        precision: Precision = "double",
-        log: bool = False,
-    ) -> SimulationResult:
-        """Let a design walk on the server, which bounds how long."""
-        request = arguments.simulation(
-            design,
-            scenarios=scenarios,
-            controller=controller,
-            robot=robot,
-            preference=preference,
-            precision=precision,
-            log=log,
-        )
-        return await self._send(calls.simulate(request))
-
-    async def robustness(
-        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
-    ) -> RobustnessView:
-        """Let designs around one walk on the server, which bounds how many and how long."""
-        return await self._send(calls.robustness(arguments.robustness(design, options)))
-
-    async def replay(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenario: ScenarioInput = "normal-fast",
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        rate: float = 50.0,
-    ) -> WalkReplay:
-        """Let a design walk on the server, to look at it."""
-        request = arguments.replay(
-            design, scenario=scenario, controller=controller, robot=robot, rate=rate
-        )
-        return await self._send(calls.replay(request))
-
-    async def surface(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        controller: ControllerName = "fuzzy-pi",
-        error_points: int = 65,
-        current_points: int = 33,
-        velocity_error: float = 0.0,
-    ) -> SurfaceView:
-        """Ask the server for a fuzzy controller's surfaces."""
-        request = arguments.surface(
-            design,
-            error_points=error_points,
-            current_points=current_points,
-            velocity_error=velocity_error,
-        )
-        return await self._send(calls.surface(controller, request))
 
     async def close(self) -> None:
         """Close the connections."""

@@ -9,11 +9,7 @@ import json
 from collections.abc import Sequence
 
 from gaitswarm.jobs.call import IDEMPOTENCY_KEY, Call, got, job_path, page, posted, segment
-from gaitswarm.requests.replay import ReplayRequest
-from gaitswarm.requests.robustness import RobustnessRequest
-from gaitswarm.requests.surface import SurfaceRequest
-from gaitswarm.requests.walk import SimulationRequest
-from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.requests.preferences import PreferencesRequest
 from gaitswarm.tables import EvaluationTable, TableFormat
 from gaitswarm.views import (
     BestView,
@@ -26,15 +22,12 @@ from gaitswarm.views import (
     PageView,
     RankingRequest,
     RankingView,
-    SimulationView,
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from gaitswarm.views.replay import WalkReplay, decoded_replay
-from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import (
     ProblemRunsView,
     TournamentStandingsView,
@@ -45,7 +38,6 @@ from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.spec import Spec
-from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
 
 
@@ -230,6 +222,17 @@ def scenarios(job_id: str, tolerance: float) -> Call[ScenarioFamiliesView]:
     return Call("GET", path, read, {"tolerance": repr(tolerance)})
 
 
+def preferences(job_id: str, request: PreferencesRequest) -> Call[RobustPreferencesView]:
+    """Find out which preference's winner is the most robust.
+
+    Args:
+        job_id: Identifier of the job.
+        request: Preferences, and walks around their winners.
+    """
+    path = f"{job_path(job_id)}/preferences"
+    return posted(path, RobustPreferencesView, request, reads=True)
+
+
 def front(job_id: str, most: int) -> Call[FrontView]:
     """Find out what designs of a job trade.
 
@@ -335,46 +338,3 @@ def recording(recording_id: str) -> Call[RecordedWalk]:
         recording_id: Its identifier.
     """
     return got(f"/recordings/{segment(recording_id, 'recording')}", RecordedWalk)
-
-
-def simulate(request: SimulationRequest) -> Call[SimulationResult]:
-    """Let one design walk.
-
-    Args:
-        request: The design and its walks.
-    """
-
-    def read(content: bytes) -> SimulationResult:
-        return SimulationResult.from_view(SimulationView.model_validate_json(content))
-
-    return Call("POST", "/simulations", read, body=request.model_dump_json(), reads=True)
-
-
-def robustness(request: RobustnessRequest) -> Call[RobustnessView]:
-    """Estimate how robust a design is.
-
-    Args:
-        request: The design, its walks and the sample.
-    """
-    return posted("/robustness", RobustnessView, request, reads=True)
-
-
-def replay(request: ReplayRequest) -> Call[WalkReplay]:
-    """Let one design walk, to look at it.
-
-    Args:
-        request: The design and its walk.
-    """
-    body = request.model_dump_json()
-    return Call("POST", "/replays", decoded_replay, body=body, reads=True)
-
-
-def surface(controller: ControllerName, request: SurfaceRequest) -> Call[SurfaceView]:
-    """Take a fuzzy controller's surfaces.
-
-    Args:
-        controller: Name of the controller.
-        request: The design, and how finely to look at it.
-    """
-    path = f"/controllers/{segment(controller, 'controller')}/surface"
-    return posted(path, SurfaceView, request, reads=True)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Final, Unpack
 
@@ -15,9 +16,11 @@ from gaitswarm.jobs.local_walks import LocalWalks
 from gaitswarm.jobs.news import PAGE, JobNews
 from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.jobs.tournaments import DatabaseTournaments
-from gaitswarm.requests import arguments
+from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.requests.families import run_scenario_families
+from gaitswarm.requests.firmware import FirmwareOptions
+from gaitswarm.requests.preferences import run_preferences
 from gaitswarm.requests.targets import run_targets
 from gaitswarm.requests.trade_offs import DESIGNS, run_front, run_preference_for
 from gaitswarm.settings import default_database
@@ -35,7 +38,9 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
+from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
@@ -43,6 +48,7 @@ from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
 from services.runtime import EvaluatorKind
 from sim.identification.recorded_walk import RecordedWalk
+from sim.kernel.walk import Precision
 
 POLL_SECONDS: Final = 0.5
 """How often a job that is followed is looked at [s]."""
@@ -273,6 +279,28 @@ class DatabaseJobs(DatabaseTournaments, LocalWalks, Jobs):
         """Judge a job's designs by fewer scenarios, from what is stored."""
         return run_scenario_families(self._service, job_id, tolerance)
 
+    def preferences(
+        self,
+        job_id: str,
+        *,
+        drawn: int = 512,
+        candidates: int = 8,
+        samples: int = 0,
+        radius: float = 0.02,
+        seed: int = 1,
+        precision: Precision = "double",
+    ) -> RobustPreferencesView:
+        """Rank a job's designs under many preferences, from what is stored."""
+        request = arguments.preferences(
+            drawn=drawn,
+            candidates=candidates,
+            samples=samples,
+            radius=radius,
+            seed=seed,
+            precision=precision,
+        )
+        return run_preferences(self._service, job_id, request)
+
     def front(self, job_id: str, *, most: int = DESIGNS) -> FrontView:
         """Find a job's front from what is stored."""
         return run_front(self._service, job_id, most=most)
@@ -310,6 +338,24 @@ class DatabaseJobs(DatabaseTournaments, LocalWalks, Jobs):
         from gaitswarm.evidence.contents import evidence
 
         return evidence(self._service, job_id)
+
+    def write_firmware(
+        self,
+        design: Mapping[str, float | str] | str,
+        output: str | os.PathLike[str],
+        **options: Unpack[FirmwareOptions],
+    ) -> FirmwareView:
+        """Make firmware in this process."""
+        from gaitswarm.firmware import written_firmware
+
+        if isinstance(design, str):
+            best = self.best(design)
+            request = design_arguments.firmware_of_best(
+                design, self.job(design).spec, best, options
+            )
+        else:
+            request = design_arguments.firmware(design, options)
+        return written_firmware(request, output)
 
     def record(self, walk: RecordedWalk) -> RecordingView:
         """Write a recorded walk into the database."""

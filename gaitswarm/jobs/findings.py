@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView
+    from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from services.optimizer.analysis.fits.targets import LeaveOut
+    from sim.kernel.walk import Precision
 
 
 class Findings(ABC):
@@ -100,6 +102,43 @@ class Findings(ABC):
 
         Raises:
             InvalidRequest: The job tunes no drive, or the tolerance makes no sense.
+            Conflict: No design of it walks in all scenarios, or it is too large to be held in
+                memory.
+        """
+
+    @abstractmethod
+    def preferences(
+        self,
+        job_id: str,
+        *,
+        drawn: int = 512,
+        candidates: int = 8,
+        samples: int = 0,
+        radius: float = 0.02,
+        seed: int = 1,
+        precision: Precision = "double",
+    ) -> RobustPreferencesView:
+        """Find the preference whose winner among a job's designs is the most robust.
+
+        The designs are ranked anew, from what is stored. The winners' robustness index is estimated
+        on request, by walks where the jobs are; see `gaitswarm.robust_preferences` for walks here.
+
+        Args:
+            job_id: Identifier of a job that tunes a drive.
+            drawn: Preferences to draw beside A, B and C (table 4.5), 1 to 100000.
+            candidates: Winners to list: those of A, B and C, and of the others those that win under
+                most preferences.
+            samples: Designs that walk beside each of them; 0 for no walk and no index.
+            radius: How far they are from it at most, as a share of each variable's bounds.
+            seed: Of preferences and samples.
+            precision: Of the walks' physics.
+
+        Returns:
+            The candidates, the most robust first; without walks those of most preferences first.
+
+        Raises:
+            InvalidRequest: The job tunes no drive, an argument makes no sense, or it takes more
+                than the server allows.
             Conflict: No design of it walks in all scenarios, or it is too large to be held in
                 memory.
         """
@@ -213,7 +252,8 @@ class Findings(ABC):
 
         Returns:
             A zip archive, as docs/evidence.md has it: spec, robot, provenance, all evaluations,
-            pictures and a page; the same bytes for the same stored job.
+            finished certificates of its designs, pictures and a page; the same bytes for the same
+            stored jobs.
 
         Raises:
             Conflict: The job has committed no iteration yet, or is too large to be held in memory.

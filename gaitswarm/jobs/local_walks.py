@@ -7,7 +7,7 @@ from typing import Unpack
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.jobs.walks import Walks
-from gaitswarm.requests import arguments
+from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.replay import run_replay
 from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
 from gaitswarm.requests.surface import run_surface
@@ -34,17 +34,19 @@ class LocalWalks(Walks):
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         precision: Precision = "double",
+        world: Mapping[str, float] | None = None,
         log: bool = False,
     ) -> SimulationResult:
         """Let a design walk in this process."""
         return simulate_request(
-            arguments.simulation(
+            design_arguments.simulation(
                 design,
                 scenarios=scenarios,
                 controller=controller,
                 robot=robot,
                 preference=preference,
                 precision=precision,
+                world=world,
                 log=log,
             )
         )
@@ -54,7 +56,7 @@ class LocalWalks(Walks):
     ) -> RobustnessView:
         """Let designs around one walk in this process."""
         with simulation_errors("design"):
-            return run_robustness(arguments.robustness(design, options))
+            return run_robustness(design_arguments.robustness(design, options))
 
     def replay(
         self,
@@ -63,11 +65,12 @@ class LocalWalks(Walks):
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
+        world: Mapping[str, float] | None = None,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let a design walk in this process, to look at it."""
-        request = arguments.replay(
-            design, scenario=scenario, controller=controller, robot=robot, rate=rate
+        request = design_arguments.replay(
+            design, scenario=scenario, controller=controller, robot=robot, world=world, rate=rate
         )
         with simulation_errors("design"):
             return decoded_replay(run_replay(request))
@@ -82,7 +85,7 @@ class LocalWalks(Walks):
         velocity_error: float = 0.0,
     ) -> SurfaceView:
         """Compute a fuzzy controller's surfaces."""
-        request = arguments.surface(
+        request = design_arguments.surface(
             design,
             error_points=error_points,
             current_points=current_points,

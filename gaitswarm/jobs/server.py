@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from typing import Final, TypeVar, Unpack
@@ -13,7 +14,7 @@ import httpx2
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import StoreUnavailable
-from gaitswarm.jobs import calls
+from gaitswarm.jobs import calls, design_calls
 from gaitswarm.jobs.attempts import (
     BACKOFF,
     RECONNECT,
@@ -27,14 +28,12 @@ from gaitswarm.jobs.attempts import (
 )
 from gaitswarm.jobs.call import Call
 from gaitswarm.jobs.port import JobEvent, Jobs
-from gaitswarm.requests import arguments
-from gaitswarm.requests.robustness import RobustnessOptions
-from gaitswarm.simulation_result import SimulationResult
+from gaitswarm.jobs.server_walks import ServerWalks
+from gaitswarm.requests import arguments, design_arguments
+from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
-    RobotInput,
-    ScenarioInput,
     SpecInput,
     SpecOptions,
     chosen_spec,
@@ -54,19 +53,16 @@ from gaitswarm.views import (
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
+from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from gaitswarm.views.replay import WalkReplay
-from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
-from sim.controllers import ControllerName
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
@@ -75,7 +71,7 @@ TIMEOUT: Final = 30.0
 """Seconds in which a server must begin to answer, and go on."""
 
 
-class ServerJobs(Jobs):
+class ServerJobs(ServerWalks, Jobs):
     """Jobs behind a server.
 
     A connection that breaks and a 503 are met by further attempts, where that is safe: for whatever
@@ -224,6 +220,28 @@ class ServerJobs(Jobs):
         """Let the server judge a job's designs by fewer scenarios."""
         return self._send(calls.scenarios(job_id, tolerance))
 
+    def preferences(
+        self,
+        job_id: str,
+        *,
+        drawn: int = 512,
+        candidates: int = 8,
+        samples: int = 0,
+        radius: float = 0.02,
+        seed: int = 1,
+        precision: Precision = "double",
+    ) -> RobustPreferencesView:
+        """Let the server rank a job's designs under many preferences."""
+        request = arguments.preferences(
+            drawn=drawn,
+            candidates=candidates,
+            samples=samples,
+            radius=radius,
+            seed=seed,
+            precision=precision,
+        )
+        return self._send(calls.preferences(job_id, request))
+
     def front(self, job_id: str, *, most: int = 1000) -> FrontView:
         """Let the server find a job's front."""
         return self._send(calls.front(job_id, most))
@@ -273,6 +291,26 @@ class ServerJobs(Jobs):
         """Let the server write evidence, and download it."""
         return self._send(calls.evidence(job_id))
 
+    def write_firmware(
+        self,
+        design: Mapping[str, float | str] | str,
+        output: str | os.PathLike[str],
+        **options: Unpack[FirmwareOptions],
+    ) -> FirmwareView:
+        """Let the server make firmware, and write its files here."""
+        from gaitswarm.firmware import check_replaceable, write_folder
+
+        if isinstance(design, str):
+            spec, best = self.job(design).spec, self.best(design)
+            request = design_arguments.firmware_of_best(design, spec, best, options)
+        else:
+            request = design_arguments.firmware(design, options)
+        check_replaceable(output)
+        view = self._send(design_calls.firmware_summary(request))
+        files = self._send(design_calls.firmware(request))
+        write_folder(output, files)
+        return view.model_copy(update={"folder": str(output)})
+
     def record(self, walk: RecordedWalk) -> RecordingView:
         """Send a recorded walk to the server."""
         return self._send(calls.record(walk))
@@ -280,68 +318,6 @@ class ServerJobs(Jobs):
     def recording(self, recording_id: str) -> RecordedWalk:
         """Ask the server for a recorded walk."""
         return self._send(calls.recording(recording_id))
-
-    def simulate(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenarios: ScenarioInput | Iterable[ScenarioInput] | None = None,
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        preference: PreferenceInput = "A",
-        precision: Precision = "double",
-        log: bool = False,
-    ) -> SimulationResult:
-        """Let a design walk on the server, which bounds how long."""
-        request = arguments.simulation(
-            design,
-            scenarios=scenarios,
-            controller=controller,
-            robot=robot,
-            preference=preference,
-            precision=precision,
-            log=log,
-        )
-        return self._send(calls.simulate(request))
-
-    def robustness(
-        self, design: Mapping[str, float | str], **options: Unpack[RobustnessOptions]
-    ) -> RobustnessView:
-        """Let designs around one walk on the server, which bounds how many and how long."""
-        return self._send(calls.robustness(arguments.robustness(design, options)))
-
-    def replay(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        scenario: ScenarioInput = "normal-fast",
-        controller: ControllerName = "fuzzy-pi",
-        robot: RobotInput = DEFAULT_ROBOT,
-        rate: float = 50.0,
-    ) -> WalkReplay:
-        """Let a design walk on the server, to look at it."""
-        request = arguments.replay(
-            design, scenario=scenario, controller=controller, robot=robot, rate=rate
-        )
-        return self._send(calls.replay(request))
-
-    def surface(
-        self,
-        design: Mapping[str, float | str],
-        *,
-        controller: ControllerName = "fuzzy-pi",
-        error_points: int = 65,
-        current_points: int = 33,
-        velocity_error: float = 0.0,
-    ) -> SurfaceView:
-        """Ask the server for a fuzzy controller's surfaces."""
-        request = arguments.surface(
-            design,
-            error_points=error_points,
-            current_points=current_points,
-            velocity_error=velocity_error,
-        )
-        return self._send(calls.surface(controller, request))
 
     def close(self) -> None:
         """Close the connections."""

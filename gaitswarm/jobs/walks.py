@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Unpack
@@ -11,9 +12,11 @@ from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
+    from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
+    from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
@@ -32,6 +35,7 @@ class Walks(ABC):
         robot: RobotInput = DEFAULT_ROBOT,
         preference: PreferenceInput = "A",
         precision: Precision = "double",
+        world: Mapping[str, float] | None = None,
         log: bool = False,
     ) -> SimulationResult:
         """Let one design walk where the jobs are; see `gaitswarm.simulate` for many.
@@ -47,6 +51,8 @@ class Walks(ABC):
                 `Preference`.
             precision: Of the physics' numbers: "double", or "single", which is about twice as fast
                 and needs a C compiler where the walk runs.
+            world: What is different from the model, as `values` of a certificate's worlds: numbers
+                by perturbation, nominal where there is none; None for the model itself.
             log: Whether to record every walk at 500 Hz.
 
         Returns:
@@ -82,6 +88,7 @@ class Walks(ABC):
         scenario: ScenarioInput = "normal-fast",
         controller: ControllerName = "fuzzy-pi",
         robot: RobotInput = DEFAULT_ROBOT,
+        world: Mapping[str, float] | None = None,
         rate: float = 50.0,
     ) -> WalkReplay:
         """Let one design walk, to look at it: where every link is, frame by frame.
@@ -91,6 +98,7 @@ class Walks(ABC):
             scenario: Name or number of a preset, or `Scenario`.
             controller: Motor controller that drives the robot.
             robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+            world: As for `simulate`.
             rate: Frames a second, 1 to 500 [Hz].
 
         Returns:
@@ -124,4 +132,30 @@ class Walks(ABC):
 
         Raises:
             InvalidRequest: The controller is not fuzzy, or an argument makes no sense.
+        """
+
+    @abstractmethod
+    def write_firmware(
+        self,
+        design: Mapping[str, float | str] | str,
+        output: str | os.PathLike[str],
+        **options: Unpack[FirmwareOptions],
+    ) -> FirmwareView:
+        """Write a design as C for the robot's microcontrollers; see `gaitswarm.write_firmware`.
+
+        It is made where the jobs are, and the folder is written here.
+
+        Args:
+            design: As for `simulate`; or the identifier of a job, whose best design is taken, with
+                its robot and scenarios.
+            output: Folder to write; one that holds firmware is replaced, as a whole or not at all.
+            **options: Scenarios and tables, see `FirmwareOptions`.
+
+        Returns:
+            Files, their sizes, and what they take of the thesis's microcontroller.
+
+        Raises:
+            InvalidRequest: As `simulate`, or the job tunes no drive, or the folder holds anything
+                but firmware or cannot be written.
+            NotFound: There is no such job, or it has no design yet that walks in every scenario.
         """

@@ -1,4 +1,4 @@
-"""Arguments as a program gives them, made into checked values and requests.
+"""Arguments about jobs as a program gives them, made into checked values and requests.
 
 They raise InvalidRequest that names the argument, before anything is asked of a database or server;
 a controller that does not exist is NotFound, as its path on a server is.
@@ -6,25 +6,18 @@ a controller that does not exist is NotFound, as its path on a server is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, TypeVar, cast, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import InvalidRequest, NotFound, invalid_request
-from gaitswarm.requests.replay import ReplayRequest
-from gaitswarm.requests.robustness import RobustnessOptions, RobustnessRequest
-from gaitswarm.requests.surface import SurfaceRequest
-from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.requests.preferences import PreferencesRequest
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
-    RobotInput,
-    ScenarioInput,
     laid_options,
-    robot_source,
-    scenario_entries,
 )
 from gaitswarm.tables import TableFormat
 from gaitswarm.views import RankingRequest
@@ -184,7 +177,43 @@ def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
     Raises:
         InvalidRequest: An argument makes no sense; names it.
     """
-    return _valid(RankingRequest, {"preference": preference, "top": top})
+    return checked(RankingRequest, {"preference": preference, "top": top})
+
+
+def preferences(
+    *,
+    drawn: int,
+    candidates: int,
+    samples: int,
+    radius: float,
+    seed: int,
+    precision: Precision,
+) -> PreferencesRequest:
+    """Under which preferences to rank the designs of a job, and how to compare the winners.
+
+    Args:
+        drawn: How many preferences to draw.
+        candidates: Winners to compare.
+        samples: Designs that walk beside each; 0 for no walk.
+        radius: How far they are from it at most, as a share of each variable's bounds.
+        seed: Of preferences and samples.
+        precision: Of the physics' numbers.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    document = {
+        "drawn": drawn,
+        "candidates": candidates,
+        "samples": samples,
+        "radius": radius,
+        "seed": seed,
+        "precision": precision,
+    }
+    return checked(PreferencesRequest, document)
 
 
 def fork(from_iteration: int, options: ForkOptions) -> ForkRequest:
@@ -200,138 +229,7 @@ def fork(from_iteration: int, options: ForkOptions) -> ForkRequest:
     Raises:
         InvalidRequest: An argument makes no sense; names it.
     """
-    return _valid(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
-
-
-def simulation(
-    design: Mapping[str, float | str],
-    *,
-    scenarios: ScenarioInput | Iterable[ScenarioInput] | None,
-    controller: ControllerName,
-    robot: RobotInput,
-    preference: PreferenceInput,
-    precision: Precision,
-    log: bool,
-) -> SimulationRequest:
-    """One design and the walks in which to try it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        scenarios: Names or numbers of presets, or `Scenario`; None for the six of table 4.2.
-        controller: Motor controller that drives the robot.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
-            `Preference`.
-        precision: Of the physics' numbers.
-        log: Whether to record every walk at 500 Hz.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
-    document: dict[str, Any] = {
-        "robot": robot_source(robot),
-        "controller": controller,
-        "design": _design(design),
-        "preference": preference,
-        "precision": precision,
-        "log": log,
-    }
-    if scenarios is not None:
-        document["scenarios"] = scenario_entries(scenarios)
-    return _valid(SimulationRequest, document)
-
-
-def robustness(design: Mapping[str, float | str], options: RobustnessOptions) -> RobustnessRequest:
-    """One design, its walks, and the sample around it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        options: What is not to have its default.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
-    document: dict[str, Any] = {**options, "design": _design(design)}
-    if "robot" in options:
-        document["robot"] = robot_source(options["robot"])
-    if "scenarios" in options:
-        document["scenarios"] = scenario_entries(options["scenarios"])
-    return _valid(RobustnessRequest, document)
-
-
-def replay(
-    design: Mapping[str, float | str],
-    *,
-    scenario: ScenarioInput,
-    controller: ControllerName,
-    robot: RobotInput,
-    rate: float,
-) -> ReplayRequest:
-    """One design and the walk in which to look at it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        scenario: Name or number of a preset, or `Scenario`.
-        controller: Motor controller that drives the robot.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        rate: Frames a second [Hz].
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
-    document: dict[str, Any] = {
-        "robot": robot_source(robot),
-        "controller": controller,
-        "design": _design(design),
-        "scenario": scenario,
-        "rate": rate,
-    }
-    return _valid(ReplayRequest, document)
-
-
-def surface(
-    design: Mapping[str, float | str],
-    *,
-    error_points: int,
-    current_points: int,
-    velocity_error: float,
-) -> SurfaceRequest:
-    """One design of a fuzzy controller, and how finely to look at it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        error_points: Points of the grid over the error's range.
-        current_points: Points of the grid over the current's range.
-        velocity_error: At which the surfaces of fuzzy-pi-3 are taken [counts/s].
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
-    document: dict[str, Any] = {
-        "design": _design(design),
-        "error_points": error_points,
-        "current_points": current_points,
-        "velocity_error": velocity_error,
-    }
-    return _valid(SurfaceRequest, document)
-
-
-def _design(design: Mapping[str, float | str]) -> dict[str, float | str]:
-    if not isinstance(design, Mapping):
-        raise InvalidRequest("must be a mapping of values by name", field="design")
-    return dict(design)
+    return checked(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
 
 
 def _one_of(kind: type[E], text: str, field: str) -> E:
@@ -341,7 +239,19 @@ def _one_of(kind: type[E], text: str, field: str) -> E:
         raise InvalidRequest(f"{text!r} is none of {', '.join(kind)}", field=field) from None
 
 
-def _valid(kind: type[M], document: dict[str, Any]) -> M:
+def checked(kind: type[M], document: dict[str, Any]) -> M:
+    """A request as a model.
+
+    Args:
+        kind: The model.
+        document: Its fields, as the caller gave them.
+
+    Returns:
+        The request.
+
+    Raises:
+        InvalidRequest: It makes no sense; names every bad field.
+    """
     try:
         return kind.model_validate(document)
     except ValidationError as error:

@@ -6,7 +6,8 @@ from typing import Final
 
 from pydantic import Field
 
-from gaitswarm.requests.walk import WorldRequest, resolved
+from gaitswarm.requests.design import resolved
+from gaitswarm.requests.walk import WorldRequest
 from gaitswarm.views.replay import encoded_replay
 from services.optimizer.errors import InvalidRequest
 from sim.outcome import Status

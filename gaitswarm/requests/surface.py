@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gaitswarm.requests.walk import PUBLISHED_DESIGN
+from gaitswarm.requests.design import PUBLISHED_DESIGN
 from gaitswarm.views.surface import SurfaceView
 from services.optimizer.errors import InvalidRequest
 from sim.catalogue import check_design, design_numbers

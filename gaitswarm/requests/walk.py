@@ -2,116 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
+from gaitswarm.requests.design import DesignRequest, ScenariosRequest
 from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from sim.assembly import Backend, check_precision
-from sim.catalogue import check_design, design_numbers
-from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
-from sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
-from sim.simulate import Simulation, check_reach, simulate
-from sim.variables import VariableName, VariableValue
+from sim.robot import load_robot
+from sim.scenario import Scenario
+from sim.simulate import Simulation, simulate
+from sim.variables import VariableName
 from sim.worlds import WorldWalk, check_worlds
 
-PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 
-
-class WalkRequest(BaseModel):
-    """One design, and the robot that it drives."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    robot: RobotSource = Field(
-        default=DEFAULT_ROBOT,
-        description="Robot to simulate, by name, or a variant with another law of friction or with"
-        " backlash, or the text of the files of your own.",
-    )
-    controller: ControllerName = Field(
-        default="fuzzy-pi", description="Motor controller that drives it; see /v1/controllers."
-    )
-    design: dict[VariableName, VariableValue] = Field(
-        description="Value of each of the controller's variables, and of any gait variable, which"
-        " then replaces the scenario's value; names and units as in /v1/controllers. A categorical"
-        " one takes a choice's name or index.",
-        examples=[PUBLISHED_DESIGN],
-    )
-
-    @model_validator(mode="after")
-    def _design_fits(self) -> Self:
-        check_design(self.controller, self.design)
-        return self
-
-    @property
-    def numbers(self) -> dict[str, float]:
-        """The design as the simulator takes it: of categorical variables the index of a choice."""
-        return design_numbers(self.controller, self.design)
-
-    def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
-        """How long the robot walks, the measure of what the request costs.
-
-        Args:
-            scenarios: The walks of the request, in full.
-
-        Returns:
-            Length of all walks together [s]; a cycle time of the design goes before a scenario's.
-        """
-        cycle_time = self.numbers.get("cycle_time")
-        return sum(
-            scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
-            for scenario in scenarios
-        )
-
-    def check_design(self) -> None:
-        """Check that the controller can have the design's values.
-
-        Raises:
-            InvalidRequest: It cannot; its field is `design`.
-        """
-        try:
-            CONTROLLERS[self.controller].compile(self.numbers)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field="design") from error
-
-    def check_reach(self, scenario: Scenario, *, field: str) -> None:
-        """Check that the legs reach the gait's trajectory.
-
-        Args:
-            scenario: The walk, in full.
-            field: Field of the request that is to blame if they do not.
-
-        Raises:
-            InvalidRequest: They do not; names scenario, leg and distance.
-        """
-        names, values = tuple(self.design), tuple(self.numbers.values())
-        try:
-            check_reach(scenario, names, values, robot=self.robot)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field=field) from error
-
-
-def resolved(entry: str | Scenario) -> Scenario:
-    """A scenario in full.
-
-    Args:
-        entry: The scenario, or name or number of a preset.
-
-    Returns:
-        The scenario itself, a preset looked up.
-    """
-    return find_scenario(entry) if isinstance(entry, str) else entry
-
-
-class WorldRequest(WalkRequest):
+class WorldRequest(DesignRequest):
     """One design in a world, by default that of the model."""
 
     world: dict[VariableName, FiniteFloat] = Field(
@@ -170,33 +81,14 @@ class WorldRequest(WalkRequest):
         )
 
 
-class WalksRequest(WalkRequest):
+class WalksRequest(ScenariosRequest):
     """One design and the walks in which to try it."""
 
-    scenarios: tuple[ScenarioChoice, ...] = Field(
-        default=tuple(scenario.name for scenario in SCENARIOS),
-        min_length=1,
-        max_length=32,
-        description="Walks: names or numbers of presets (see /v1/scenarios), or your own.",
-        examples=[["normal-fast", "2"]],
-    )
     precision: Precision = Field(
         default="double",
         description="Of the physics' numbers: `double`, or `single`, which is about twice as fast"
         " and needs a C compiler.",
     )
-
-    @model_validator(mode="after")
-    def _names_are_unique(self) -> Self:
-        names = [scenario.name for scenario in self.resolved_scenarios()]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"scenarios: {name!r} is named twice")
-        return self
-
-    def resolved_scenarios(self) -> tuple[Scenario, ...]:
-        """The scenarios in full, presets looked up."""
-        return tuple(map(resolved, self.scenarios))
 
     def check_walks(self) -> None:
         """Check every walk before the first is run.
@@ -211,8 +103,7 @@ class WalksRequest(WalkRequest):
         except SimulationInputError as error:
             text = str(error).removeprefix("precision: ")
             raise InvalidRequest(text, field="precision") from error
-        for index, scenario in enumerate(self.resolved_scenarios()):
-            self.check_reach(scenario, field=f"scenarios.{index}")
+        self.check_gaits()
 
 
 class SimulationRequest(WalksRequest, WorldRequest):

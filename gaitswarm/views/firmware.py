@@ -69,7 +69,11 @@ class FirmwareMemoryView(View):
 class FirmwareView(View):
     """A folder of C for a microcontroller."""
 
-    folder: str = Field(description="Where it is.", examples=["firmware"])
+    folder: str | None = Field(
+        default=None,
+        description="Where it is; null for one that a server describes.",
+        examples=["firmware"],
+    )
     label: str = Field(description="What people call the design.", examples=["published A"])
     controller: ControllerName = Field(description="Of the design.", examples=["fuzzy-pi"])
     design: dict[str, float] = Field(
@@ -98,7 +102,7 @@ class FirmwareView(View):
         cls,
         firmware: Firmware,
         *,
-        folder: str,
+        folder: str | None,
         label: str,
         controller: ControllerName,
         design: dict[str, float],
@@ -107,7 +111,7 @@ class FirmwareView(View):
 
         Args:
             firmware: that was written.
-            folder: where.
+            folder: where; None for nowhere yet.
             label: what people call the design.
             controller: of the design.
             design: values by variable.

@@ -32,6 +32,7 @@ PREFIX: Final = "/v1"
 JobKind = Literal["tuning", "identification", "calibration", "tournament", "certificate"]
 
 _RESOURCES: Final = ("iterations", "events")
+_OF_A_BEST: Final = ("scenarios", "preferences", "firmware")
 
 _RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
 """Those that only a job has whose spec can be read."""
@@ -172,8 +173,9 @@ class JobSummaryView(View):
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(
         description="Where to go on: `self`, `iterations`, `events`; where the spec can be read,"
-        " `best`, `distribution`, `particles`, `export`, and `ranking` (POST) for a job that tunes"
-        " a drive; `evidence` once an iteration is committed; `parent` of a fork; those of `pause`,"
+        " `best`, `distribution`, `particles`, `export`; for a job that tunes a drive `ranking`"
+        " (POST) and, once it has a best design, `scenarios`, `preferences` (POST), `firmware`;"
+        " `evidence` once an iteration is committed; `parent` of a fork; those of `pause`,"
         " `resume`, `cancel`, `extend`, `fork` (POST) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
@@ -327,9 +329,9 @@ def job_links(job: Job) -> dict[str, str]:
     """
     here = f"{PREFIX}/jobs/{job.id}"
     names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
-    resources = {name: f"{here}/{name}" for name in names}
     if isinstance(job.stored_spec, JobSpec):
-        resources["ranking"] = f"{here}/ranking"
+        names += ["ranking", *(_OF_A_BEST if job.progress.best_fitness is not None else ())]
+    resources = {name: f"{here}/{name}" for name in names}
     commands = {
         command.value: f"{here}/{command.value}"
         for (state, command), after in TRANSITIONS.items()

@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
-from sim.firmware.folder import FORMAT, MANIFEST, Firmware, check_table_bits, firmware_of
+from sim.firmware.folder import (
+    FORMAT,
+    MANIFEST,
+    Firmware,
+    check_table_bits,
+    firmware_of,
+    parsed_table_bits,
+)
 from sim.firmware.memory import BUDGET, Memory
 
-__all__ = ["BUDGET", "FORMAT", "MANIFEST", "Firmware", "Memory", "check_table_bits", "firmware_of"]
+__all__ = [
+    "BUDGET",
+    "FORMAT",
+    "MANIFEST",
+    "Firmware",
+    "Memory",
+    "check_table_bits",
+    "firmware_of",
+    "parsed_table_bits",
+]

@@ -166,6 +166,24 @@ def firmware_of(
     return Firmware(files, integers, trajectories, logs, memory, difference)
 
 
+def parsed_table_bits(text: str) -> tuple[int, int]:
+    """Read the resolution of a table.
+
+    Args:
+        text: Bits of the indices of angle error and current, such as 8x6.
+
+    Returns:
+        The same as numbers.
+
+    Raises:
+        SimulationInputError: It is not like that.
+    """
+    error, _, current = text.partition("x")
+    if not (error.isascii() and error.isdigit() and current.isascii() and current.isdigit()):
+        raise SimulationInputError(f"{text!r} is not like 8x6")
+    return int(error), int(current)
+
+
 def check_table_bits(controller: ControllerName, bits: tuple[int, int]) -> None:
     """Check that a controller can have a table of other resolution.
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from sim.scenario import HELD_OUT
 from sim.worlds.engine_walk import EngineWalk
 from sim.worlds.perturbations import PERTURBATIONS, check_worlds, sample_worlds
+from sim.worlds.perturbed_walk import MeasuredPerturbedWalk, PerturbedWalk
 from sim.worlds.world_walk import WorldWalk
 
 __all__ = [
     "HELD_OUT",
     "PERTURBATIONS",
     "EngineWalk",
+    "MeasuredPerturbedWalk",
+    "PerturbedWalk",
     "WorldWalk",
     "check_worlds",
     "sample_worlds",

@@ -246,16 +246,18 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
         low, high = LIMITS[name]
         outside = ~((column >= low) & (column <= high))
         if outside.any():
-            world = int(np.argmax(outside))
             raise SimulationInputError(
-                f"{name}: {column[world]:g} in world {world}; it must lie in {low:g} to {high:g}"
+                f"{name}: {_first(outside, column)} must lie in {low:g} to {high:g}"
             )
         broken = column != np.rint(column)
         if name in _WHOLE and broken.any():
-            world = int(np.argmax(broken))
-            raise SimulationInputError(
-                f"{name}: {column[world]:g} in world {world} is no whole number"
-            )
+            raise SimulationInputError(f"{name}: {_first(broken, column)} is no whole number")
+
+
+def _first(wrong: NDArray[np.bool_], column: Floats) -> str:
+    """The first value that is wrong, and where if there are several worlds."""
+    world = int(np.argmax(wrong))
+    return f"{column[world]:g}" + (f" in world {world}" if len(column) > 1 else "")
 
 
 def sample_worlds(count: int, seed: int, choice: Sequence[Variable] = PERTURBATIONS) -> Floats:

@@ -10,13 +10,24 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, judge, kernel_of, plan_walk
+from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from sim.controllers import ControlLaw, ControllerName, control_law
 from sim.kernel.batch import Walking, WantedWalk, walk_together
+from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Precision, WalkSetup
-from sim.outcome import N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
+from sim.outcome import (
+    MEASUREMENTS,
+    N_MEASUREMENTS,
+    N_OBJECTIVES,
+    OBJECTIVES,
+    Measurements,
+    Objective,
+    Outcome,
+    Status,
+)
 from sim.robot import Robot, RobotSource, load_robot
 from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+from sim.simulate import Simulation
 from sim.worlds.perturbations import check_worlds
 from sim.worlds.perturbed_setup import perturbed_setups
 
@@ -70,16 +81,43 @@ class PerturbedWalk:
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
         """Let every design walk, beside walks of other cases."""
+        walked = yield from self._simulating(designs, log=False)
+        return walked.outcome
+
+    def simulate(self, designs: Floats, *, log: bool = False) -> Simulation:
+        """Let every design walk, to be looked at.
+
+        Args:
+            designs: (n, len(variables)), in the variables' units.
+            log: Whether to keep every walk's log.
+
+        Returns:
+            Outcomes with the bits of `run`, measurements and logs.
+
+        Raises:
+            SimulationInputError: The world or a design cannot be simulated; names the variable.
+        """
+        (simulation,) = walk_together([self._simulating(designs, log=log)])
+        return simulation
+
+    def _simulating(self, designs: Floats, *, log: bool) -> Walking[Simulation]:
         robot = load_robot(self.robot)
         kernel = kernel_of(robot, precision=self.precision)
         coding, timestep = control_steps(robot)
         statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
         objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
+        measured = np.full((len(designs), N_MEASUREMENTS), np.nan)
+        logs: list[WalkLog | None] = [None] * len(designs)
         setups = self._setups(robot, designs, timestep)
-        results = yield [WantedWalk(kernel, coding, setup) for setup in setups.values()]
+        results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups.values()]
         for (index, setup), result in zip(setups.items(), results, strict=True):
             statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
-        return Outcome(objectives, statuses)
+            measured[index] = measure(setup, result, coding.substeps)
+            if result.states is not None:
+                logs[index] = walk_log(robot, setup, result.states)
+        return Simulation(
+            Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
+        )
 
     def _setups(self, robot: Robot, designs: Floats, timestep: float) -> dict[int, WalkSetup]:
         """By index of the design; without those whose gait is out of the legs' reach."""
@@ -112,6 +150,23 @@ class PerturbedWalk:
         check_worlds(names, worlds)
         (setup,) = perturbed_setups(robot, scenario, plan(law), names, worlds)
         return setup
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredPerturbedWalk(PerturbedWalk):
+    """The same walk with its measurements, as further columns behind its objectives."""
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """f1 to f6 of table 4.1, then `MEASUREMENTS`."""
+        measured = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
+        return (*OBJECTIVES, *measured)
+
+    def walking(self, designs: Floats) -> Walking[Outcome]:
+        """Let every design walk, beside walks of other cases."""
+        walked = yield from self._simulating(designs, log=False)
+        columns = [walked.outcome.objectives, walked.measurements.array()]
+        return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)
 
 
 @lru_cache(maxsize=_PLANS_KEPT)

@@ -83,7 +83,7 @@ def test_a_world_is_looked_at_by_its_values(client: httpx2.Client, store: SqlSto
     ("world", "field", "words"),
     [
         ({"gravity": 3.0}, "world", "gravity: no perturbation; known are friction_factor"),
-        ({"friction_factor": -1.0}, "world", "friction_factor: -1 in world 0; it must lie in"),
+        ({"friction_factor": -1.0}, "world", "friction_factor: -1 must lie in 0 to 100"),
     ],
 )
 def test_a_world_that_cannot_be_names_what_is_wrong(

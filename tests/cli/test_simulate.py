@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -195,3 +196,31 @@ def test_a_trajectory_file_sets_gait_parameters_that_the_design_does_not(
     )  # fmt: skip
     assert result.code == 2
     assert named in result.err
+
+
+def test_a_design_walks_in_a_world_that_a_certificate_names(
+    gaitswarm: Gaitswarm, write_json: WriteJson
+) -> None:
+    values = {"friction_factor": 0.8, "slope_added": 2.0}
+    walk = ("simulate", "--design", "published:A", *FAST, "--json")
+    file = write_json({"world": 3, "values": values}, "world.json")
+    inline, named, model = (
+        gaitswarm(*walk, *options).json
+        for options in (("--world", json.dumps(values)), ("--world", file), ())
+    )
+    assert inline == named != model
+
+
+@pytest.mark.parametrize(
+    ("world", "said"),
+    [
+        ('{"friction_factor": 200}', "world.friction_factor: 200 must lie in 0 to 100"),
+        ('{"gravity": 3}', "world.gravity: no perturbation; known are friction_factor"),
+        ("{", "world: is not valid JSON"),
+        ("nowhere.json", "world: cannot read nowhere.json"),
+    ],
+)
+def test_a_world_that_cannot_be_is_refused(gaitswarm: Gaitswarm, world: str, said: str) -> None:
+    result = gaitswarm("simulate", "--design", "published:A", "--world", world)
+    assert result.code == 2
+    assert said in result.err

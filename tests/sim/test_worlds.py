@@ -23,7 +23,13 @@ from sim.outcome import Outcome, Status
 from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVariant, load_robot
 from sim.robot.identifiable import with_parameters
 from sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
-from sim.worlds import PERTURBATIONS, WorldWalk, sample_worlds
+from sim.worlds import (
+    PERTURBATIONS,
+    MeasuredPerturbedWalk,
+    PerturbedWalk,
+    WorldWalk,
+    sample_worlds,
+)
 from tests.examples.walks import PUBLISHED_A, quadruped_files, short_walk, walk
 
 Floats = NDArray[np.float64]
@@ -340,3 +346,26 @@ def test_held_out_scenarios_are_none_of_the_table_and_can_be_walked(scenario: Sc
         assert desired_angles(load_robot(robot), scenario).reachable
     outcome = walk(scenario).outcome
     assert outcome.statuses.tolist() == [Status.OK]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["reconstructed", "backlash"])
+def test_designs_in_one_world_have_the_bits_of_worlds_of_one_design(name: str) -> None:
+    (drawn,) = sample_worlds(1, 5)
+    known = tuple(zip(NAMES, drawn.tolist(), strict=True))
+    designs = np.array([[0.45, 0.1], [0.2, 0.0]])
+    scenario = short_walk()
+    robot, gains = VARIANTS[name], ("P", "I")
+    perturbed = PerturbedWalk("short", robot, "pi", scenario, known, gains)
+    together = perturbed.simulate(designs, log=True)
+    measured = MeasuredPerturbedWalk("short", robot, "pi", scenario, known, gains).run(designs)
+    for row, (p, i) in enumerate(designs.tolist()):
+        alone = case(*NAMES, robot=robot, design={"P": p, "I": i}).simulate(
+            drawn[np.newaxis], log=True
+        )
+        columns = [alone.outcome.objectives, alone.measurements.array()]
+        assert np.array_equal(measured.objectives[[row]], np.concatenate(columns, axis=1))
+        assert np.array_equal(together.outcome.objectives[[row]], alone.outcome.objectives)
+        logs = together.logs[row], alone.logs[0]
+        assert logs[0] is not None and logs[1] is not None
+        assert np.array_equal(logs[0].base_position, logs[1].base_position)

@@ -80,12 +80,11 @@ def firmware(
 
 def _bits(text: str) -> tuple[int, int]:
     """Raises InvalidRequest."""
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.errors import simulation_errors
+    from sim.firmware import parsed_table_bits
 
-    error, _, current = text.partition("x")
-    if not (error.isascii() and error.isdigit() and current.isascii() and current.isdigit()):
-        raise InvalidRequest(f"{text!r} is not like 8x6", field="table_bits")
-    return int(error), int(current)
+    with simulation_errors("table_bits"):
+        return parsed_table_bits(text)
 
 
 def _show(view: FirmwareView) -> None:

@@ -40,6 +40,15 @@ def simulate(
     preference: Annotated[
         str, typer.Option(help="A, B, C or chapter-3: how objectives are weighed.")
     ] = "A",
+    world: Annotated[
+        str | None,
+        typer.Option(
+            metavar="JSON|FILE",
+            help="Walk where the model is wrong: an object of perturbations, such as"
+            ' \'{"friction_factor": 0.7, "slope_added": 2}\', or one with it under `values`, as'
+            " `certify --json` prints worlds.",
+        ),
+    ] = None,
     log: Annotated[
         Path | None,
         typer.Option(metavar="FILE.npz", help="Write the walks' 500 Hz logs as NumPy arrays."),
@@ -54,6 +63,7 @@ def simulate(
     from cli.design_file import read_design
     from cli.output import note
     from cli.robots import chosen_robot, scenario_data
+    from cli.spec_file import json_object
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
@@ -66,6 +76,9 @@ def simulate(
         "precision": precision or "double",
         "log": log is not None,
     }
+    if world is not None:
+        found = json_object(world, "world")
+        data["world"] = found.get("values", found)
     try:
         request = SimulationRequest.model_validate(data)
     except ValidationError as error:

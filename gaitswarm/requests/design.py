@@ -1,0 +1,137 @@
+"""One design and its scenarios, as every request for walks has them. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from services.optimizer.errors import InvalidRequest
+from sim.catalogue import check_design, design_numbers
+from sim.controllers import CONTROLLERS, ControllerName
+from sim.errors import SimulationInputError
+from sim.robot import DEFAULT_ROBOT, RobotSource
+from sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from sim.simulate import check_reach
+from sim.variables import VariableName, VariableValue
+
+PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
+
+
+class DesignRequest(BaseModel):
+    """One design, and the robot that it drives."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    robot: RobotSource = Field(
+        default=DEFAULT_ROBOT,
+        description="Robot to simulate, by name, or a variant with another law of friction or with"
+        " backlash, or the text of the files of your own.",
+    )
+    controller: ControllerName = Field(
+        default="fuzzy-pi", description="Motor controller that drives it; see /v1/controllers."
+    )
+    design: dict[VariableName, VariableValue] = Field(
+        description="Value of each of the controller's variables, and of any gait variable, which"
+        " then replaces the scenario's value; names and units as in /v1/controllers. A categorical"
+        " one takes a choice's name or index.",
+        examples=[PUBLISHED_DESIGN],
+    )
+
+    @model_validator(mode="after")
+    def _design_fits(self) -> Self:
+        check_design(self.controller, self.design)
+        return self
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The design as the simulator takes it: of categorical variables the index of a choice."""
+        return design_numbers(self.controller, self.design)
+
+    def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
+        """How long the robot walks, the measure of what the request costs.
+
+        Args:
+            scenarios: The walks of the request, in full.
+
+        Returns:
+            Length of all walks together [s]; a cycle time of the design goes before a scenario's.
+        """
+        cycle_time = self.numbers.get("cycle_time")
+        return sum(
+            scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
+            for scenario in scenarios
+        )
+
+    def check_design(self) -> None:
+        """Check that the controller can have the design's values.
+
+        Raises:
+            InvalidRequest: It cannot; its field is `design`.
+        """
+        try:
+            CONTROLLERS[self.controller].compile(self.numbers)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field="design") from error
+
+    def check_reach(self, scenario: Scenario, *, field: str) -> None:
+        """Check that the legs reach the gait's trajectory.
+
+        Args:
+            scenario: The walk, in full.
+            field: Field of the request that is to blame if they do not.
+
+        Raises:
+            InvalidRequest: They do not; names scenario, leg and distance.
+        """
+        names, values = tuple(self.design), tuple(self.numbers.values())
+        try:
+            check_reach(scenario, names, values, robot=self.robot)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field=field) from error
+
+
+class ScenariosRequest(DesignRequest):
+    """One design and the scenarios in which it walks."""
+
+    scenarios: tuple[ScenarioChoice, ...] = Field(
+        default=tuple(scenario.name for scenario in SCENARIOS),
+        min_length=1,
+        max_length=32,
+        description="Walks: names or numbers of presets (see /v1/scenarios), or your own.",
+        examples=[["normal-fast", "2"]],
+    )
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> Self:
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"scenarios: {name!r} is named twice")
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios in full, presets looked up."""
+        return tuple(map(resolved, self.scenarios))
+
+    def check_gaits(self) -> None:
+        """Check every scenario's gait.
+
+        Raises:
+            InvalidRequest: One leaves the legs' reach; names the field.
+        """
+        for index, scenario in enumerate(self.resolved_scenarios()):
+            self.check_reach(scenario, field=f"scenarios.{index}")
+
+
+def resolved(entry: str | Scenario) -> Scenario:
+    """A scenario in full.
+
+    Args:
+        entry: The scenario, or name or number of a preset.
+
+    Returns:
+        The scenario itself, a preset looked up.
+    """
+    return find_scenario(entry) if isinstance(entry, str) else entry

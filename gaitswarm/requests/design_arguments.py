@@ -1,0 +1,215 @@
+"""Arguments about single designs as a program gives them, made into checked requests.
+
+They raise InvalidRequest that names the argument, before anything walks or is asked of a server.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from gaitswarm.errors import InvalidRequest
+from gaitswarm.requests.arguments import checked
+from gaitswarm.requests.firmware import (
+    FirmwareOptions,
+    FirmwareRequest,
+    firmware_request_of_best,
+)
+from gaitswarm.requests.replay import ReplayRequest
+from gaitswarm.requests.robustness import RobustnessOptions, RobustnessRequest
+from gaitswarm.requests.surface import SurfaceRequest
+from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.specs import (
+    PreferenceInput,
+    RobotInput,
+    ScenarioInput,
+    robot_source,
+    scenario_entries,
+)
+from gaitswarm.views import BestView
+from services.optimizer.jobs.documents import AnySpec
+from sim.controllers import ControllerName
+from sim.kernel.walk import Precision
+
+
+def simulation(
+    design: Mapping[str, float | str],
+    *,
+    scenarios: ScenarioInput | Iterable[ScenarioInput] | None,
+    controller: ControllerName,
+    robot: RobotInput,
+    preference: PreferenceInput,
+    precision: Precision,
+    world: Mapping[str, float] | None,
+    log: bool,
+) -> SimulationRequest:
+    """One design and the walks in which to try it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        scenarios: Names or numbers of presets, or `Scenario`; None for the six of table 4.2.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
+            `Preference`.
+        precision: Of the physics' numbers.
+        world: Values of perturbations by name; None for the model itself.
+        log: Whether to record every walk at 500 Hz.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    document: dict[str, Any] = {
+        "robot": robot_source(robot),
+        "controller": controller,
+        "design": _design(design),
+        "preference": preference,
+        "precision": precision,
+        "world": _world(world),
+        "log": log,
+    }
+    if scenarios is not None:
+        document["scenarios"] = scenario_entries(scenarios)
+    return checked(SimulationRequest, document)
+
+
+def robustness(design: Mapping[str, float | str], options: RobustnessOptions) -> RobustnessRequest:
+    """One design, its walks, and the sample around it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        options: What is not to have its default.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    return checked(RobustnessRequest, {**_laid(options), "design": _design(design)})
+
+
+def firmware(design: Mapping[str, float | str], options: FirmwareOptions) -> FirmwareRequest:
+    """One design, and the scenarios that are written with it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        options: What is not to have its default.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    return checked(FirmwareRequest, {**_laid(options), "design": _design(design)})
+
+
+def firmware_of_best(
+    job_id: str, spec: AnySpec, best: BestView, options: FirmwareOptions
+) -> FirmwareRequest:
+    """A job's best design, and the scenarios that are written with it.
+
+    Args:
+        job_id: Identifier of the job.
+        spec: Of the job.
+        best: Its best design.
+        options: What is not to be as in the job.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: The job tunes no drive, or an argument makes no sense; names it.
+    """
+    return firmware_request_of_best(job_id, spec, best, _laid(options))
+
+
+def replay(
+    design: Mapping[str, float | str],
+    *,
+    scenario: ScenarioInput,
+    controller: ControllerName,
+    robot: RobotInput,
+    world: Mapping[str, float] | None,
+    rate: float,
+) -> ReplayRequest:
+    """One design and the walk in which to look at it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        scenario: Name or number of a preset, or `Scenario`.
+        controller: Motor controller that drives the robot.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        world: Values of perturbations by name; None for the model itself.
+        rate: Frames a second [Hz].
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    document: dict[str, Any] = {
+        "robot": robot_source(robot),
+        "controller": controller,
+        "design": _design(design),
+        "scenario": scenario,
+        "world": _world(world),
+        "rate": rate,
+    }
+    return checked(ReplayRequest, document)
+
+
+def surface(
+    design: Mapping[str, float | str],
+    *,
+    error_points: int,
+    current_points: int,
+    velocity_error: float,
+) -> SurfaceRequest:
+    """One design of a fuzzy controller, and how finely to look at it.
+
+    Args:
+        design: Value by variable, in the variables' units.
+        error_points: Points of the grid over the error's range.
+        current_points: Points of the grid over the current's range.
+        velocity_error: At which the surfaces of fuzzy-pi-3 are taken [counts/s].
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    document: dict[str, Any] = {
+        "design": _design(design),
+        "error_points": error_points,
+        "current_points": current_points,
+        "velocity_error": velocity_error,
+    }
+    return checked(SurfaceRequest, document)
+
+
+def _design(design: Mapping[str, float | str]) -> dict[str, float | str]:
+    if not isinstance(design, Mapping):
+        raise InvalidRequest("must be a mapping of values by name", field="design")
+    return dict(design)
+
+
+def _world(world: Mapping[str, float] | None) -> dict[str, float]:
+    if world is not None and not isinstance(world, Mapping):
+        raise InvalidRequest("must be a mapping of values by name", field="world")
+    return dict(world or {})
+
+
+def _laid(options: RobustnessOptions | FirmwareOptions) -> dict[str, Any]:
+    document: dict[str, Any] = dict(options)
+    if "robot" in options:
+        document["robot"] = robot_source(options["robot"])
+    if "scenarios" in options:
+        document["scenarios"] = scenario_entries(options["scenarios"])
+    return document

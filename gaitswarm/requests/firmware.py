@@ -1,0 +1,163 @@
+"""A design as firmware: what is asked, and how it is done. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, TypedDict
+
+from pydantic import Field, ValidationError
+
+from gaitswarm.errors import invalid_request, simulation_errors
+from gaitswarm.requests.design import ScenariosRequest
+from gaitswarm.specs import RobotInput, ScenarioInput
+from gaitswarm.views import BestView
+from gaitswarm.views.firmware import FirmwareView
+from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.jobs.documents import AnySpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from sim.catalogue import design_numbers
+from sim.controllers import ControllerName
+from sim.firmware import Firmware, check_table_bits, firmware_of
+
+
+class FirmwareOptions(TypedDict, total=False):
+    """Fields of a `FirmwareRequest` as keywords; what is left out has its default.
+
+    Attributes:
+        scenarios: One scenario or several, whose trajectories are written and whose walks are
+            repeated: names or numbers of presets, or `Scenario`; default those of the job, of other
+            designs the six of table 4.2.
+        controller: Motor controller that drives the robot; default that of the job, or fuzzy-pi.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another; default that of
+            the job, or the default robot.
+        label: What people call the design.
+        table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
+            place of 10 and 6, where there is less flash.
+    """
+
+    scenarios: ScenarioInput | Iterable[ScenarioInput]
+    controller: ControllerName
+    robot: RobotInput
+    label: str
+    table_bits: tuple[int, int] | None
+
+
+class FirmwareRequest(ScenariosRequest):
+    """One design, and the scenarios whose trajectories and walks are written with it."""
+
+    label: str = Field(default="design", max_length=200, description="What people call the design.")
+    table_bits: tuple[int, int] | None = Field(
+        default=None,
+        description="Of the indices of angle error and current in a fuzzy controller's table, in"
+        " place of 10 and 6; the walks are by this table.",
+        examples=[[8, 6]],
+    )
+
+    @property
+    def walked_seconds(self) -> float:
+        """Length of all walks together [s]; with other tables each is compared with the usual's."""
+        seconds = self.simulated_seconds(self.resolved_scenarios())
+        return seconds if self.table_bits is None else 2.0 * seconds
+
+    def check(self) -> None:
+        """Check the design, its gaits and its table before anything walks.
+
+        Raises:
+            InvalidRequest: Something cannot be; names the field.
+        """
+        self.check_design()
+        self.check_gaits()
+        if self.table_bits is not None:
+            with simulation_errors("table_bits"):
+                check_table_bits(self.controller, self.table_bits)
+
+
+def firmware_request_of_best(
+    job_id: str, spec: AnySpec, best: BestView | None, options: dict[str, Any]
+) -> FirmwareRequest:
+    """Ask for firmware of a job's best design, by default with its robot and in its scenarios.
+
+    Args:
+        job_id: Identifier of the job.
+        spec: Of the job.
+        best: Its best design; None while there is none.
+        options: Fields of the request that are not to be the job's.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: The job tunes no drive, or another controller is asked for; names the field.
+        NotFound: No design has walked in every scenario yet.
+    """
+    if not isinstance(spec, JobSpec):
+        raise InvalidRequest(
+            f"job {job_id} is of kind {spec.kind}, which tunes no drive", field="job_id"
+        )
+    if options.get("controller", spec.controller) != spec.controller:
+        raise InvalidRequest(
+            f"job {job_id} tunes {spec.controller}; leave it out", field="controller"
+        )
+    if best is None:
+        raise NotFound(f"job {job_id} has no design yet that walks in every scenario")
+    document = {
+        "robot": spec.robot,
+        "controller": spec.controller,
+        "design": design_numbers(spec.controller, best.design),
+        "scenarios": spec.resolved_scenarios(),
+        "label": spec.name or f"job {job_id}",
+        **options,
+    }
+    try:
+        return FirmwareRequest.model_validate(document)
+    except ValidationError as error:
+        raise invalid_request(error, document) from error
+
+
+def run_firmware(request: FirmwareRequest) -> Firmware:
+    """Write a design as C, and let it walk for the test of it.
+
+    Args:
+        request: The design and its scenarios.
+
+    Returns:
+        The files, and what they take.
+
+    Raises:
+        InvalidRequest: The design cannot be compiled or needs integers that the robot does not
+            have, a gait leaves the legs' reach, or the controller has no such table; names the
+            field.
+        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
+    """
+    request.check()
+    with simulation_errors("scenarios"):
+        return firmware_of(
+            request.robot,
+            request.controller,
+            request.numbers,
+            request.resolved_scenarios(),
+            label=request.label,
+            table_bits=request.table_bits,
+        )
+
+
+def firmware_view(
+    request: FirmwareRequest, firmware: Firmware, folder: str | None = None
+) -> FirmwareView:
+    """Say what firmware holds and takes.
+
+    Args:
+        request: That it was written for.
+        firmware: The files.
+        folder: Where they are; None for nowhere yet.
+
+    Returns:
+        Files, their sizes, and what they take of the thesis's microcontroller.
+    """
+    return FirmwareView.from_firmware(
+        firmware,
+        folder=folder,
+        label=request.label,
+        controller=request.controller,
+        design=request.numbers,
+    )

@@ -1,0 +1,79 @@
+"""Designs in worlds that differ from the model, wherever they walk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaitswarm
+from tests.examples.walks import short_walk
+from tests.library.conftest import Reach
+
+pytestmark = pytest.mark.slow
+
+PI = {"P": 0.45, "I": 0.1}
+ASKED: dict[str, Any] = {"controller": "pi", "scenarios": short_walk()}
+WORLD = {"friction_factor": 0.8, "slope_added": 2.0, "angle_noise": 1e-3, "world_seed": 7}
+
+
+def test_a_world_has_the_same_bits_wherever_a_design_walks(reach: Reach, db: Path) -> None:
+    here = gaitswarm.simulate(PI, world=WORLD, **ASKED)
+    there = reach(db).simulate(PI, world=WORLD, **ASKED)
+    assert np.array_equal(there.objectives, here.objectives)
+    assert np.array_equal(there.measurements, here.measurements)
+    assert not np.array_equal(here.objectives, gaitswarm.simulate(PI, **ASKED).objectives)
+
+
+def test_a_replay_shows_the_walk_of_the_world(reach: Reach, db: Path) -> None:
+    jobs = reach(db)
+    walks = [
+        jobs.replay(PI, controller="pi", scenario=short_walk(), world=world)
+        for world in (WORLD, None, {})
+    ]
+    poses = [walk.channels["link_pose"] for walk in walks]
+    assert not np.array_equal(poses[0], poses[1])
+    assert np.array_equal(poses[1], poses[2])
+    objectives = gaitswarm.simulate(PI, world=WORLD, **ASKED)["short"].objectives
+    assert walks[0].header.objectives["energy"] == objectives["energy"][0]
+
+
+def test_many_designs_walk_in_a_world_as_each_alone() -> None:
+    gains = np.array([0.2, 0.45])
+    many = gaitswarm.simulate({"P": gains, "I": 0.1}, world=WORLD, **ASKED)
+    for row, gain in enumerate(gains.tolist()):
+        alone = gaitswarm.simulate({"P": gain, "I": 0.1}, world=WORLD, log=True, **ASKED)
+        assert np.array_equal(many.objectives[[row]], alone.objectives)
+        assert np.array_equal(many.measurements[[row]], alone.measurements)
+        assert alone["short"].logs[0] is not None
+
+
+@pytest.mark.parametrize(
+    ("world", "field", "said"),
+    [
+        ({"gravity": 3.0}, "world.gravity", "no perturbation; known are friction_factor"),
+        ({"friction_factor": -1.0}, "world.friction_factor", "-1 must lie in 0 to 100"),
+        ({"slope_added": float("nan")}, "world.slope_added", "finite number"),
+        ([0.8], "world", "must be a mapping"),
+    ],
+)
+def test_a_world_that_cannot_be_is_refused_with_its_field(
+    reach: Reach, db: Path, world: Any, field: str, said: str
+) -> None:
+    jobs = reach(db)
+    for ask in (
+        lambda: gaitswarm.simulate(PI, world=world, **ASKED),
+        lambda: jobs.simulate(PI, world=world, **ASKED),
+        lambda: jobs.replay(PI, controller="pi", world=world),
+    ):
+        with pytest.raises(gaitswarm.InvalidRequest, match=said) as refused:
+            ask()
+        assert refused.value.field == field
+
+
+def test_a_world_chooses_its_kernel() -> None:
+    with pytest.raises(gaitswarm.InvalidRequest) as refused:
+        gaitswarm.simulate(PI, world=WORLD, backend="native", **ASKED)
+    assert refused.value.field == "backend"

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Any, Final
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import ServerProcess
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 from tests.web.test_views import TOO_WIDE
@@ -103,20 +101,6 @@ def test_a_certificate_that_waits_says_so(
     idle = start_server("--no-runner")
     page = visit(idle.url).go(f"/jobs/{idle.submit(CERTIFICATE)}/certificate")
     expect(page.get_by_role("heading", name="No world yet")).to_be_visible()
-
-
-def test_a_tuning_in_many_worlds_is_shown_and_cloned_with_them(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
-    job = server.submit(SMALL_SPEC | {"name": "robust", "worlds": {"count": 2}})
-    server.wait_for(job, "succeeded")
-    page = visit(server.url).go(f"/jobs/{job}/scenarios")
-    table = page.get_by_role("table", name="Objectives of the winner by scenario")
-    names = ["short.world-0", "short.world-1"]
-    expect(table.get_by_role("rowheader")).to_have_text(names)
-    page.get_by_role("link", name="Clone").click()
-    spec = page.get_by_role("textbox", name="Spec as JSON")
-    expect(spec).to_have_value(re.compile('"aggregate": "cvar"'))
 
 
 def test_no_part_has_to_be_scrolled_sideways(

@@ -42,6 +42,19 @@ export const DOCUMENT: OpenApiDocument = {
           backlash: { default: [0, 0, 0] },
         },
       },
+      TuningWorlds: {
+        properties: {
+          count: { type: 'integer', minimum: 1, maximum: 100, default: 8 },
+          seed: { type: 'integer', minimum: 0, default: 1 },
+          ranges: { anyOf: [{ type: 'array' }, { type: 'null' }] },
+          aggregate: {
+            type: 'string',
+            enum: ['mean', 'quantile', 'worst', 'cvar'],
+            default: 'cvar',
+          },
+          level: { type: 'number', minimum: 0, exclusiveMaximum: 1, default: 0.75 },
+        },
+      },
     },
   },
 }
@@ -124,5 +137,6 @@ export const CATALOGUE = {
     job: fieldsOf(DOCUMENT, 'JobSpec'),
     scenario: fieldsOf(DOCUMENT, 'Scenario'),
     variant: fieldsOf(DOCUMENT, 'RobotVariant'),
+    worlds: fieldsOf(DOCUMENT, 'TuningWorlds'),
   },
 } as unknown as Catalogue

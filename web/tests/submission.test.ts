@@ -5,6 +5,7 @@ import { errorsByField, specOf, withKinds } from '../src/submission/build-spec'
 import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
 import { optimizerDraft, settingsOf, withPreset } from '../src/submission/optimizer'
 import { boundsInWords, fieldsOf } from '../src/submission/schema-fields'
+import { counts, walksEach, worldsFields } from '../src/submission/worlds'
 import { CATALOGUE, DOCUMENT } from './catalogue-example'
 
 const empty = emptyDraft(CATALOGUE)
@@ -124,6 +125,52 @@ describe('a draft', () => {
 
   test('offers the choices of a field that may be null', () => {
     expect(CATALOGUE.fields.variant.get('contact_law')?.choices).toEqual(['linear_zone', 'stick'])
+  })
+})
+
+describe('worlds', () => {
+  const { fields } = CATALOGUE
+  const robust = (values: Record<string, string> = {}): Draft => ({
+    ...empty,
+    worlds: { ...empty.worlds, robust: true, values: { ...empty.worlds.values, ...values } },
+  })
+
+  test('are left out unless the job is to be robust', () => {
+    expect(specOf(empty)).not.toHaveProperty('worlds')
+    expect(walksEach(empty.worlds)).toBe(1)
+    expect(specOf(robust()).worlds).toEqual({ count: 8, seed: 1, aggregate: 'cvar', level: 0.75 })
+  })
+
+  test('are what the schema lets be set, in its order', () => {
+    const names = worldsFields(fields.worlds).map(({ name }) => name)
+    expect(names).toEqual(['count', 'seed', 'aggregate', 'level'])
+  })
+
+  test('multiply the walks of a design', () => {
+    expect(walksEach(robust({ count: '12' }).worlds)).toBe(12)
+    expect(walksEach(robust({ count: 'many' }).worlds)).toBeNaN()
+    expect(specOf(robust({ count: 'many' })).worlds).toMatchObject({ count: 'many' })
+    expect(specOf(robust({ count: '' })).worlds).toMatchObject({ count: '' })
+  })
+
+  test('have a level for a quantile and a value at risk only', () => {
+    const level = fields.worlds.get('level')!
+    const asked = (aggregate: string) => counts(level, robust({ aggregate }).worlds)
+    expect(['mean', 'quantile', 'worst', 'cvar'].filter(asked)).toEqual(['quantile', 'cvar'])
+  })
+
+  test('of a cloned job are asked for again, with their ranges', () => {
+    const worlds = {
+      count: 3,
+      seed: 5,
+      aggregate: 'worst',
+      level: 0.5,
+      ranges: ['friction_factor'],
+    }
+    const cloned = draftOf({ worlds } as unknown as JobSpec, CATALOGUE)
+    expect(specOf(cloned).worlds).toEqual(worlds)
+    const all = { ...cloned, worlds: { ...cloned.worlds, ranges: null } }
+    expect(specOf(all).worlds).not.toHaveProperty('ranges')
   })
 })
 

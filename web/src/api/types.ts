@@ -5,6 +5,7 @@ import type { components } from './schema'
 type Schemas = components['schemas']
 
 export type JobSpec = Schemas['JobSpec']
+export type TuningWorlds = Schemas['TuningWorlds']
 export type JobState = Schemas['JobState']
 export type JobSummary = Schemas['JobSummaryView']
 /** A job as it is answered: without a spec and a kind where the server cannot read it. */

@@ -14,6 +14,7 @@ import { fitnessUnit } from './fitness'
 import { LineageNote } from './lineage'
 import { startDesigns } from './start'
 import type { LiveJob } from './use-job'
+import { WorldsNote } from './worlds-note'
 
 export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
   const { followed } = live
@@ -36,6 +37,7 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
               <a href={tournamentPath(job.id)}>Its tournament: all methods compared</a>
             </p>
           )}
+          {isReadable(job) && <WorldsNote job={job} />}
           <LineageNote job={job} />
         </div>
         <JobActions job={job} onJob={live.replace} />

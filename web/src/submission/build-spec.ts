@@ -25,6 +25,7 @@ export function specOf(draft: Draft): JobSpec {
     .filter(([, { mode }]) => mode === 'fixed')
     .map(([name, { value }]) => [name, number(value)])
   const start = startOf(draft.start)
+  const worlds = worldsOf(draft)
   return {
     name: draft.name,
     robot: robotOf(draft),
@@ -33,6 +34,7 @@ export function specOf(draft: Draft): JobSpec {
     variables,
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
+    ...(worlds !== undefined && { worlds }),
     optimizer: optimizerSettings(draft.optimizer),
     iterations: number(draft.iterations),
     seed: number(draft.seed),
@@ -103,6 +105,14 @@ function preferenceOf({ preference }: Draft): JobSpec['preference'] {
     bias: bias.map(number),
     exponent: exponent.map(number),
   } as unknown as JobSpec['preference']
+}
+
+/** undefined for a job that is judged in the model alone. */
+function worldsOf({ worlds }: Draft): JobSpec['worlds'] | undefined {
+  if (!worlds.robust) return undefined
+  const values = Object.entries(worlds.values).map(([name, value]) => [name, number(value)])
+  const ranges = worlds.ranges && { ranges: worlds.ranges }
+  return { ...Object.fromEntries(values), ...ranges } as JobSpec['worlds']
 }
 
 function scenarioOf(own: Readonly<Record<string, string>>): Scenario {

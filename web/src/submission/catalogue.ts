@@ -21,6 +21,7 @@ export interface Catalogue {
     readonly job: ReadonlyMap<string, SchemaField>
     readonly scenario: ReadonlyMap<string, SchemaField>
     readonly variant: ReadonlyMap<string, SchemaField>
+    readonly worlds: ReadonlyMap<string, SchemaField>
   }
 }
 
@@ -49,6 +50,7 @@ export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
       job: fieldsOf(document, 'JobSpec'),
       scenario: fieldsOf(document, 'Scenario'),
       variant: fieldsOf(document, 'RobotVariant'),
+      worlds: fieldsOf(document, 'TuningWorlds'),
     },
   }
 }

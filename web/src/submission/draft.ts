@@ -5,6 +5,7 @@ import { type Catalogue, variablesOf } from './catalogue'
 import { type OptimizerDraft, optimizerDraft } from './optimizer'
 import type { SchemaField } from './schema-fields'
 import { NO_START, type StartDraft, startDraft } from './start'
+import { type WorldsDraft, worldsDraft } from './worlds'
 
 /** What becomes of a variable; `default` leaves a convention, or the gait to each scenario. */
 export type VariableMode = 'searched' | 'fixed' | 'default'
@@ -49,6 +50,7 @@ export interface Draft {
   readonly own: readonly Readonly<Record<string, string>>[]
   readonly variables: Readonly<Record<string, VariableDraft>>
   readonly preference: PreferenceDraft
+  readonly worlds: WorldsDraft
   /** Settings of the method that is its `name`. */
   readonly optimizer: OptimizerDraft
   readonly start: StartDraft
@@ -78,6 +80,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     own: [],
     variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, preset),
+    worlds: worldsDraft(catalogue.fields.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, undefined, usualMethod(catalogue)),
     start: NO_START,
     iterations: text(job.get('iterations')?.default),
@@ -127,6 +130,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
+    worlds: worldsDraft(catalogue.fields.worlds, spec.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, usualMethod(catalogue)),
     start: startDraft(spec.start),
     iterations: text(spec.iterations),

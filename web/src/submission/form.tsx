@@ -16,6 +16,7 @@ import { StartSection } from './start-section'
 import { SubmitPanel } from './submit-panel'
 import { useSubmission } from './use-submission'
 import { VariablesSection } from './variables-section'
+import { WorldsSection } from './worlds-section'
 
 export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial: Draft }) {
   const [draft, setDraft] = useState(initial)
@@ -53,6 +54,7 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
         <VariablesSection {...parts} />
         <ScenariosSection {...parts} />
         <PreferenceSection {...parts} />
+        <WorldsSection {...parts} />
         <OptimizerSection {...parts} />
         <StartSection {...parts} />
       </div>

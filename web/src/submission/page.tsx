@@ -85,9 +85,9 @@ function startingFrom(draft: Draft, query: URLSearchParams): Draft {
   return jobs === null ? draft : { ...draft, start: { ...draft.start, jobs } }
 }
 
-/** Whether the form has no fields for a job: of another kind, or judged in many worlds. */
+/** Whether the form has no fields for a job, as it is of another kind. */
 function isDocument({ spec }: Job): boolean {
-  return spec.kind !== 'tuning' || Boolean(spec.worlds)
+  return spec.kind !== 'tuning'
 }
 
 function withSeed(job: Job, seed: string | null): Job {

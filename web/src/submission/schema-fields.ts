@@ -72,9 +72,9 @@ export function boundsInWords({ low, high, above, below }: SchemaField): string 
   return above || below ? `${least}, ${most}` : `${formatExact(low, 8)} to ${formatExact(high, 8)}`
 }
 
-/** Description without its unit. */
+/** Description without its unit, and without the marks of code. */
 export function describe({ description }: SchemaField): string {
-  return description.replace(/\s*\[[^\]]*\]/, '')
+  return description.replace(/\s*\[[^\]]*\]/, '').replaceAll('`', '')
 }
 
 function fieldOf(name: string, given: Property, required: boolean): SchemaField {

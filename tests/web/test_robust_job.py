@@ -1,0 +1,79 @@
+"""A job that judges designs in many worlds: its part of the form, and what its page says of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.servers import ServerProcess
+from tests.web.test_job import fill_in, submitted
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_robust_job_is_set_up_in_the_form_and_its_cost_is_told_first(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="status of 422").go("/jobs/new")
+    fill_in(page, "robust", iterations=2)
+    walks = page.locator("[data-walks]")
+    expect(walks).to_have_attribute("data-walks", "16")
+    part = page.get_by_role("region", name="Robustness")
+    expect(part.get_by_label(re.compile("^Worlds"))).to_have_count(0)
+
+    part.get_by_role("button", name="many worlds").click()
+    expect(part.get_by_text("Every design walks 8 times")).to_be_visible()
+    expect(walks).to_have_attribute("data-walks", "128")
+    worlds = part.get_by_label(re.compile("^Worlds"))
+    worlds.fill("3")
+    expect(walks).to_have_attribute("data-walks", "48")
+    expect(part.get_by_label(re.compile("^Level"))).to_be_visible()
+    part.get_by_label(re.compile("^Aggregate")).select_option("worst")
+    expect(part.get_by_label(re.compile("^Level"))).to_have_count(0)
+
+    worlds.fill("1000")
+    page.get_by_role("button", name="Submit the job").click()
+    expect(worlds).to_have_attribute("aria-invalid", "true")
+    expect(worlds).to_be_focused()
+    expect(part.get_by_text(re.compile("less than or equal to 100"))).to_be_visible()
+    worlds.fill("2")
+    page.get_by_role("button", name="Submit the job").click()
+
+    spec = server.job(submitted(page))["spec"]
+    assert (spec["worlds"]["count"], spec["worlds"]["aggregate"]) == (2, "worst")
+    note = page.locator("[data-worlds='2']")
+    expect(note).to_contain_text("Robust job: every design walks in 2 worlds")
+    expect(note).to_contain_text("A scenario counts by the worst of its utilities.")
+
+
+def test_its_page_has_a_row_for_every_world_and_a_clone_asks_for_the_same(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    ranges = ["friction_factor", "efficiency_factor"]
+    job_id = server.submit(SMALL_SPEC | {"worlds": {"count": 2, "ranges": ranges}})
+    server.wait_for(job_id, "succeeded")
+    page = visit(server.url).go(f"/jobs/{job_id}/scenarios")
+    table = page.get_by_role("table", name="Objectives of the winner by scenario")
+    names = ["short.world-0", "short.world-1"]
+    expect(table.get_by_role("rowheader")).to_have_text(names)
+    note = page.locator("[data-worlds='2']")
+    expect(note).to_contain_text("in 2 perturbations")
+    expect(note).to_contain_text("the mean of the worst 25 %")
+
+    page.get_by_role("link", name="Clone").click()
+    expect(page.get_by_text("2 perturbations are drawn")).to_be_visible()
+    page.get_by_role("button", name="Submit the job").click()
+    assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
+
+
+def test_other_jobs_do_not_call_themselves_robust(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    expect(page.get_by_text("Submitted", exact=True)).to_be_visible()
+    assert page.locator("[data-worlds]").count() == 0

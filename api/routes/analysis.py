@@ -91,13 +91,26 @@ def get_particles(
             description="Most designs; more are thinned evenly in iterations, the best is kept.",
         ),
     ] = 100_000,
+    objectives: Annotated[
+        bool,
+        Query(
+            description="Whether f1 to f5 follow, each as its geometric mean over the scenarios;"
+            " only jobs that tune a drive have them."
+        ),
+    ] = False,
 ) -> Response:
     """One row per design, by column, in binary: iteration, particle, fitness, the searched
     variables, and the utility in each scenario; NaN for what does not exist.
 
     The header is a ParticlesHeaderView: it names the columns in order, with units and bounds.
     """
-    body = encoded_particles(job, service.columns(job), after=after_iteration, most=max_points)
+    body = encoded_particles(
+        job,
+        service.columns(job),
+        after=after_iteration,
+        most=max_points,
+        objectives=objectives,
+    )
     return Response(body, media_type=MEDIA_TYPE)
 
 

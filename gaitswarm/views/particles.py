@@ -10,24 +10,29 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, framed
 from services.optimizer.analysis.distribution import thinned
-from services.optimizer.analysis.utilities import utilities
+from services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from services.optimizer.analysis.utilities import objective_vectors, utilities
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
 
 
 class ParticleColumnView(View):
     """What one column of numbers is."""
 
     name: str = Field(
-        description="`iteration`, `particle`, `fitness`, a searched variable's name, or"
-        " `utility:<scenario>`.",
+        description="`iteration`, `particle`, `fitness`, a searched variable's name,"
+        " `utility:<scenario>`, or `objective:<name>`.",
         examples=["FI1R"],
     )
     unit: str = Field(description="Unit of its numbers.", examples=["counts"])
     low: float | None = Field(description="Lower bound of a variable; else null.")
     high: float | None = Field(description="Upper bound of a variable; else null.")
-    kind: Literal["index", "fitness", "continuous", "integer", "categorical", "utility"] = Field(
-        description="What its numbers are; `continuous`, `integer` and `categorical` are variables."
+    kind: Literal[
+        "index", "fitness", "continuous", "integer", "categorical", "utility", "objective"
+    ] = Field(
+        description="What its numbers are; `continuous`, `integer` and `categorical` are variables,"
+        " `objective` is an objective's geometric mean over the scenarios."
     )
     choices: list[str] = Field(
         description="Names of a categorical variable's choices, whose indices its numbers are;"
@@ -50,7 +55,12 @@ class ParticlesHeaderView(View):
 
 
 def encoded_particles(
-    job: Job, columns: EvaluationColumns, *, after: int | None, most: int
+    job: Job,
+    columns: EvaluationColumns,
+    *,
+    after: int | None,
+    most: int,
+    objectives: bool = False,
 ) -> bytes:
     """Encode evaluations for pictures of the whole search.
 
@@ -60,6 +70,8 @@ def encoded_particles(
         after: only iterations with a greater index; None for all.
         most: rows at most, at least 1; more are thinned evenly in iterations, and the best of them
             is always there.
+        objectives: whether f1 to f5 over all scenarios are to follow, as a front weighs them; only
+            a job that tunes a drive has them.
 
     Returns:
         `framed` ParticlesHeaderView and columns, one after another; NaN for what does not exist.
@@ -72,9 +84,13 @@ def encoded_particles(
         rows=rows,
         total=len(wanted),
         iterations=(int(chosen.iteration[0]), int(chosen.iteration[-1])) if rows else None,
-        columns=_described(job),
+        columns=[*_described(job), *(_objectives_described(job) if objectives else ())],
     )
-    return framed(header, _numbers(job, chosen))
+    numbers = _numbers(job, chosen)
+    if objectives and isinstance(job.spec, JobSpec):
+        vectors = objective_vectors(chosen, worlds=job.spec.worlds).T
+        numbers = np.concatenate([numbers, np.where(np.isfinite(vectors), vectors, np.nan)])
+    return framed(header, numbers)
 
 
 def _described(job: Job) -> list[ParticleColumnView]:
@@ -92,6 +108,20 @@ def _described(job: Job) -> list[ParticleColumnView]:
     ]
     described = [*unbounded[0], *variables, *unbounded[1]]
     return [ParticleColumnView.model_validate(column) for column in described]
+
+
+def _objectives_described(job: Job) -> list[ParticleColumnView]:
+    return [
+        ParticleColumnView(
+            name=f"objective:{objective.name}",
+            unit=objective.unit,
+            low=None,
+            high=None,
+            kind="objective",
+            choices=[],
+        )
+        for objective in (NORMALISED_OBJECTIVES if isinstance(job.spec, JobSpec) else ())
+    ]
 
 
 def _numbers(job: Job, chosen: EvaluationColumns) -> NDArray[np.float64]:

@@ -35,7 +35,7 @@ def ranking(client: httpx2.Client, job: Job, **body: Any) -> Any:
 
 
 def particles(
-    client: httpx2.Client, job: Job, **parameters: int
+    client: httpx2.Client, job: Job, **parameters: int | bool
 ) -> tuple[Any, dict[str, NDArray[np.float32]]]:
     answer = client.get(f"/v1/jobs/{job.id}/particles", params=parameters)
     assert answer.status_code == 200, answer.text
@@ -143,6 +143,26 @@ def test_a_categorical_variable_is_a_column_of_indices_with_the_names_of_its_cho
         ["moving_average", "hamming"],
     )
     assert set(columns["fir_window"].tolist()) == {0.0, 1.0}
+
+
+def test_particles_have_the_objectives_of_a_front_where_they_are_asked_for(
+    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+) -> None:
+    commit(job, 2)
+    plain, without = particles(client, job)
+    header, columns = particles(client, job, objectives=True)
+    assert header["columns"][: len(plain["columns"])] == plain["columns"]
+    described = header["columns"][len(plain["columns"]) :]
+    assert [(d["name"], d["unit"], d["kind"]) for d in described][1:3] == [
+        ("objective:acceleration", "m/s2", "objective"),
+        ("objective:angular_acceleration", "rad/s2", "objective"),
+    ]
+    assert set(columns) - set(without) == {d["name"] for d in described}
+    rows = store.evaluations_between(job.id, 0, 2)
+    failed = np.array([row.statuses.any() for row in rows])
+    means = np.exp([np.log(row.objectives[:, 0]).mean() for row in rows])
+    np.testing.assert_allclose(columns["objective:torque"], np.where(failed, np.nan, means), 1e-6)
+    assert failed.any()
 
 
 def test_particles_after_an_iteration_are_the_later_ones(

@@ -18,6 +18,7 @@ VIEWS: Final = {
     "iterations": "/jobs/{job}/iterations",
     "particles": "/jobs/{job}/iterations/1",
     "what-if": "/jobs/{job}/preferences",
+    "trade-offs": "/jobs/{job}/trade-offs",
     "spec": "/jobs/{job}/reproduce",
     "walk": "/walk?job={job}",
     "two-walks": "/walk?job={job}&against=published:A",

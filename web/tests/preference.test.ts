@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import type { Preference, ScenarioResult } from '../src/api/types'
-import { analyse, utilityOf, weighed } from '../src/job/preference'
+import { analyse, preferenceIn, preferenceQuery, utilityOf, weighed } from '../src/job/preference'
 
 const PREFERENCE: Preference = { bias: [0, 0, 0, 0, 1], exponent: [1, 0, 0, 2, 1] }
 
@@ -9,6 +9,26 @@ const walked = (torque: number, energy: number, reciprocal_speed: number): Scena
   explanation: '',
   utility: null,
   objectives: { torque, acceleration: 1, angular_acceleration: 1, energy, reciprocal_speed },
+})
+
+describe('a preference in an address', () => {
+  const read = (preference: string) => preferenceIn(new URLSearchParams({ preference }))
+
+  test('is what was written there', () => {
+    expect(read(preferenceQuery(PREFERENCE))).toEqual(PREFERENCE)
+  })
+
+  test('is none where it cannot be read', () => {
+    expect(preferenceIn(new URLSearchParams())).toBeUndefined()
+    for (const text of [
+      'A',
+      '{}',
+      '{"bias":[1],"exponent":[1,2]}',
+      '{"bias":["a"],"exponent":[1]}',
+    ]) {
+      expect(read(text)).toBeUndefined()
+    }
+  })
 })
 
 describe('the utility', () => {

@@ -81,3 +81,19 @@ export function useNow(milliseconds = 1000): number {
   usePolling(() => setNow(Date.now()), milliseconds)
   return now
 }
+
+/** A number that follows another one, but not more often than every `milliseconds`. */
+export function useSlowly(value: number, milliseconds: number): number {
+  const [shown, setShown] = useState(value)
+  const changed = useRef(0)
+  useEffect(() => {
+    if (value === shown) return
+    const wait = shown === 0 ? 0 : Math.max(0, changed.current + milliseconds - Date.now())
+    const timer = setTimeout(() => {
+      changed.current = Date.now()
+      setShown(value)
+    }, wait)
+    return () => clearTimeout(timer)
+  }, [value, shown, milliseconds])
+  return shown
+}

@@ -18,6 +18,7 @@ import { ReproducePanel } from './reproduce-panel'
 import { RobustnessPanel } from './robustness-panel'
 import { ScenariosPanel } from './scenarios-panel'
 import { TargetsPanel } from './targets-panel'
+import { TradeOffsPanel } from './trade-offs/panel'
 import { type LiveJob, useJob } from './use-job'
 import { VariablesPanel } from './variables-panel'
 
@@ -30,6 +31,7 @@ const TABS = [
   { tab: 'robustness', label: 'Robustness' },
   { tab: 'variables', label: 'Variables' },
   { tab: 'iterations', label: 'Iterations' },
+  { tab: 'trade-offs', label: 'Trade-offs' },
   { tab: 'preferences', label: 'What if' },
   { tab: 'reproduce', label: 'Spec' },
 ] as const
@@ -42,6 +44,7 @@ const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
   scenarios: ['tuning', 'identification', 'calibration', 'tournament'],
   parameters: ['identification', 'calibration'],
   robustness: ['tuning'],
+  'trade-offs': ['tuning'],
   preferences: ['tuning'],
 }
 
@@ -124,6 +127,8 @@ function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
       return <IterationsPanel live={live} job={job} />
     case 'parameters':
       return <ParametersPanel job={job} />
+    case 'trade-offs':
+      return <TradeOffsPanel job={job} />
     case 'preferences':
       return <PreferencesPanel job={job} />
     case 'reproduce':

@@ -17,6 +17,24 @@ export function weighed({ bias }: { readonly bias: readonly unknown[] }): readon
   return PREFERRED.slice(0, bias.length)
 }
 
+/** The preference that a query asks for; undefined if it has none that can be read. */
+export function preferenceIn(query: URLSearchParams): Preference | undefined {
+  try {
+    const { bias, exponent } = JSON.parse(query.get('preference') ?? '') as Partial<Preference>
+    const numbers = [bias, exponent].every((part) => part?.every(Number.isFinite))
+    return numbers && bias?.length === exponent?.length
+      ? ({ bias, exponent } as Preference)
+      : undefined
+  } catch {
+    return undefined
+  }
+}
+
+/** What `preferenceIn` reads. */
+export function preferenceQuery({ bias, exponent }: Preference): string {
+  return JSON.stringify({ bias, exponent })
+}
+
 /** One factor (b + f)^e of a scenario's utility. */
 export interface Factor {
   readonly scenario: string

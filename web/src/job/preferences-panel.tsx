@@ -6,12 +6,15 @@ import { LatestAnswer } from '../api/latest-answer'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec, Preference, Ranking } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
+import { usePlace } from '../router/navigation'
+import { preferenceIn } from './preference'
 import { PreferenceSliders } from './preference-sliders'
 import { RankingResult } from './ranking-result'
 
 export function PreferencesPanel({ job }: { job: Job }) {
   const own = (job.spec as JobSpec).preference as Preference
-  const [preference, setPreference] = useState(own)
+  const { query } = usePlace()
+  const [preference, setPreference] = useState(() => preferenceIn(query) ?? own)
   const { ranking, error } = useRanking(job, preference)
   const presets = useResource('preferences', (signal) =>
     get('/v1/preferences', { signal }).then((answer) => answer.items),

@@ -10,6 +10,7 @@ import { change, formatCount, formatNumber } from '../format/number'
 import { formatValue } from '../format/value'
 import { withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
+import { preferenceQuery } from './preference'
 import { Where } from './selected-designs'
 
 export function RankingResult({
@@ -66,7 +67,7 @@ function Winners({
   const gain = old === null ? null : (winner.fitness / old - 1) * 100
   const target = withQuery('/jobs/new', {
     clone: job.id,
-    preference: JSON.stringify({ bias: preference.bias, exponent: preference.exponent }),
+    preference: preferenceQuery(preference),
     iteration: winner.iteration,
     particle: winner.particle,
   })

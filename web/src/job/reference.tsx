@@ -34,6 +34,17 @@ async function load(job: Job, choice: string, signal: AbortSignal): Promise<Refe
   return { label: `published ${study}`, scenarios: result.scenarios }
 }
 
+/** The published designs of the job's controller, walking in its scenarios. */
+export async function publishedWalks(job: Job): Promise<readonly Reference[]> {
+  const spec = job.spec as JobSpec
+  const found = (await catalogue()).find(({ name }) => name === spec.controller)
+  const walks = Object.entries(found?.published ?? {}).map(async ([study, design]) => {
+    const { scenarios } = await walkOf(spec, spec.controller, design)
+    return { label: `published ${study}`, scenarios }
+  })
+  return Promise.all(walks)
+}
+
 let controllers: Promise<readonly Controller[]> | null = null
 
 function catalogue(): Promise<readonly Controller[]> {

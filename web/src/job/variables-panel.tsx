@@ -1,8 +1,8 @@
 /** All designs of a job across their variables, coloured by fitness; brushing selects some. */
 
-import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { useMemo, useRef, useState } from 'preact/hooks'
 import { getBytes } from '../api/client'
-import { useResource } from '../api/resource'
+import { useResource, useSlowly } from '../api/resource'
 import type { Job } from '../api/types'
 import { type Brushes, ParallelCoordinates } from '../charts/parallel-coordinates'
 import { type AxisSource, bestRows, buildModel, selectRows } from '../charts/parallel-model'
@@ -143,20 +143,4 @@ function axesOf({ columns }: Particles, utilities: boolean): readonly AxisSource
     choices: column.choices,
     values: column.values,
   }))
-}
-
-/** A number that follows another one, but not more often than every `milliseconds`. */
-function useSlowly(value: number, milliseconds: number): number {
-  const [shown, setShown] = useState(value)
-  const changed = useRef(0)
-  useEffect(() => {
-    if (value === shown) return
-    const wait = shown === 0 ? 0 : Math.max(0, changed.current + milliseconds - Date.now())
-    const timer = setTimeout(() => {
-      changed.current = Date.now()
-      setShown(value)
-    }, wait)
-    return () => clearTimeout(timer)
-  }, [value, shown, milliseconds])
-  return shown
 }

@@ -3,8 +3,9 @@
 import { get } from '../api/client'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
-import type { Job, JobSpec, Preference } from '../api/types'
+import type { Job, JobSpec } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
+import { preferenceIn } from '../job/preference'
 import { usePlace } from '../router/navigation'
 import { around } from './around-design'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
@@ -93,11 +94,6 @@ function isDocument({ spec }: Job): boolean {
 function withSeed(job: Job, seed: string | null): Job {
   if (seed === null || !/^\d+$/.test(seed)) return job
   return { ...job, spec: { ...job.spec, seed: Number(seed) } }
-}
-
-function preferenceIn(query: URLSearchParams): Preference | undefined {
-  const text = query.get('preference')
-  return text === null ? undefined : (JSON.parse(text) as Preference)
 }
 
 async function designIn(query: URLSearchParams, job: string, signal: AbortSignal) {

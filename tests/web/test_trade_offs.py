@@ -1,0 +1,170 @@
+"""The Pareto front of a job, and the preference that would have chosen one of its designs."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.examples.servers import ServerProcess
+from tests.web.conftest import SMALL_JOB
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+SCATTER = re.compile("designs of the front by")
+
+
+def front_of(server: ServerProcess, job_id: str) -> Any:
+    return server.client.get(f"/v1/jobs/{job_id}/front").json()
+
+
+def place(design: dict[str, Any]) -> str:
+    return f"{design['iteration']}/{design['particle']}"
+
+
+def preference_of(server: ServerProcess, job_id: str, design: dict[str, Any]) -> Any:
+    query = {name: design[name] for name in ("iteration", "particle")}
+    return server.client.get(f"/v1/jobs/{job_id}/preference-for", params=query).json()
+
+
+def table(page: Page, name: str) -> Locator:
+    return page.get_by_role("table", name=name)
+
+
+def test_the_front_is_drawn_over_any_two_objectives_and_listed_with_its_marks(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    front = front_of(server, finished_job)
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    page.get_by_role("link", name="Trade-offs").click()
+    shown = page.locator("[data-front]")
+    expect(shown).to_have_attribute("data-front", str(front["size"]))
+    expect(page.get_by_role("img", name=SCATTER)).to_have_attribute(
+        "aria-label", re.compile(rf"^{len(front['designs'])} .* reciprocal speed and acceleration$")
+    )
+    page.get_by_label("Across").select_option("energy")
+    expect(page).to_have_url(re.compile("x=energy"))
+    expect(page.get_by_role("img", name=SCATTER)).to_have_attribute(
+        "aria-label", re.compile("by energy and acceleration$")
+    )
+
+    page.get_by_role("button", name=re.compile("^Show as table.*Pareto front")).click()
+    rows = table(page, "Designs of the front").locator("tbody tr")
+    expect(rows).to_have_count(min(20, len(front["designs"])))
+    marked = [design for design in front["designs"] if design["marks"]]
+    # Those with a mark come first.
+    expect(rows.nth(len(marked) - 1)).to_contain_text(re.compile("best|knee|least"))
+    listed = table(page, "Designs of the front")
+    listed.get_by_role("button", name=re.compile("^energy")).click()
+    least = min(design["objectives"]["energy"] for design in front["designs"])
+    expect(rows.first).to_contain_text(re.compile("least energy"))
+    expect(rows.first).to_contain_text(f"{least:.4g}")
+    rows.first.get_by_role("link").click()
+    expect(page).to_have_url(re.compile(rf"/walk\?job={finished_job}&iteration="))
+
+
+def test_published_designs_walk_when_they_are_asked_for_and_stand_in_the_table(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    visited = visit(server.url)
+    page = visited.go(f"/jobs/{finished_job}/trade-offs")
+    expect(page.get_by_role("img", name=SCATTER)).to_be_visible()
+    assert not any("/v1/simulations" in url for url in visited.requested)
+    page.get_by_label("published designs").check()
+    expect(page).to_have_url(re.compile("published="))
+    page.get_by_role("button", name=re.compile("^Show as table.*Pareto front")).click()
+    rows = table(page, "Published designs").get_by_role("rowheader")
+    expect(rows).to_have_text(["published A", "published B", "published C"])
+
+
+def test_winners_of_known_preferences_and_the_hypervolume_are_told(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    front = front_of(server, finished_job)
+    page = visit(server.url).go(f"/jobs/{finished_job}/trade-offs")
+    assert {winner["preference"] for winner in front["winners"]} == {"job", "A", "B", "C"}
+    for winner in front["winners"]:
+        row = page.locator(f"[data-preference='{winner['preference']}']")
+        expect(row).to_have_attribute("data-place", place(winner))
+        expect(row).to_contain_text("yes" if winner["on_front"] else "dominate it")
+    page.get_by_role("button", name=re.compile("^Show as table.*Hypervolume")).click()
+    rows = table(page, "Hypervolume by iteration").locator("tbody tr")
+    expect(rows).to_have_count(len(front["iterations"]))
+    expect(rows.first).to_contain_text(f"{front['hypervolume']:.4g}".rstrip("0"))
+
+
+def test_a_design_that_is_pointed_at_has_its_preference_which_ranks_and_starts_jobs(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    front = front_of(server, finished_job)
+    best = place(server.job(finished_job)["best"])
+    chosen = next(
+        design
+        for design in front["designs"]
+        if place(design) != best and preference_of(server, finished_job, design)["wins"]
+    )
+    wanted = preference_of(server, finished_job, chosen)["fits"][0]["preference"]
+    page = visit(server.url).go(f"/jobs/{finished_job}/trade-offs")
+    expect(page.get_by_role("heading", name="No design chosen")).to_be_visible()
+    page.get_by_role("button", name=re.compile("^Show as table.*Pareto front")).click()
+    name = f"design {chosen['particle']} of iteration {chosen['iteration']}"
+    row = table(page, "Designs of the front").get_by_role("row").filter(has_text=name)
+    row.get_by_role("button").click()
+    expect(page.locator("[data-wins='true']")).to_contain_text("is the best of the job")
+    assert parse_qs(urlsplit(page.url).query)["design"] == [place(chosen)]
+
+    page.get_by_role("link", name="Rank the history under it").click()
+    expect(page.locator("[data-winner]")).to_have_attribute("data-winner", place(chosen))
+    page.go_back()
+    page.get_by_role("link", name="Start a job with it").click()
+    query = parse_qs(urlsplit(page.url).query)
+    assert json.loads(query["preference"][0]) == wanted
+    expect(page.get_by_role("button", name="own", exact=True)).to_have_attribute(
+        "aria-pressed", "true"
+    )
+
+
+def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    front = front_of(server, finished_job)
+    page = visit(server.url).go(f"/jobs/{finished_job}/trade-offs")
+    chart = page.get_by_role("img", name=SCATTER)
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    assert box is not None
+    chosen = page.locator("[data-chosen]")
+    expect(chosen).to_have_attribute("data-chosen", "")
+    # Somewhere along these lines there is a design.
+    for share in (0.3, 0.5, 0.7):
+        for step in range(8, 60):
+            page.mouse.click(box["x"] + box["width"] * step / 60, box["y"] + box["height"] * share)
+            if (found := chosen.get_attribute("data-chosen")) != "":
+                assert found in {place(design) for design in front["designs"]}
+                return
+    raise AssertionError("no click chose a design")
+
+
+def test_a_design_that_fails_is_told_why_it_has_no_preference(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="status of 404").go(
+        f"/jobs/{finished_job}/trade-offs?design=0/4000"
+    )
+    notice = page.get_by_role("alert")
+    expect(notice).to_contain_text("Its preference cannot be told.")
+    expect(notice).to_contain_text("has no design 4000 in iteration 0")
+
+
+def test_a_job_that_waits_has_no_front_yet(
+    start_server: Callable[..., ServerProcess], visit: Callable[..., Visit]
+) -> None:
+    server = start_server("--no-runner")
+    page = visit(server.url).go(f"/jobs/{server.submit(SMALL_JOB)}/trade-offs")
+    expect(page.get_by_role("heading", name="No front yet")).to_be_visible()

@@ -1,0 +1,119 @@
+/** Designs of a front: how they are named, pointed at and drawn. Pure. */
+
+import type { Front, ScenarioResult } from '../../api/types'
+import type { Cloud, Mark } from '../../charts/scatter'
+import { columnNamed, type Particles } from '../particles'
+import type { Reference } from '../reference'
+
+/** Where a design is in its job. */
+export interface Place {
+  readonly iteration: number
+  readonly particle: number
+}
+
+/** Axes at first: shaking less costs speed. */
+const USUAL = ['reciprocal_speed', 'acceleration']
+
+/** `24/7`: design 7 of iteration 24. */
+export function placeWord({ iteration, particle }: Place): string {
+  return `${iteration}/${particle}`
+}
+
+/** What `placeWord` wrote; null for anything else. */
+export function placeOf(word: string | null): Place | null {
+  const found = /^(\d+)\/(\d+)$/.exec(word ?? '')
+  return found && { iteration: Number(found[1]), particle: Number(found[2]) }
+}
+
+/** Whose preference it is, in words. */
+export function ownerWords(owner: string): string {
+  return owner === 'job' ? 'the job’s own' : owner
+}
+
+/** Two objectives to draw: those that were asked for, else what most preferences set against each other. */
+export function axesOf(front: Front, x: string | null, y: string | null): [string, string] {
+  const names = front.objectives.map(({ name }) => name)
+  const wanted = [x, y, ...USUAL, ...names].filter((name) => name !== null && names.includes(name))
+  const [first, second] = new Set(wanted)
+  return [first!, second!]
+}
+
+/** All designs in two objectives, those of the front among them. */
+export function allCloud(particles: Particles, x: string, y: string): Cloud | null {
+  const values = (name: string) => columnNamed(particles, `objective:${name}`)?.values
+  const [xs, ys] = [values(x), values(y)]
+  if (!xs || !ys) return null
+  return { x: xs, y: ys, colour: '--series-6', radius: 2, opacity: 0.35 }
+}
+
+/** The front in two objectives; its order is that of `designs`. */
+export function frontCloud({ designs }: Front, x: string, y: string): Cloud {
+  return {
+    x: designs.map(({ objectives }) => objectives[x]),
+    y: designs.map(({ objectives }) => objectives[y]),
+    colour: '--series-1',
+    radius: 3.5,
+    opacity: 0.9,
+  }
+}
+
+/** A published design by its objectives over all scenarios. */
+export interface PublishedDesign {
+  readonly label: string
+  readonly objectives: Readonly<Record<string, number>>
+}
+
+/** What a published design comes to; null if a walk of it failed. */
+export function publishedDesign(front: Front, reference: Reference): PublishedDesign | null {
+  const walks = Object.values(reference.scenarios)
+  if (walks.some(({ status }) => status !== 'ok')) return null
+  const objectives = front.objectives.map(({ name }) => [name, geometricMean(walks, name)] as const)
+  return { label: reference.label, objectives: Object.fromEntries(objectives) }
+}
+
+function geometricMean(walks: readonly ScenarioResult[], objective: string): number {
+  const logarithms = walks.map(({ objectives }) => Math.log(objectives[objective] ?? Number.NaN))
+  return Math.exp(logarithms.reduce((a, b) => a + b, 0) / walks.length)
+}
+
+/** Published designs among those of the job. */
+export function publishedMarks(
+  designs: readonly PublishedDesign[],
+  x: string,
+  y: string,
+): readonly Mark[] {
+  return designs.map(({ label, objectives }) => ({
+    x: objectives[x],
+    y: objectives[y],
+    name: label,
+    colour: '--series-4',
+    shape: 'square',
+  }))
+}
+
+/** Knees, and where the best of A, B, C and of the job are; one mark for each design. */
+export function marksOf(front: Front, x: string, y: string): readonly Mark[] {
+  const winners = new Map<string, Mark>()
+  for (const winner of front.winners) {
+    const word = placeWord(winner)
+    const name = winner.preference === 'job' ? 'own' : winner.preference
+    const before = winners.get(word)
+    winners.set(word, {
+      x: winner.objectives[x],
+      y: winner.objectives[y],
+      name: before ? `${before.name}, ${name}` : name,
+      colour: '--series-5',
+      shape: 'ring',
+    })
+  }
+  const knees = front.knees.map(
+    (knee, index): Mark => ({
+      x: knee.objectives[x],
+      y: knee.objectives[y],
+      name: `knee ${index + 1}`,
+      colour: '--series-2',
+      shape: 'diamond',
+    }),
+  )
+  return [...winners.values(), ...knees]
+}

@@ -1,0 +1,118 @@
+/** The designs of a front as a table: what is remarkable of them, and all their objectives. */
+
+import type { Front, FrontDesign, Job, Objective } from '../../api/types'
+import { type Column, Table } from '../../components/table'
+import { formatNumber, NONE } from '../../format/number'
+import { inWords } from '../../format/words'
+import { Where } from '../selected-designs'
+import { type Place, type PublishedDesign, placeWord } from './designs'
+
+/** What every design of a front is told by. */
+interface ByObjective {
+  readonly objectives: Readonly<Record<string, number>>
+}
+
+export function FrontTable({
+  job,
+  front,
+  chosen,
+  onChoose,
+}: {
+  job: Job
+  front: Front
+  chosen: Place | null
+  onChoose: (place: Place) => void
+}) {
+  const columns: readonly Column<FrontDesign>[] = [
+    {
+      key: 'design',
+      label: 'Design',
+      header: true,
+      value: ({ iteration, particle }) => iteration * 1e5 + particle,
+      cell: (design) => <Where job={job} {...design} />,
+    },
+    {
+      key: 'marks',
+      label: 'Remarkable',
+      // Those with a mark first.
+      value: ({ marks }) => (marks.length === 0 ? null : marks.join(', ')),
+      cell: ({ marks }) => (marks.length === 0 ? NONE : marks.map(inWords).join(', ')),
+    },
+    ...objectiveColumns<FrontDesign>(front.objectives),
+    {
+      key: 'fitness',
+      label: 'Fitness',
+      numeric: true,
+      value: ({ fitness }) => fitness,
+      cell: ({ fitness }) => formatNumber(fitness, 5),
+    },
+    chooseColumn(chosen, onChoose),
+  ]
+  return (
+    <Table
+      caption="Designs of the front"
+      rows={front.designs}
+      rowKey={placeWord}
+      order={{ column: 'marks', descending: false }}
+      pageSize={20}
+      columns={columns}
+    />
+  )
+}
+
+/** Published designs beside those of a front, by the same objectives. */
+export function PublishedTable({
+  front,
+  designs,
+}: {
+  front: Front
+  designs: readonly PublishedDesign[]
+}) {
+  return (
+    <Table
+      caption="Published designs"
+      rows={designs}
+      rowKey={({ label }) => label}
+      columns={[
+        { key: 'design', label: 'Design', header: true, value: ({ label }) => label },
+        ...objectiveColumns<PublishedDesign>(front.objectives),
+      ]}
+    />
+  )
+}
+
+/** A column for each objective. */
+export function objectiveColumns<R extends ByObjective>(
+  objectives: readonly Objective[],
+): readonly Column<R>[] {
+  return objectives.map(({ name, unit }) => ({
+    key: name,
+    label: inWords(name),
+    unit,
+    numeric: true,
+    value: (row) => row.objectives[name] ?? null,
+    cell: (row) => formatNumber(row.objectives[name]),
+  }))
+}
+
+/** A button that asks for the preference of a row's design. */
+export function chooseColumn<R extends Place>(
+  chosen: Place | null,
+  onChoose: (place: Place) => void,
+): Column<R> {
+  return {
+    key: 'choose',
+    label: 'Preference',
+    cell: (design) => (
+      <button
+        type="button"
+        class="compact"
+        aria-pressed={chosen !== null && placeWord(chosen) === placeWord(design)}
+        aria-label={`Which preference chooses design ${design.particle} of iteration ${design.iteration}`}
+        onClick={() => onChoose(design)}
+      >
+        Which?
+      </button>
+    ),
+  }
+}

@@ -1,0 +1,181 @@
+/** The front over any two objectives, with what is remarkable of it; as a table with all of them. */
+
+import { useMemo, useState } from 'preact/hooks'
+import { useResource } from '../../api/resource'
+import type { Front, Job, JobSpec } from '../../api/types'
+import { Scatter } from '../../charts/scatter'
+import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { ErrorNotice } from '../../components/feedback'
+import { formatCount } from '../../format/number'
+import { capitalized, inWords } from '../../format/words'
+import { setQuery, usePlace } from '../../router/navigation'
+import type { Particles } from '../particles'
+import { publishedWalks } from '../reference'
+import {
+  allCloud,
+  axesOf,
+  frontCloud,
+  marksOf,
+  type Place,
+  placeWord,
+  publishedDesign,
+  publishedMarks,
+} from './designs'
+import { FrontTable, PublishedTable } from './front-table'
+
+export function ScatterCard({
+  job,
+  front,
+  all,
+  chosen,
+  onChoose,
+}: {
+  job: Job
+  front: Front
+  /** Designs of the job to be drawn behind the front; null while there are none. */
+  all: Particles | null
+  chosen: Place | null
+  onChoose: (place: Place) => void
+}) {
+  const { query } = usePlace()
+  const [logarithmic, setLogarithmic] = useState(true)
+  const [x, y] = axesOf(front, query.get('x'), query.get('y'))
+  const clouds = useMemo(() => {
+    const behind = all && allCloud(all, x, y)
+    return [...(behind ? [behind] : []), frontCloud(front, x, y)]
+  }, [front, all, x, y])
+  // In worlds an objective is no mean over scenarios.
+  const comparable = !(job.spec as JobSpec).worlds
+  const asked = comparable && query.has('published')
+  const published = usePublished(job, front, asked)
+  const marks = useMemo(
+    () => [...marksOf(front, x, y), ...publishedMarks(published.data ?? [], x, y)],
+    [front, published.data, x, y],
+  )
+  const index = front.designs.findIndex(
+    (design) => chosen !== null && placeWord(design) === placeWord(chosen),
+  )
+  const unit = (name: string) => front.objectives.find((o) => o.name === name)!.unit
+  const listed =
+    front.designs.length < front.size
+      ? ` ${formatCount(front.designs.length)} of them are shown, which cover it evenly.`
+      : ''
+  return (
+    <ChartFrame
+      title="Pareto front"
+      note={`Each objective is its geometric mean over the scenarios; less is better in both.${listed} Click a design to see which preference would have chosen it.`}
+      tools={
+        <>
+          <AxisPicker
+            label="across"
+            front={front}
+            chosen={x}
+            other={y}
+            onChoose={(name) => setQuery({ x: name, y })}
+          />
+          <AxisPicker
+            label="up"
+            front={front}
+            chosen={y}
+            other={x}
+            onChoose={(name) => setQuery({ x, y: name })}
+          />
+          {comparable && (
+            <label class="check small">
+              <input
+                type="checkbox"
+                checked={asked}
+                onChange={() => setQuery({ published: asked ? null : '' })}
+              />
+              published designs
+            </label>
+          )}
+          <label class="check small">
+            <input
+              type="checkbox"
+              checked={logarithmic}
+              onChange={(event) => setLogarithmic(event.currentTarget.checked)}
+            />
+            logarithmic
+          </label>
+        </>
+      }
+      legend={
+        <>
+          <LegendEntry colour="--series-1" label="front" area />
+          <LegendEntry colour="--series-6" label="other designs" area />
+          <LegendEntry
+            colour="--series-5"
+            label="best under A, B, C and the job’s own preference"
+            area
+          />
+          {published.data && <LegendEntry colour="--series-4" label="published designs" area />}
+          {published.loading && <span role="status">published designs walk…</span>}
+          {front.knees.length > 0 && <LegendEntry colour="--series-2" label="knees" area />}
+        </>
+      }
+      table={() => (
+        <>
+          <FrontTable job={job} front={front} chosen={chosen} onChoose={onChoose} />
+          {published.data && <PublishedTable front={front} designs={published.data} />}
+        </>
+      )}
+    >
+      {published.error && (
+        <ErrorNotice
+          what="The published designs cannot be shown."
+          error={published.error}
+          retry={published.reload}
+        />
+      )}
+      <Scatter
+        label={`${formatCount(front.designs.length)} designs of the front by ${inWords(x)} and ${inWords(y)}`}
+        xLabel={inWords(x)}
+        xUnit={unit(x)}
+        yLabel={inWords(y)}
+        yUnit={unit(y)}
+        clouds={clouds}
+        marks={marks}
+        logarithmic={logarithmic}
+        chosen={index < 0 ? null : index}
+        onChoose={(k) => onChoose(front.designs[k])}
+      />
+    </ChartFrame>
+  )
+}
+
+/** Published designs that walk in all scenarios of the job; they walk when they are asked for. */
+function usePublished(job: Job, front: Front, asked: boolean) {
+  return useResource(asked ? `published ${job.id}` : null, async () => {
+    const walks = await publishedWalks(job)
+    return walks.map((walk) => publishedDesign(front, walk)).filter((design) => design !== null)
+  })
+}
+
+function AxisPicker({
+  label,
+  front,
+  chosen,
+  other,
+  onChoose,
+}: {
+  label: string
+  front: Front
+  chosen: string
+  /** The objective of the other axis. */
+  other: string
+  onChoose: (name: string) => void
+}) {
+  return (
+    <label class="row small">
+      <span>{capitalized(label)}</span>
+      <select value={chosen} onChange={(event) => onChoose(event.currentTarget.value)}>
+        {front.objectives.map(({ name }) => (
+          <option key={name} value={name} disabled={name === other}>
+            {inWords(name)}
+          </option>
+        ))}
+      </select>
+    </label>
+  )
+}

@@ -1,0 +1,66 @@
+/** Where the best designs under A, B, C and the job's own preference lie with respect to the front. */
+
+import type { Front, FrontWinner, Job } from '../../api/types'
+import { Table } from '../../components/table'
+import { formatCount, percent } from '../../format/number'
+import { capitalized } from '../../format/words'
+import { Where } from '../selected-designs'
+import { ownerWords, type Place } from './designs'
+import { chooseColumn, objectiveColumns } from './front-table'
+
+export function WinnersCard({
+  job,
+  front,
+  onChoose,
+}: {
+  job: Job
+  front: Front
+  onChoose: (place: Place) => void
+}) {
+  return (
+    <section class="card" aria-labelledby="front-winners">
+      <h2 id="front-winners">Where preferences lie</h2>
+      <Table
+        caption="Best designs under the known preferences"
+        rows={front.winners}
+        rowKey={({ preference }) => preference}
+        rowData={({ preference, iteration, particle }) => ({
+          'data-preference': preference,
+          'data-place': `${iteration}/${particle}`,
+        })}
+        columns={[
+          {
+            key: 'preference',
+            label: 'Best under',
+            header: true,
+            value: ({ preference }) => preference,
+            cell: ({ preference }) => capitalized(ownerWords(preference)),
+          },
+          {
+            key: 'design',
+            label: 'Design',
+            value: ({ iteration, particle }) => iteration * 1e5 + particle,
+            cell: (winner) => <Where job={job} {...winner} />,
+          },
+          {
+            key: 'dominated',
+            label: 'On the front',
+            value: ({ dominated_by }) => dominated_by,
+            cell: (winner) => frontWords(winner),
+          },
+          ...objectiveColumns<FrontWinner>(front.objectives),
+          chooseColumn(null, onChoose),
+        ]}
+      />
+      <p class="muted small table-note">
+        The biases of a preference count in every scenario for itself, so that a design that is
+        dominated over all scenarios can win.
+      </p>
+    </section>
+  )
+}
+
+function frontWords({ on_front, dominated_by, behind }: FrontWinner): string {
+  if (on_front) return 'yes'
+  return `no: ${formatCount(dominated_by)} dominate it, one by ${percent(behind, 2)} throughout`
+}

@@ -19,6 +19,7 @@ VIEWS: Final = {
     "particles": "/jobs/{job}/iterations/1",
     "what-if": "/jobs/{job}/preferences",
     "trade-offs": "/jobs/{job}/trade-offs",
+    "firmware": "/jobs/{job}/firmware",
     "spec": "/jobs/{job}/reproduce",
     "walk": "/walk?job={job}",
     "two-walks": "/walk?job={job}&against=published:A",

@@ -6,6 +6,7 @@ import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
 import { CertificatePanel } from './certificate-panel'
+import { FirmwarePanel } from './firmware-panel'
 import { caseWords } from './fitness'
 import { JobHeader } from './header'
 import { IterationPanel } from './iteration-panel'
@@ -33,6 +34,7 @@ const TABS = [
   { tab: 'iterations', label: 'Iterations' },
   { tab: 'trade-offs', label: 'Trade-offs' },
   { tab: 'preferences', label: 'What if' },
+  { tab: 'firmware', label: 'Firmware' },
   { tab: 'reproduce', label: 'Spec' },
 ] as const
 
@@ -46,6 +48,7 @@ const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
   robustness: ['tuning'],
   'trade-offs': ['tuning'],
   preferences: ['tuning'],
+  firmware: ['tuning'],
 }
 
 function hasPart({ kind }: Job, tab: string): boolean {
@@ -131,6 +134,8 @@ function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
       return <TradeOffsPanel job={job} />
     case 'preferences':
       return <PreferencesPanel job={job} />
+    case 'firmware':
+      return <FirmwarePanel job={job} />
     case 'reproduce':
       return <ReproducePanel job={job} />
     default:

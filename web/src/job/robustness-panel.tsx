@@ -9,6 +9,7 @@ import { type Column, Table } from '../components/table'
 import { formatNumber, NONE, percent } from '../format/number'
 import { inWords } from '../format/words'
 import { searchedVariables } from './design-variables'
+import { RobustPreferencesCard } from './robust-preferences-card'
 
 const LEAST_SAMPLES = 128
 
@@ -46,6 +47,7 @@ export function RobustnessPanel({ job }: { job: Job }) {
       ) : (
         robustness.loading && <Loading what="walks of designs around the winner" />
       )}
+      <RobustPreferencesCard job={job} />
     </div>
   )
 }

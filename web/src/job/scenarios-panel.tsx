@@ -12,6 +12,7 @@ import { ObjectiveNotes } from './objective-notes'
 import { utilityOf } from './preference'
 import { caseLabel, type RecordingSummary, RecordingsCard, useRecordings } from './recordings'
 import { type Reference, ReferencePicker, useReference } from './reference'
+import { ScenarioFamiliesCard } from './scenario-families-card'
 import { UtilityBars } from './utility-bars'
 
 interface Row {
@@ -85,6 +86,7 @@ export function ScenariosPanel({ job }: { job: Job }) {
         )}
         <ObjectiveNotes job={job} />
       </section>
+      {job.kind === 'tuning' && <ScenarioFamiliesCard job={job} />}
     </div>
   )
 }

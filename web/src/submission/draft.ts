@@ -139,6 +139,15 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
   }
 }
 
+/** The draft with those of its scenarios that are named. */
+export function withScenarios(draft: Draft, wanted: readonly string[]): Draft {
+  return {
+    ...draft,
+    presets: draft.presets.filter((name) => wanted.includes(name)),
+    own: draft.own.filter(({ name }) => wanted.includes(name)),
+  }
+}
+
 /** A scenario of one's own to start from: a preset's values, or those that have a default. */
 export function scenarioDraft(
   fields: ReadonlyMap<string, SchemaField>,

@@ -9,7 +9,7 @@ import { preferenceIn } from '../job/preference'
 import { usePlace } from '../router/navigation'
 import { around } from './around-design'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
-import { type Draft, draftOf, emptyDraft, preferenceOf } from './draft'
+import { type Draft, draftOf, emptyDraft, preferenceOf, withScenarios } from './draft'
 import { JobForm } from './form'
 import { JsonForm } from './json-form'
 import './submission.css'
@@ -60,8 +60,8 @@ export default function NewJobPage() {
 }
 
 /**
- * `clone` names a job; `seed` and `preference` replace its own; `start` names jobs whose best
- * designs the search begins with; `iteration`, `particle` name a design to stay near.
+ * `clone` names a job; `seed` and `preference` replace its own; `scenarios` names those of its
+ * scenarios that stay; `start` names jobs whose best designs the search begins with; `iteration`, `particle` name a design to stay near.
  */
 async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Start> {
   const id = query.get('clone')
@@ -76,6 +76,8 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   let draft = startingFrom(draftOf(from.spec as JobSpec, catalogue), query)
   const preference = preferenceOf(preferenceIn(query), catalogue)
   if (preference) draft = { ...draft, preference }
+  const scenarios = query.get('scenarios')?.split(',')
+  if (scenarios) draft = withScenarios(draft, scenarios)
   const design = await designIn(query, from.id, signal)
   if (design) draft = around(draft, design, wholeVariables(catalogue, draft.controller))
   return { catalogue, draft, from }

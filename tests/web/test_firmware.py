@@ -1,0 +1,75 @@
+"""The best design of a job as firmware: memory against the microcontroller's, and the download."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.examples.servers import ServerProcess
+from tests.web.conftest import SMALL_JOB
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+def digits(text: str) -> str:
+    """Without the spaces that group them."""
+    return re.sub(r"\s", "", text)
+
+
+def test_the_winners_memory_stands_beside_the_microcontrollers_and_it_is_downloaded(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    summary = f"/v1/jobs/{finished_job}/firmware/summary"
+    memory = server.client.get(summary).json()["memory"]
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    page.get_by_role("link", name="Firmware").click()
+    table = page.get_by_role("table", name="Memory of a leg's microcontroller")
+    tables = table.get_by_role("row", name=re.compile("^Fuzzy tables"))
+    assert str(memory["tables"]) in digits(tables.inner_text())
+    limits = table.get_by_role("row", name=re.compile("^An MSP430F2618 has")).inner_text()
+    assert digits(limits).endswith("118784B8192B")
+    expect(page.get_by_text("116 kB of flash, 8 kB of RAM")).to_be_visible()
+    walks = page.get_by_role("table", name="Trajectories and walks by scenario")
+    expect(walks.get_by_role("rowheader")).to_have_text(["short", "loaded"])
+
+    smaller = server.client.get(summary, params={"table_bits": "8x6"}).json()
+    page.get_by_label("Fuzzy table").select_option("8x6")
+    expect(page.locator("[data-table-difference]")).to_contain_text("in angular acceleration")
+    assert str(smaller["memory"]["tables"]) in digits(tables.inner_text())
+
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download").click()
+    assert download.value.suggested_filename == f"{finished_job}-firmware.zip"
+    with zipfile.ZipFile(download.value.path()) as archive:
+        assert {"Makefile", "tick.c", "law.h"} <= set(archive.namelist())
+        assert sum(entry.file_size for entry in archive.infolist()) == sum(
+            smaller["files"].values()
+        )
+
+
+def test_a_job_without_a_winner_says_when_there_will_be_firmware(
+    start_server: Callable[..., ServerProcess], visit: Callable[..., Visit]
+) -> None:
+    server = start_server("--no-runner")
+    page = visit(server.url).go(f"/jobs/{server.submit(SMALL_JOB)}/firmware")
+    expect(page.get_by_role("heading", name="No design to write yet")).to_be_visible()
+    expect(page.get_by_role("link", name="Download")).to_have_count(0)
+
+
+def test_what_cannot_be_written_is_told(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    visited = visit(server.url, allowed="status of 503")
+    visited.page.route(
+        "**/firmware/summary*",
+        lambda route: route.fulfill(
+            status=503, json={"detail": "the compiler is gone", "errors": []}
+        ),
+    )
+    page = visited.go(f"/jobs/{finished_job}/firmware")
+    expect(page.get_by_role("alert")).to_contain_text("The compiler is gone.")

@@ -36,7 +36,6 @@ from gaitswarm.views.evaluation import (
 )
 from gaitswarm.views.iteration import HistoryIterationView, IterationView
 from gaitswarm.views.job import (
-    PREFIX,
     ExtensionRequest,
     JobSummaryView,
     JobView,
@@ -44,6 +43,7 @@ from gaitswarm.views.job import (
     ResumeRequest,
     StateView,
 )
+from gaitswarm.views.links import PREFIX
 from gaitswarm.views.particles import ParticlesHeaderView, encoded_particles
 from gaitswarm.views.problem import FieldErrorView, ProblemView, field_errors
 from gaitswarm.views.simulation import (

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Any, Final, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.views.base import View, finite, listing_name
 from gaitswarm.views.budget import Spent, budget_spent
 from gaitswarm.views.evaluation import BestView, ObjectiveView
+from gaitswarm.views.links import job_links
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import (
     LARGEST_BUDGET,
-    TRANSITIONS,
     Job,
     JobState,
     UnreadableSpec,
@@ -26,16 +26,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import ProvenanceRecord
 from sim.kernel.walk import Precision
 
-PREFIX: Final = "/v1"
-"""Version of the HTTP API, in every path."""
-
 JobKind = Literal["tuning", "identification", "calibration", "tournament", "certificate"]
-
-_RESOURCES: Final = ("iterations", "events")
-_OF_A_BEST: Final = ("scenarios", "preferences", "firmware")
-
-_RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
-"""Those that only a job has whose spec can be read."""
 
 T = TypeVar("T")
 
@@ -316,35 +307,6 @@ class StateView(View):
             iterations=job.progress.iterations,
             evaluations=job.progress.evaluations,
         )
-
-
-def job_links(job: Job) -> dict[str, str]:
-    """Say where a client goes on from a job.
-
-    Args:
-        job: as it was read.
-
-    Returns:
-        Paths of its resources, and of the commands that its state allows, by name.
-    """
-    here = f"{PREFIX}/jobs/{job.id}"
-    names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
-    if isinstance(job.stored_spec, JobSpec):
-        names += ["ranking", *(_OF_A_BEST if job.progress.best_fitness is not None else ())]
-    resources = {name: f"{here}/{name}" for name in names}
-    commands = {
-        command.value: f"{here}/{command.value}"
-        for (state, command), after in TRANSITIONS.items()
-        if state is job.state and (job.readable or after is not JobState.QUEUED)
-    }
-    if job.readable and job.state is not JobState.CANCELLED:
-        commands["extend"] = f"{here}/extend"
-    if job.readable and job.progress.iterations:
-        resources["evidence"] = f"{here}/evidence"
-        commands["fork"] = f"{here}/fork"
-    if job.lineage is not None:
-        resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"
-    return {"self": here, **resources, **commands}
 
 
 def _summary(job: Job) -> dict[str, object]:

@@ -1,0 +1,46 @@
+"""Where a client goes on from a job: its resources, and the commands that it takes now."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from services.optimizer.jobs.job import TRANSITIONS, Job, JobState
+from services.optimizer.jobs.kinds.tuning import JobSpec
+
+PREFIX: Final = "/v1"
+"""Version of the HTTP API, in every path."""
+
+_RESOURCES: Final = ("iterations", "events")
+_OF_A_BEST: Final = ("scenarios", "preferences", "firmware")
+
+_RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
+"""Those that only a job has whose spec can be read."""
+
+
+def job_links(job: Job) -> dict[str, str]:
+    """Say where a client goes on from a job.
+
+    Args:
+        job: as it was read.
+
+    Returns:
+        Paths of its resources, and of the commands that its state allows, by name.
+    """
+    here = f"{PREFIX}/jobs/{job.id}"
+    names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
+    if isinstance(job.stored_spec, JobSpec):
+        names += ["ranking", *(_OF_A_BEST if job.progress.best_fitness is not None else ())]
+    resources = {name: f"{here}/{name}" for name in names}
+    commands = {
+        command.value: f"{here}/{command.value}"
+        for (state, command), after in TRANSITIONS.items()
+        if state is job.state and (job.readable or after is not JobState.QUEUED)
+    }
+    if job.readable and job.state is not JobState.CANCELLED:
+        commands["extend"] = f"{here}/extend"
+    if job.readable and job.progress.iterations:
+        resources["evidence"] = f"{here}/evidence"
+        commands["fork"] = f"{here}/fork"
+    if job.lineage is not None:
+        resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"
+    return {"self": here, **resources, **commands}

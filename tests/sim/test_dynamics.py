@@ -94,9 +94,9 @@ def lossless() -> Robot:
     toml = (folder / "robot.toml").read_text(encoding="utf-8")
     for line, replacement in (
         ("efficiency = 0.6", "efficiency = 1.0"),
-        ("resistance = 4.09", "resistance = 1e15"),
-        ("resistance = 1.9 ", "resistance = 1e15 "),
-        ("resistance = 1.9\n", "resistance = 1e15\n"),
+        ("resistance = 4.09", "resistance = 1e9"),
+        ("resistance = 1.9 ", "resistance = 1e9 "),
+        ("resistance = 1.9\n", "resistance = 1e9\n"),
         ("viscous_friction = 3.7659e-7", "viscous_friction = 0.0"),
         ("viscous_friction = 1.1851415e-6", "viscous_friction = 0.0"),
     ):

@@ -54,6 +54,7 @@ def test_a_broken_stream_is_said_to_be_stale_and_goes_on_without_a_gap(
     server.client.post(f"/v1/jobs/{job_id}/cancel")
     expect_state(page, "cancelled")
     committed = server.job(job_id)["iterations"]
+    wait_for_iteration(page, committed - 1)
     assert shown_iteration(page) == committed - 1
     page.get_by_role("link", name="Iterations", exact=True).click()
     expect(page.get_by_text(f"{committed} of {committed}", exact=True)).to_be_visible()

@@ -21,8 +21,6 @@ from tests.examples.servers import ServerProcess
 
 pytestmark = pytest.mark.slow
 
-LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells this of a process")
-
 BLOCKED = 0.1
 """Seconds that the event loop may be busy with one body."""
 
@@ -100,7 +98,18 @@ def test_there_are_two_hundred_bodies() -> None:
     assert len(corpus()) >= 200
 
 
-def test_every_body_is_refused_or_taken_for_what_it_is(posted: Posted) -> None:
+def test_a_server_outlives_them_all(posted: Posted) -> None:
+    """One test: posting them takes long, and workers of the tests do not share it."""
+    _every_body_is_refused_or_taken_for_what_it_is(posted)
+    _every_refusal_is_a_short_problem_that_names_the_field(posted)
+    _others_are_answered_meanwhile(posted)
+    if sys.platform == "linux":
+        _no_body_keeps_the_event_loop_busy(posted)
+        _the_server_does_not_grow_by_what_it_refuses_or_takes(posted)
+    _the_server_lives_and_serves(posted)
+
+
+def _every_body_is_refused_or_taken_for_what_it_is(posted: Posted) -> None:
     wrong = [
         (body.name, answer.status_code, answer.text[:200])
         for body, answer in posted.answers
@@ -109,7 +118,7 @@ def test_every_body_is_refused_or_taken_for_what_it_is(posted: Posted) -> None:
     assert wrong == []
 
 
-def test_every_refusal_is_a_short_problem_that_names_the_field(posted: Posted) -> None:
+def _every_refusal_is_a_short_problem_that_names_the_field(posted: Posted) -> None:
     refusals = [(body, answer) for body, answer in posted.answers if answer.status_code >= 400]
     assert len(refusals) > 150
     for body, answer in refusals:
@@ -121,18 +130,17 @@ def test_every_refusal_is_a_short_problem_that_names_the_field(posted: Posted) -
             assert named, (body.name, fields)
 
 
-def test_the_server_lives_and_serves(posted: Posted) -> None:
+def _the_server_lives_and_serves(posted: Posted) -> None:
     assert posted.server.process.poll() is None
     job = posted.server.submit({"scenarios": ["1"], "iterations": 1})
     assert posted.server.job(job)["state"] == "queued"
 
 
-@LINUX
-def test_no_body_keeps_the_event_loop_busy(posted: Posted) -> None:
+def _no_body_keeps_the_event_loop_busy(posted: Posted) -> None:
     assert [(body, busy) for busy, body in posted.busy if busy > BLOCKED] == []
 
 
-def test_others_are_answered_meanwhile(posted: Posted) -> None:
+def _others_are_answered_meanwhile(posted: Posted) -> None:
     assert len(posted.lags) > 50
     # A machine has other work, too, which delays answers of an idle server as much.
     assert _common(posted.lags) < _common(posted.idle) + BLOCKED
@@ -143,7 +151,6 @@ def _common(lags: list[float]) -> float:
     return sorted(lags)[len(lags) * 95 // 100]
 
 
-@LINUX
-def test_the_server_does_not_grow_by_what_it_refuses_or_takes(posted: Posted) -> None:
+def _the_server_does_not_grow_by_what_it_refuses_or_takes(posted: Posted) -> None:
     before, after = posted.memory
     assert after - before < GROWTH

@@ -104,10 +104,12 @@ def kill_group(process: subprocess.Popen[str]) -> None:
     "given",
     [
         {"precision": "double"},
-        {"precision": "single"},
-        {"optimizer": HypeSettings(particles=5, population=8, offspring=8)},
+        {
+            "precision": "single",
+            "optimizer": HypeSettings(particles=5, population=8, offspring=8),
+        },
     ],
-    ids=["double", "single", "multi-objective"],
+    ids=["double", "single-multi-objective"],
 )
 def test_resumed_job_equals_one_never_killed(
     store: Store, url: str, evaluator: Evaluator, given: dict[str, Any]

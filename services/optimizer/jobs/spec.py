@@ -74,7 +74,7 @@ class Spec(BaseModel):
     are drawn, and what is said of them holds for draws alone."""
 
     has_objective_vectors: ClassVar[bool] = False
-    """Whether designs of this kind have objectives to trade, see `objective_vectors`."""
+    """Whether designs of this kind have objectives to trade, which `told` then gives."""
 
     schema_version: Literal[1] = Field(default=1, description="Version of this schema.")
     name: str = Field(default="", max_length=200, description="For people; need not be unique.")
@@ -316,18 +316,6 @@ class Spec(BaseModel):
             Fitness and utilities of the n designs.
         """
 
-    def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
-        """What designs come to in each objective, over all cases; only if there are objectives.
-
-        Args:
-            objectives: (n, K, m) raw objectives, in their units.
-            failed: (n, K), true for a case without a result.
-
-        Returns:
-            (n, M), minimized; a row is +inf throughout for a design that failed.
-        """
-        raise NotImplementedError
-
     def told(self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats) -> Floats:
         """What the search is told of designs. It follows from what is stored of them.
 
@@ -339,8 +327,7 @@ class Spec(BaseModel):
         Returns:
             The fitness; of a multi-objective method (n, M) objective vectors.
         """
-        if METHODS[self.search.name].multi_objective:
-            return self.objective_vectors(objectives, failed)
+        del objectives, failed  # Of use to kinds that have objective vectors.
         return fitness
 
     def figure_of_merit(self, fitness: float) -> float | None:  # noqa: ARG002 - kinds may have one

@@ -16,6 +16,7 @@ from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.kinds.walks import WalksSpec
 from services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
+from services.optimizer.search.registry import METHODS
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
@@ -185,6 +186,21 @@ class JobSpec(WalksSpec):
         """
         judged = super().judge(objectives, failed)
         return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
+
+    def told(self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats) -> Floats:
+        """What the search is told: fitness, or to a multi-objective method what it trades.
+
+        Args:
+            objectives: As for `Spec.told`.
+            failed: As for `Spec.told`.
+            fitness: As for `Spec.told`.
+
+        Returns:
+            As of `Spec.told`.
+        """
+        if METHODS[self.search.name].multi_objective:
+            return self.objective_vectors(objectives, failed)
+        return fitness
 
     def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
         """What designs come to in f1 to f5, over all scenarios, without any bias.

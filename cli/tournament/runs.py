@@ -17,7 +17,7 @@ import numpy as np
 from cli.atomic_file import replacing
 from cli.exit_codes import JobEnded
 from cli.output import note
-from gaitswarm.jobs.embedded import earlier_job, taken_up
+from gaitswarm.jobs.database.embedded import earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.settings import read_settings
 from gaitswarm.tables import Table

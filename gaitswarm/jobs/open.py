@@ -11,11 +11,11 @@ from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
 from services.optimizer.run.coordinator import Backoff
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.async_database import AsyncDatabaseJobs
-    from gaitswarm.jobs.async_server import AsyncServerJobs
-    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.database.async_jobs import AsyncDatabaseJobs
+    from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.port import Jobs
-    from gaitswarm.jobs.server import ServerJobs
+    from gaitswarm.jobs.server.async_jobs import AsyncServerJobs
+    from gaitswarm.jobs.server.jobs import ServerJobs
     from gaitswarm.settings import Settings
 
 
@@ -36,7 +36,7 @@ def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
         NotFound: There is no such file, and none is to be made.
         StoreUnavailable: The database cannot be opened, or is of a later version.
     """
-    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.settings import read_settings
     from services.optimizer.service import JobService
     from services.runtime import open_store
@@ -65,7 +65,7 @@ def open_async(
         The jobs in it, as an asynchronous context manager, which opens the database and raises
         what `open` raises.
     """
-    from gaitswarm.jobs.async_database import AsyncDatabaseJobs
+    from gaitswarm.jobs.database.async_jobs import AsyncDatabaseJobs
     from gaitswarm.settings import read_settings
 
     url = read_settings(db=None if db is None else os.fspath(db)).database
@@ -97,8 +97,8 @@ def connect(
     Raises:
         InvalidRequest: It is not a URL.
     """
-    from gaitswarm.jobs.attempts import BACKOFF
-    from gaitswarm.jobs.server import TIMEOUT, ServerJobs
+    from gaitswarm.jobs.server.attempts import BACKOFF
+    from gaitswarm.jobs.server.jobs import TIMEOUT, ServerJobs
 
     sent = _with_token(headers, token)
     return ServerJobs(url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=sent)
@@ -128,9 +128,9 @@ def connect_async(
     Raises:
         InvalidRequest: It is not a URL.
     """
-    from gaitswarm.jobs.async_server import AsyncServerJobs
-    from gaitswarm.jobs.attempts import BACKOFF
-    from gaitswarm.jobs.server import TIMEOUT
+    from gaitswarm.jobs.server.async_jobs import AsyncServerJobs
+    from gaitswarm.jobs.server.attempts import BACKOFF
+    from gaitswarm.jobs.server.jobs import TIMEOUT
 
     sent = _with_token(headers, token)
     return AsyncServerJobs(

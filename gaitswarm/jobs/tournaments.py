@@ -11,7 +11,6 @@ if TYPE_CHECKING:
         TournamentStandingsView,
         TournamentView,
     )
-    from services.optimizer.service import JobService
 
 
 class Tournaments(ABC):
@@ -57,27 +56,3 @@ class Tournaments(ABC):
             InvalidRequest: A job of another kind, or one that was cancelled.
             Conflict: No run has ended yet.
         """
-
-
-class DatabaseTournaments(Tournaments):
-    """Tournaments of a database."""
-
-    _service: JobService
-
-    def tournaments(self) -> list[TournamentView]:
-        """Read which tournaments there are."""
-        from gaitswarm.requests.tournament import run_tournaments
-
-        return run_tournaments(self._service)
-
-    def standings(self, job_id: str, *, compare_with: str | None = None) -> TournamentStandingsView:
-        """Judge a tournament from what is stored."""
-        from gaitswarm.requests.tournament import run_standings
-
-        return run_standings(self._service, job_id, compare_with)
-
-    def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """Read the runs on a problem."""
-        from gaitswarm.requests.tournament import run_problem
-
-        return run_problem(self._service, job_id, problem)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from cli.controllers_study import Budget, comparisons, study_document, study_table
-from gaitswarm.jobs.embedded import earlier_job
+from gaitswarm.jobs.database.embedded import earlier_job
 from services.optimizer.jobs.job import Command, Job
 from services.optimizer.search.registry import OPTIMIZERS
 from services.optimizer.service import JobService

@@ -15,8 +15,8 @@ import httpx2
 import pytest
 
 import gaitswarm
-from gaitswarm.jobs.attempts import Attempts, error_of
-from gaitswarm.jobs.call import Call
+from gaitswarm.jobs.server.attempts import Attempts, error_of
+from gaitswarm.jobs.server.call import Call
 from tests.library.conftest import SMALL, Finished
 
 URL = "http://127.0.0.1:1"

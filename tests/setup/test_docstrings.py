@@ -12,8 +12,8 @@ ROOT = Path(__file__).parents[2]
 FILES = (
     "sim/**/*.py",
     "services/optimizer/search/**/*.py",
-    "services/optimizer/jobs/*.py",
-    "services/optimizer/analysis/*.py",
+    "services/optimizer/jobs/**/*.py",
+    "services/optimizer/analysis/**/*.py",
     "services/optimizer/tournament/*.py",
     "services/optimizer/store/*.py",
     "services/optimizer/run/*.py",
@@ -22,7 +22,7 @@ FILES = (
     "services/*.py",
     "gaitswarm/views/*.py",
     "gaitswarm/requests/*.py",
-    "gaitswarm/jobs/*.py",
+    "gaitswarm/jobs/**/*.py",
     "api/*.py",
 )
 """Without the API's routes, whose parameters are described to clients."""

@@ -113,7 +113,7 @@ def certify(
     from cli.certificate_table import show_certificate, show_world
     from cli.embedded import Embedded, job_run
     from cli.output import print_json
-    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
     from services.optimizer.errors import InvalidRequest

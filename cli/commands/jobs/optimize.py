@@ -50,7 +50,7 @@ def optimize(
     from cli.embedded import Embedded, finish, job_run, resumed_job
     from cli.output import note
     from cli.spec_file import build_spec, by_other_optimizer, check_optimizer_name
-    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
     from services.optimizer.errors import InvalidRequest

@@ -102,7 +102,7 @@ def _calibrated(
     from dataclasses import asdict
 
     from cli.embedded import Embedded, job_run
-    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
     from services.optimizer.service import JobService

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gaitswarm.jobs.call import Call, posted, segment
+from gaitswarm.jobs.server.call import Call, posted, segment
 from gaitswarm.requests.firmware import FirmwareRequest
 from gaitswarm.requests.replay import ReplayRequest
 from gaitswarm.requests.robustness import RobustnessRequest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import TypeVar, Unpack
 
@@ -14,10 +14,12 @@ from anyio import to_thread
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import StoreUnavailable
-from gaitswarm.jobs import calls, design_calls
 from gaitswarm.jobs.async_port import AsyncJobs
-from gaitswarm.jobs.async_server_walks import AsyncServerWalks
-from gaitswarm.jobs.attempts import (
+from gaitswarm.jobs.port import JobEvent
+from gaitswarm.jobs.server import calls, design_calls
+from gaitswarm.jobs.server.async_findings import AsyncServerFindings
+from gaitswarm.jobs.server.async_walks import AsyncServerWalks
+from gaitswarm.jobs.server.attempts import (
     BACKOFF,
     RECONNECT,
     Attempts,
@@ -26,51 +28,35 @@ from gaitswarm.jobs.attempts import (
     request_of,
     result,
     server_url,
-    unreachable,
 )
-from gaitswarm.jobs.call import Call
-from gaitswarm.jobs.port import JobEvent
-from gaitswarm.jobs.server import TIMEOUT
+from gaitswarm.jobs.server.call import Call
+from gaitswarm.jobs.server.jobs import TIMEOUT
 from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.specs import (
     ForkOptions,
-    PreferenceInput,
     SpecInput,
     SpecOptions,
     chosen_spec,
 )
-from gaitswarm.tables import EvaluationTable, TableFormat
 from gaitswarm.views import (
     PREFIX,
-    BestView,
     EstimateView,
-    HistoryIterationView,
-    IterationView,
     JobSummaryView,
     JobView,
     PageView,
-    RankingView,
 )
-from gaitswarm.views.calibration import TargetsView
-from gaitswarm.views.certificate import CertificateView
-from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from gaitswarm.views.preferences import RobustPreferencesView
-from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
-from gaitswarm.views.trade_offs import FrontView, PreferenceForView
-from services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.views.identification import RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.walk import Precision
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
 
 
-class AsyncServerJobs(AsyncServerWalks, AsyncJobs):
+class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
     """Jobs behind a server, over an `httpx2.AsyncClient`; attempts are those of `ServerJobs`."""
 
     def __init__(
@@ -173,26 +159,6 @@ class AsyncServerJobs(AsyncServerWalks, AsyncJobs):
         """Send another budget for a job."""
         return await self._send(calls.extend(job_id, iterations))
 
-    async def best(self, job_id: str) -> BestView:
-        """Ask the server for the best design of a job."""
-        return await self._send(calls.best(job_id))
-
-    def iterations(self, job_id: str, *, after: int | None = None) -> AsyncIterator[IterationView]:
-        """List committed iterations, page by page."""
-        first = None if after is None else str(after)
-        return self._items(lambda cursor: calls.iterations(job_id, cursor or first))
-
-    async def history(self, job_id: str) -> AsyncIterator[HistoryIterationView]:
-        """List committed iterations, and ask for the designs of each."""
-        async for iteration in self.iterations(job_id):
-            particles = await self._send(calls.evaluations_of(job_id, iteration.index))
-            yield HistoryIterationView(**dict(iteration), evaluations=particles.items)
-
-    async def evaluations(self, job_id: str) -> EvaluationTable:
-        """Download every evaluation at once."""
-        job = await self.job(job_id)
-        return await self._send(calls.evaluations(job_id, job.spec))
-
     async def follow(self, job_id: str, *, after: int | None = None) -> AsyncIterator[JobEvent]:
         """Read the server's events; a connection that breaks is taken up again where it broke."""
         await self.job(job_id)
@@ -212,94 +178,6 @@ class AsyncServerJobs(AsyncServerWalks, AsyncJobs):
             except ValidationError as error:
                 raise foreign(self._url) from error
             await anyio.sleep(following.after_break(broken))
-
-    async def ranking(
-        self, job_id: str, preference: PreferenceInput, *, top: int = 20
-    ) -> RankingView:
-        """Let the server rank a job's designs."""
-        return await self._send(calls.ranking(job_id, arguments.ranking(preference, top)))
-
-    async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
-        """Let the server judge a job's designs by fewer scenarios."""
-        return await self._send(calls.scenarios(job_id, tolerance))
-
-    async def preferences(
-        self,
-        job_id: str,
-        *,
-        drawn: int = 512,
-        candidates: int = 8,
-        samples: int = 0,
-        radius: float = 0.02,
-        seed: int = 1,
-        precision: Precision = "double",
-    ) -> RobustPreferencesView:
-        """Let the server rank a job's designs under many preferences."""
-        request = arguments.preferences(
-            drawn=drawn,
-            candidates=candidates,
-            samples=samples,
-            radius=radius,
-            seed=seed,
-            precision=precision,
-        )
-        return await self._send(calls.preferences(job_id, request))
-
-    async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
-        """Let the server find a job's front."""
-        return await self._send(calls.front(job_id, most))
-
-    async def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
-        """Let the server find a design's preference."""
-        return await self._send(calls.preference_for(job_id, iteration, particle))
-
-    async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
-        """Let the server compare runs."""
-        return await self._send(calls.parameters(arguments.runs(job_ids)))
-
-    async def targets(
-        self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None
-    ) -> TargetsView:
-        """Let the server compare runs with their targets."""
-        chosen = arguments.leave_out(leave_out)
-        return await self._send(calls.targets(arguments.runs(job_ids), chosen))
-
-    async def tournaments(self) -> list[TournamentView]:
-        """Ask the server which tournaments there are."""
-        return (await self._send(calls.tournaments())).items
-
-    async def standings(
-        self, job_id: str, *, compare_with: str | None = None
-    ) -> TournamentStandingsView:
-        """Let the server judge a tournament."""
-        return await self._send(calls.standings(job_id, compare_with))
-
-    async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """Ask the server for the runs on a problem."""
-        return await self._send(calls.problem_runs(job_id, problem))
-
-    async def certificate(
-        self, job_id: str, *, worlds: int | None = None, most: int = 5
-    ) -> CertificateView:
-        """Ask the server what a certificate comes to."""
-        arguments.certificate(worlds, most)
-        return await self._send(calls.certificate(job_id, worlds, most))
-
-    async def export(
-        self, job_id: str, file_format: TableFormat = "parquet"
-    ) -> AsyncIterator[bytes]:
-        """Download every evaluation as a file, in parts as they come."""
-        call = calls.export(job_id, arguments.table_format(file_format))
-        async with self._opened(call) as response:
-            try:
-                async for part in response.aiter_bytes():
-                    yield part
-            except httpx2.HTTPError as error:
-                raise unreachable(self._url, error) from error
-
-    async def evidence(self, job_id: str) -> bytes:
-        """Let the server write evidence, and download it."""
-        return await self._send(calls.evidence(job_id))
 
     async def write_firmware(
         self,

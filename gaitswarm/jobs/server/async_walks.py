@@ -6,8 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import TypeVar, Unpack
 
-from gaitswarm.jobs import design_calls
-from gaitswarm.jobs.call import Call
+from gaitswarm.jobs.server import design_calls
+from gaitswarm.jobs.server.call import Call
 from gaitswarm.requests import design_arguments
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
 from typing import Final, TypeVar, Unpack
@@ -14,8 +14,9 @@ import httpx2
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import StoreUnavailable
-from gaitswarm.jobs import calls, design_calls
-from gaitswarm.jobs.attempts import (
+from gaitswarm.jobs.port import JobEvent, Jobs
+from gaitswarm.jobs.server import calls, design_calls
+from gaitswarm.jobs.server.attempts import (
     BACKOFF,
     RECONNECT,
     Attempts,
@@ -24,45 +25,30 @@ from gaitswarm.jobs.attempts import (
     request_of,
     result,
     server_url,
-    unreachable,
 )
-from gaitswarm.jobs.call import Call
-from gaitswarm.jobs.port import JobEvent, Jobs
-from gaitswarm.jobs.server_walks import ServerWalks
+from gaitswarm.jobs.server.call import Call
+from gaitswarm.jobs.server.findings import ServerFindings
+from gaitswarm.jobs.server.walks import ServerWalks
 from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.specs import (
     ForkOptions,
-    PreferenceInput,
     SpecInput,
     SpecOptions,
     chosen_spec,
 )
-from gaitswarm.tables import EvaluationTable, TableFormat
 from gaitswarm.views import (
     PREFIX,
-    BestView,
     EstimateView,
-    HistoryIterationView,
-    IterationView,
     JobSummaryView,
     JobView,
     PageView,
-    RankingView,
 )
-from gaitswarm.views.calibration import TargetsView
-from gaitswarm.views.certificate import CertificateView
-from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import IdentifiabilityView, RecordingView
-from gaitswarm.views.preferences import RobustPreferencesView
-from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
-from gaitswarm.views.trade_offs import FrontView, PreferenceForView
-from services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.views.identification import RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.run.coordinator import Backoff
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.walk import Precision
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
@@ -71,7 +57,7 @@ TIMEOUT: Final = 30.0
 """Seconds in which a server must begin to answer, and go on."""
 
 
-class ServerJobs(ServerWalks, Jobs):
+class ServerJobs(ServerFindings, ServerWalks, Jobs):
     """Jobs behind a server.
 
     A connection that breaks and a 503 are met by further attempts, where that is safe: for whatever
@@ -177,25 +163,6 @@ class ServerJobs(ServerWalks, Jobs):
         """Send another budget for a job."""
         return self._send(calls.extend(job_id, iterations))
 
-    def best(self, job_id: str) -> BestView:
-        """Ask the server for the best design of a job."""
-        return self._send(calls.best(job_id))
-
-    def iterations(self, job_id: str, *, after: int | None = None) -> Iterator[IterationView]:
-        """List committed iterations, page by page."""
-        first = None if after is None else str(after)
-        return self._items(lambda cursor: calls.iterations(job_id, cursor or first))
-
-    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
-        """List committed iterations, and ask for the designs of each."""
-        for iteration in self.iterations(job_id):
-            particles = self._send(calls.evaluations_of(job_id, iteration.index)).items
-            yield HistoryIterationView(**dict(iteration), evaluations=particles)
-
-    def evaluations(self, job_id: str) -> EvaluationTable:
-        """Download every evaluation at once."""
-        return self._send(calls.evaluations(job_id, self.job(job_id).spec))
-
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Read the server's events; a connection that breaks is taken up again where it broke."""
         self.job(job_id)
@@ -211,85 +178,6 @@ class ServerJobs(ServerWalks, Jobs):
             except ValidationError as error:
                 raise foreign(self._url) from error
             time.sleep(following.after_break(broken))
-
-    def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
-        """Let the server rank a job's designs."""
-        return self._send(calls.ranking(job_id, arguments.ranking(preference, top)))
-
-    def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
-        """Let the server judge a job's designs by fewer scenarios."""
-        return self._send(calls.scenarios(job_id, tolerance))
-
-    def preferences(
-        self,
-        job_id: str,
-        *,
-        drawn: int = 512,
-        candidates: int = 8,
-        samples: int = 0,
-        radius: float = 0.02,
-        seed: int = 1,
-        precision: Precision = "double",
-    ) -> RobustPreferencesView:
-        """Let the server rank a job's designs under many preferences."""
-        request = arguments.preferences(
-            drawn=drawn,
-            candidates=candidates,
-            samples=samples,
-            radius=radius,
-            seed=seed,
-            precision=precision,
-        )
-        return self._send(calls.preferences(job_id, request))
-
-    def front(self, job_id: str, *, most: int = 1000) -> FrontView:
-        """Let the server find a job's front."""
-        return self._send(calls.front(job_id, most))
-
-    def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
-        """Let the server find a design's preference."""
-        return self._send(calls.preference_for(job_id, iteration, particle))
-
-    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
-        """Let the server compare runs."""
-        return self._send(calls.parameters(arguments.runs(job_ids)))
-
-    def targets(self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None) -> TargetsView:
-        """Let the server compare runs with their targets."""
-        chosen = arguments.leave_out(leave_out)
-        return self._send(calls.targets(arguments.runs(job_ids), chosen))
-
-    def tournaments(self) -> list[TournamentView]:
-        """Ask the server which tournaments there are."""
-        return self._send(calls.tournaments()).items
-
-    def standings(self, job_id: str, *, compare_with: str | None = None) -> TournamentStandingsView:
-        """Let the server judge a tournament."""
-        return self._send(calls.standings(job_id, compare_with))
-
-    def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """Ask the server for the runs on a problem."""
-        return self._send(calls.problem_runs(job_id, problem))
-
-    def certificate(
-        self, job_id: str, *, worlds: int | None = None, most: int = 5
-    ) -> CertificateView:
-        """Ask the server what a certificate comes to."""
-        arguments.certificate(worlds, most)
-        return self._send(calls.certificate(job_id, worlds, most))
-
-    def export(self, job_id: str, file_format: TableFormat = "parquet") -> Iterator[bytes]:
-        """Download every evaluation as a file, in parts as they come."""
-        call = calls.export(job_id, arguments.table_format(file_format))
-        with self._opened(call) as response:
-            try:
-                yield from response.iter_bytes()
-            except httpx2.HTTPError as error:
-                raise unreachable(self._url, error) from error
-
-    def evidence(self, job_id: str) -> bytes:
-        """Let the server write evidence, and download it."""
-        return self._send(calls.evidence(job_id))
 
     def write_firmware(
         self,

@@ -9,7 +9,7 @@ from typing import Unpack
 
 from anyio import to_thread
 
-from gaitswarm.jobs.local_walks import LocalWalks
+from gaitswarm.jobs.database.walks import LocalWalks
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput

@@ -26,8 +26,8 @@ from gaitswarm.errors import (
     Unauthorized,
     Unreadable,
 )
-from gaitswarm.jobs.call import Call
 from gaitswarm.jobs.port import JobEvent
+from gaitswarm.jobs.server.call import Call
 from gaitswarm.views import IterationView, ProblemView, StateView
 from services.optimizer.jobs.job import JobState
 from services.optimizer.run.coordinator import Backoff

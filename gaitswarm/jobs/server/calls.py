@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from gaitswarm.jobs.call import IDEMPOTENCY_KEY, Call, got, job_path, page, posted, segment
+from gaitswarm.jobs.server.call import IDEMPOTENCY_KEY, Call, got, job_path, page, posted, segment
 from gaitswarm.requests.preferences import PreferencesRequest
 from gaitswarm.tables import EvaluationTable, TableFormat
 from gaitswarm.views import (

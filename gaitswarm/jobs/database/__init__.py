@@ -1,0 +1,1 @@
+"""Jobs in a database that this process opens itself."""

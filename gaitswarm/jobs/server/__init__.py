@@ -1,0 +1,1 @@
+"""Jobs of a gaitswarm server, over its HTTP API."""

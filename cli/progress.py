@@ -102,7 +102,8 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
                 )
             else:
                 last = event
-                progress.remark(f"job {event.id} is {event.state.value}")
+                because = f", and waits: {event.waiting}" if event.waiting else ""
+                progress.remark(f"job {event.id} is {event.state.value}{because}")
     _check_success(last)
 
 

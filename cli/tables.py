@@ -232,6 +232,7 @@ def print_job(job: JobView) -> None:
         "job": job.id,
         "name": job.name or MISSING,
         "state": job.state.value,
+        "waiting": job.waiting,
         "error": job.error,
         "lineage": None if job.lineage is None else lineage_line(job.lineage),
         "iterations": _iterations(job),

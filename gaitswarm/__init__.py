@@ -85,7 +85,7 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.kinds.tuning import JobSpec
     from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
     from services.optimizer.jobs.preference import PREFERENCES, Preference
-    from services.optimizer.run.coordinator import Backoff
+    from services.optimizer.run.outage import Backoff
     from services.optimizer.search.automatic import AutoSettings
     from services.optimizer.search.evolution.cma_es import CmaEsSettings
     from services.optimizer.search.evolution.differential_evolution import DeSettings
@@ -295,7 +295,7 @@ _MODULES: Final = {
     "services.optimizer.search.swarm.pso": ("PsoSettings",),
     "services.optimizer.search.swarm.pso_ps": ("PsoPsSettings",),
     "services.optimizer.search.swarm.tlbo": ("TlboSettings",),
-    "services.optimizer.run.coordinator": ("Backoff",),
+    "services.optimizer.run.outage": ("Backoff",),
     "sim.controllers": ("CONTROLLERS",),
     "sim.calibration.targets": ("Target", "TargetWalk"),
     "sim.identification.recorded_walk": ("RecordedWalk",),

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from services.optimizer.errors import InvalidRequest, StoreUnavailable
+from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.worker import EvaluatorKind
 from sim.compiler.cache import DEFAULT_SIZE
 
@@ -68,6 +69,12 @@ class Settings(BaseSettings):
         ge=3.0,
         le=3600.0,
         description="After so long without a word from its process a job is taken over [s].",
+    )
+    quarantine_after: int = Field(
+        default=QUARANTINE_AFTER,
+        ge=1,
+        le=1000,
+        description="A job with which so many runner processes in a row went down fails.",
     )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
     api_host: str = Field(default="127.0.0.1", description="Address to listen on.")

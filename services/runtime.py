@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
+from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
@@ -79,6 +80,7 @@ def open_runtime(
     concurrent_jobs: int = 2,
     lease_seconds: float = 30.0,
     cache: bool = False,
+    quarantine_after: int = QUARANTINE_AFTER,
     longest_job: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Runtime]:
@@ -93,6 +95,7 @@ def open_runtime(
         lease_seconds: After so long without a word from this process another one takes its jobs
             over [s].
         cache: Whether a design is walked only if no job has walked it before.
+        quarantine_after: A job with which so many runner processes in a row went down fails.
         longest_job: Simulated time of all walks of all designs that a new job may have [s].
         should_stop: As for `open_evaluator`.
 
@@ -119,6 +122,7 @@ def open_runtime(
             concurrency=concurrent_jobs,
             lease_seconds=lease_seconds,
             cache=cache,
+            quarantine_after=quarantine_after,
         )
         stack.callback(runner.stop)
         runner.start()

@@ -35,7 +35,8 @@ data: {"index":24,"designs":25,"best":21.3,"mean":25.2,"median":23.9,"worst":41.
 id: 24
 
 event: state
-data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"evaluations":625}
+data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"evaluations":625,\
+"waiting":null}
 
 """
 
@@ -79,9 +80,9 @@ async def stream_events(
 
     An event `iteration` is sent once for each committed iteration, in order; its id is the
     iteration's index, its data an IterationView. An event `state`, without an id, is sent on
-    connecting and whenever the job's state changes; its data is a StateView. The stream ends after
-    the event of a final state. A broken stream goes on without gap or repeat from `Last-Event-ID`
-    (or `after`). Comments keep idle connections alive.
+    connecting and whenever the job's state, or what it waits for, changes; its data is a StateView.
+    The stream ends after the event of a final state. A broken stream goes on without gap or repeat
+    from `Last-Event-ID` (or `after`). Comments keep idle connections alive.
     """
     start = after if last_event_id is None else last_event_id
     events = _events(
@@ -112,7 +113,7 @@ async def _events(
     No transaction is held between polls. Ends after a terminal state, after `limit` iterations,
     with the server, or when caught up unless `follow`.
     """
-    told: JobState | None = None
+    told: tuple[JobState, str | None] | None = None
     sent = 0
     while not stopping.is_set():
         try:
@@ -130,8 +131,8 @@ async def _events(
                 return
         if len(iterations) == _PAGE:
             continue
-        if job.state is not told:
-            told = job.state
+        if (job.state, job.waiting) != told:
+            told = (job.state, job.waiting)
             yield ServerSentEvent(event="state", data=StateView.from_job(job))
         if job.state.terminal or not follow:
             return

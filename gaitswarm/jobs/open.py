@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
-from services.optimizer.run.coordinator import Backoff
+from services.optimizer.run.outage import Backoff
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.database.async_jobs import AsyncDatabaseJobs

@@ -239,8 +239,8 @@ class Jobs(Findings, Tournaments, Walks, ABC):
 
         Returns:
             What is committed, then what comes: an IterationView for each iteration, once and in
-            order, and a StateView for the present state and for every other that is seen. The last
-            is the state in which it ended.
+            order, and a StateView for the present state and for every other that is seen, or if
+            what the job waits for is another. The last is the state in which it ended.
         """
 
     def wait(self, job_id: str) -> JobView:

@@ -143,9 +143,15 @@ class JobSummaryView(View):
         " time [1/s].",
         examples=[121.6],
     )
+    waiting: str | None = Field(
+        default=None,
+        description="What a running job waits for, such as workers that cannot be reached; it goes"
+        " on by itself when they are back. Null for nothing.",
+        examples=[None],
+    )
     eta_seconds: float | None = Field(
         description="Estimated time to the end of the budget at the rate so far [s]: 0 for a job"
-        " that succeeded, null unless it runs and has committed an iteration.",
+        " that succeeded, null unless it runs, waits for nothing and has committed an iteration.",
         examples=[16.1],
     )
     lineage: Lineage | None = Field(
@@ -292,6 +298,12 @@ class StateView(View):
     error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
     iterations: int = Field(description="Iterations committed so far [1].", examples=[25])
     evaluations: int = Field(description="Designs judged in them [1].", examples=[625])
+    waiting: str | None = Field(
+        default=None,
+        description="What a running job waits for, such as workers that cannot be reached; null"
+        " for nothing.",
+        examples=[None],
+    )
 
     @classmethod
     def from_job(cls, job: Job) -> StateView:
@@ -306,6 +318,7 @@ class StateView(View):
             error=job.error,
             iterations=job.progress.iterations,
             evaluations=job.progress.evaluations,
+            waiting=job.waiting,
         )
 
 
@@ -325,6 +338,7 @@ def _summary(job: Job) -> dict[str, object]:
         "compute_seconds": progress.compute_seconds,
         "evaluations_per_second": rates.evaluations_per_second,
         "simulations_per_second": rates.simulations_per_second,
+        "waiting": job.waiting,
         "eta_seconds": rates.eta_seconds,
         "lineage": job.lineage,
         "owner": job.owner,

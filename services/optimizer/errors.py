@@ -11,6 +11,7 @@ GaitswarmError
 ├── Forbidden               not for whoever asks (HTTP 403)
 │   └── Unauthorized        the server knows nobody of that token, or asks for one (HTTP 401)
 ├── LeaseLost               another runner, or a cancellation, has taken the job
+├── KilledWorker            a task ends the workers that run it
 └── Unavailable             not possible now, whatever was asked; try again later (HTTP 503)
     ├── EvaluatorUnavailable    the workers cannot be reached
     └── StoreUnavailable        the database or server cannot be reached, or has another schema
@@ -68,6 +69,10 @@ class Unauthorized(Forbidden):
 
 class LeaseLost(GaitswarmError):
     """The job belongs to another runner now, or was cancelled."""
+
+
+class KilledWorker(GaitswarmError):
+    """A task was tried on several workers, and each of them died of it."""
 
 
 class Unavailable(GaitswarmError):

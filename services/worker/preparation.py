@@ -68,10 +68,12 @@ class KernelBuilder:
         with self._lock:
             work = self._under_way.get((robot, precision))
             if work is None:
-                work = self._under_way[robot, precision] = Future()
+                work = Future()
                 threading.Thread(
                     target=self._build, args=(robot, precision, work), name="kernel", daemon=True
                 ).start()
+                # After a start that may be refused; the thread waits for the lock before it ends.
+                self._under_way[robot, precision] = work
             return work
 
     def _build(self, robot: RobotSource, precision: Precision, work: Future[None]) -> None:

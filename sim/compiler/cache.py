@@ -198,19 +198,20 @@ def _is_private(directory: Path) -> bool:
 
 
 def _writable_directory() -> Path:
+    refused: OSError | None = None
     for directory in _directories():
         try:
             directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=directory):
                 return directory
-        except OSError:
-            continue
+        except OSError as error:
+            refused = error
     private = _private_directory()
     reason = "can be written" if _is_private(private) else "is a directory of this user's alone"
     raise KernelBuildError(
         f"neither {_usual_directory()} can be written nor {private} {reason}; set XDG_CACHE_HOME to"
         " a directory for compiled kernels"
-    )
+    ) from refused
 
 
 @contextlib.contextmanager

@@ -87,8 +87,26 @@ def test_iterations_are_streamed_as_they_are_committed(
             "error": None,
             "iterations": 3,
             "evaluations": 3 * PARTICLES,
+            "waiting": None,
         }
         assert list(stream) == []
+
+
+def test_what_a_job_waits_for_is_streamed_once_and_shown_of_the_job(
+    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+) -> None:
+    claim = commit(job, 1)
+    with client.stream("GET", f"/v1/jobs/{job.id}/events", params={"after": 0}) as answer:
+        stream = parsed(answer.iter_lines())
+        assert next(stream)["data"]["waiting"] is None
+        for _ in range(2):
+            store.renew(claim, lease_seconds=60.0, waiting="no route to host")
+        news = next(stream)["data"]
+        assert (news["state"], news["waiting"]) == ("running", "no route to host")
+        view = client.get(f"/v1/jobs/{job.id}").json()
+        assert (view["waiting"], view["eta_seconds"]) == ("no route to host", None)
+        store.renew(claim, lease_seconds=60.0)
+        assert next(stream)["data"]["waiting"] is None
 
 
 def test_a_broken_stream_goes_on_without_gap_or_repeat(

@@ -16,7 +16,7 @@ from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
-from services.optimizer.run.runner import Surroundings, run_claim
+from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
@@ -122,8 +122,10 @@ def test_a_job_is_kept_while_its_workers_are_opened_however_long_that_takes(
         def __getattr__(self, name: str) -> Any:
             return getattr(store, name)
 
-        def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
-            state = store.renew(claim, lease_seconds=lease_seconds)
+        def renew(
+            self, claim: Claim, *, lease_seconds: float, waiting: str | None = None
+        ) -> JobState:
+            state = store.renew(claim, lease_seconds=lease_seconds, waiting=waiting)
             renewed.set()
             return state
 

@@ -11,7 +11,7 @@ from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import LARGEST_BUDGET, Claim, Command, Job, JobState, extended
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
-from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
+from services.optimizer.run.execution import OnCommit, Surroundings, run_claim
 from services.optimizer.store.base import Store
 from tests.examples.jobs import Bits, history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk

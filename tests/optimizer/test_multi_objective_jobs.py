@@ -20,7 +20,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.kinds.tuning_worlds import Aggregate
 from services.optimizer.jobs.preference import PREFERENCES, judge
 from services.optimizer.run.embedded import run_embedded
-from services.optimizer.run.runner import Surroundings, run_claim
+from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
 from services.optimizer.tournament.methods import method_names

@@ -31,7 +31,7 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
-from services.optimizer.run.runner import OnCommit, Surroundings, run_claim
+from services.optimizer.run.execution import OnCommit, Surroundings, run_claim
 from services.optimizer.search.registry import create_search
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store

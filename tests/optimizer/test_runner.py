@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -13,15 +15,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
+from services.optimizer.errors import EvaluatorUnavailable, KilledWorker, StoreUnavailable
 from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Command, Job, JobState
+from services.optimizer.jobs.job import Claim, Command, Job, JobState, time_left
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.run.coordinator import Backoff
+from services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.evaluator import EvaluationRequest
-from services.optimizer.run.runner import Runner, Surroundings, run_claim
+from services.optimizer.run.execution import Surroundings, run_claim
+from services.optimizer.run.outage import Backoff
+from services.optimizer.run.runner import Runner
 from services.optimizer.store.base import Store
-from sim.errors import SimulationInputError
+from sim.errors import KernelBuildError, SimulationInputError
 from sim.outcome import Outcome
 from tests.examples.jobs import history
 from tests.examples.processes import eventually
@@ -137,21 +142,127 @@ def test_workers_out_of_reach_delay_a_job_and_change_no_bit(store: Store) -> Non
     assert history(store, job_id) == history(store, whole)
 
 
-def test_a_job_whose_workers_stay_away_fails_with_the_reason_and_can_be_resumed(
-    store: Store,
-) -> None:
-    queue(store)
+def test_a_job_outlives_workers_that_are_away_for_days(store: Store) -> None:
+    whole = queue(store)
+    run(store, FormulaEvaluator())
+    job_id = queue(store)
+    now = [0.0]
     gone = EvaluatorUnavailable("no route to host")
     job = run(
         store,
-        FormulaEvaluator([None, gone, gone, gone]),
-        backoff=Backoff(first=0.01, attempts=2),
+        FormulaEvaluator([None, *[gone] * 100]),
+        clock=lambda: now[0],
+        sleep=lambda seconds: now.__setitem__(0, now[0] + 36_000.0 * seconds),
+        lease_seconds=1e6,
+        backoff=Backoff(longest=3600.0),
     )
-    assert job.state is JobState.FAILED
-    assert job.error is not None and "no route to host" in job.error
+    assert now[0] > 3 * 86_400.0
+    assert (job.state, job.error) == (JobState.SUCCEEDED, None)
+    assert history(store, job_id) == history(store, whole)
+
+
+class AwayEvaluator(FormulaEvaluator):
+    """Out of reach in its second call and all later ones, until it is back."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.back = threading.Event()
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        if self.calls and not self.back.is_set():
+            self.calls += 1
+            raise EvaluatorUnavailable("no route to host")
+        return super().evaluate(request, should_stop)
+
+
+def test_a_job_says_what_it_waits_for_keeps_its_lease_and_goes_on_by_itself(store: Store) -> None:
+    job_id = queue(store)
+    evaluator = AwayEvaluator()
+    thread = threading.Thread(
+        target=run, args=(store, evaluator), kwargs={"backoff": Backoff(0.01, longest=0.1)}
+    )
+    thread.start()
+    eventually(lambda: store.job(job_id).waiting == "no route to host")
+    waiting = store.job(job_id)
+    assert waiting.state is JobState.RUNNING
+    assert time_left(waiting, waiting.updated_at).eta_seconds is None
+    # Longer than the lease, which the heartbeat renews.
+    tried = evaluator.calls
+    eventually(lambda: evaluator.calls > tried + 10)
+    assert store.claim("thief", lease_seconds=1.0, job_id=job_id) is None
+    evaluator.back.set()
+    thread.join()
+    ended = store.job(job_id)
+    assert (ended.state, ended.waiting) == (JobState.SUCCEEDED, None)
+
+
+def test_a_job_that_waits_can_be_cancelled(store: Store) -> None:
+    job_id = queue(store)
+    ended: list[Job] = []
+    thread = threading.Thread(
+        target=lambda: ended.append(run(store, AwayEvaluator(), backoff=Backoff(first=600.0)))
+    )
+    thread.start()
+    eventually(lambda: store.job(job_id).waiting is not None)
+    store.command(job_id, Command.CANCEL)
+    thread.join()
+    assert (ended[0].state, ended[0].waiting) == (JobState.CANCELLED, None)
+
+
+def kernel_not_stored() -> Exception:
+    error = KernelBuildError("the kernel cannot be stored")
+    error.__cause__ = OSError(errno.EACCES, "Permission denied")
+    return error
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        OSError(errno.ENOSPC, "No space left on device"),
+        BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"),
+        MemoryError(),
+        RuntimeError("can't start new thread"),
+        kernel_not_stored(),
+        KernelBuildError("cc did not compile: cannot write: No space left on device"),
+        StoreUnavailable("database is locked"),
+    ],
+    ids=lambda error: f"{type(error).__name__}: {error}",
+)
+def test_what_the_machine_lacks_delays_a_job_with_one_line_in_the_log_for_all_attempts(
+    store: Store, error: Exception, caplog: pytest.LogCaptureFixture
+) -> None:
+    queue(store)
+    evaluator = FormulaEvaluator([None, error, error, error])
+    with caplog.at_level(logging.WARNING):
+        job = run(store, evaluator, backoff=Backoff(first=0.001, longest=0.01))
+    assert (job.state, job.error) == (JobState.SUCCEEDED, None)
+    assert evaluator.calls == SPEC.iterations + 3
+    (record,) = caplog.records
+    assert record.exc_info is None and str(error) in record.getMessage()
+
+
+def test_a_machine_without_memory_for_what_precedes_the_walks_delays_a_job(store: Store) -> None:
+    queue(store)
+    lacks = [MemoryError(), OSError(errno.EMFILE, "Too many open files")]
+
+    def provenance(spec: Spec) -> JobProvenance:
+        if lacks:
+            raise lacks.pop()
+        return job_provenance(spec)
+
+    job = run(store, FormulaEvaluator(), provenance=provenance, backoff=Backoff(first=0.001))
+    assert job.state is JobState.SUCCEEDED
+    assert not lacks
+
+
+def test_walks_that_kill_worker_after_worker_fail_their_job_with_the_reason(store: Store) -> None:
+    queue(store)
+    killed = KilledWorker("3 workers died of designs 4 to 7 in 'slope-fast'")
+    job = run(store, FormulaEvaluator([None, killed]))
+    assert (job.state, job.error) == (JobState.FAILED, str(killed))
     assert job.progress.iterations == 1
-    store.command(job.id, Command.RESUME)
-    assert run(store, FormulaEvaluator()).state is JobState.SUCCEEDED
 
 
 def test_a_pause_need_not_wait_for_workers_out_of_reach(store: Store) -> None:
@@ -205,14 +316,44 @@ def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_a_moment(stor
     assert history(store, job_id) == history(store, whole)
 
 
-def test_a_store_that_stays_away_is_waited_for_no_longer_than_the_lease(store: Store) -> None:
-    queue(store)
+def test_an_evaluated_iteration_waits_for_a_store_that_is_away_for_longer_than_the_lease(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    job_id = queue(store)
     evaluator = FormulaEvaluator()
-    absent = AbsentStore(store, lambda access: access != "job" and evaluator.calls > 0)
-    job = run(cast(Store, absent), evaluator, lease_seconds=0.3)
-    assert evaluator.calls == 1
+    until: list[float] = []
+
+    def away(access: str) -> bool:
+        if evaluator.calls == 1 and not until:
+            until.append(time.monotonic() + 0.6)
+        return bool(until) and time.monotonic() < until[0]
+
+    absent = AbsentStore(store, away)
+    with caplog.at_level(logging.WARNING):
+        job = run(cast(Store, absent), evaluator, lease_seconds=0.3)
+    assert job.state is JobState.SUCCEEDED
+    assert {"commit", "renew"} <= set(absent.refused)
+    assert evaluator.calls == SPEC.iterations
+    assert len(history(store, job_id)) == SPEC.iterations * SPEC.optimizer.particles
+    assert len(caplog.records) == 1
+
+
+def test_an_iteration_that_waited_for_the_store_is_dropped_if_another_has_the_job(
+    store: Store,
+) -> None:
+    job_id = queue(store)
+    evaluator = FormulaEvaluator()
+    taken: list[Claim] = []
+
+    def away(access: str) -> bool:
+        if evaluator.calls and not taken:
+            claim = store.claim("another", lease_seconds=60.0, job_id=job_id)
+            taken.extend([claim] if claim else [])
+        return bool(evaluator.calls) and not taken
+
+    job = run(cast(Store, AbsentStore(store, away)), evaluator, lease_seconds=0.3)
     assert (job.state, job.progress.iterations) == (JobState.RUNNING, 0)
-    assert store.claim("another", lease_seconds=60.0) is not None
+    assert evaluator.calls == 1
 
 
 def test_a_process_that_is_to_end_does_not_wait_for_a_store_that_is_away(store: Store) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import LeaseLost
-from services.optimizer.jobs.job import Claim, Command, JobState
+from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, JobState
 from services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
@@ -173,3 +173,96 @@ def test_a_lease_that_ran_out_but_was_not_taken_is_still_good(
     claim = begun(store)
     clock.advance(1000 * LEASE)
     assert store.commit(claim, completed(0), ask(1)) is JobState.RUNNING
+
+
+def crash(store: SqlStore, clock: Clock, times: int, runner: str = "") -> list[Claim]:
+    """Runners that claim the job, and are not heard of any more."""
+    claims = []
+    for number in range(times):
+        claims.append(taken(store, runner or f"killed-{number}"))
+        clock.advance(LEASE)
+    return claims
+
+
+def test_a_job_that_takes_runner_after_runner_down_is_quarantined_and_others_run(
+    store: SqlStore, clock: Clock
+) -> None:
+    poison, _ = store.create_job(spec())
+    clock.advance(1.0)
+    sound, _ = store.create_job(spec())
+    *_, last = crash(store, clock, QUARANTINE_AFTER)
+    assert taken(store).job.id == sound.id
+    found = store.job(poison.id)
+    assert found.state is JobState.FAILED
+    assert found.error is not None and "quarantined: 5 runner processes in a row" in found.error
+    assert last.runner in found.error and "resume" in found.error
+    with pytest.raises(LeaseLost):
+        store.begin(last, ask(0))
+
+
+def test_a_quarantined_job_that_is_resumed_is_tried_as_often_again(
+    store: SqlStore, clock: Clock
+) -> None:
+    job, _ = store.create_job(spec())
+    for _ in range(2):
+        crash(store, clock, QUARANTINE_AFTER)
+        assert store.claim("runner-b", lease_seconds=LEASE) is None
+        assert store.job(job.id).state is JobState.FAILED
+        assert store.command(job.id, Command.RESUME).state is JobState.QUEUED
+    assert taken(store).job.error is None
+
+
+def test_a_job_that_commits_between_crashes_is_never_quarantined(
+    store: SqlStore, clock: Clock
+) -> None:
+    begun(store, iterations=100)
+    for iteration in range(3):
+        clock.advance(LEASE)
+        *_, last = crash(store, clock, QUARANTINE_AFTER - 2)
+        # The last of them has committed something before it was killed.
+        assert store.commit(last, completed(iteration), ask(iteration + 1)) is JobState.RUNNING
+    assert taken(store).job.state is JobState.RUNNING
+
+
+def test_claims_that_were_given_up_in_order_do_not_count_and_do_not_reset(
+    store: SqlStore, clock: Clock
+) -> None:
+    job, _ = store.create_job(spec())
+    crash(store, clock, QUARANTINE_AFTER - 1)
+    for number in range(3):
+        store.release(taken(store, f"stopped-{number}"), JobState.QUEUED)
+    assert taken(store, "killed").job.state is JobState.RUNNING
+    clock.advance(LEASE)
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
+    assert store.job(job.id).state is JobState.FAILED
+
+
+def test_a_runner_that_lives_may_take_up_its_own_job_as_often_as_its_machine_sleeps(
+    store: SqlStore, clock: Clock
+) -> None:
+    store.create_job(spec())
+    crash(store, clock, 3 * QUARANTINE_AFTER, runner="laptop")
+    assert taken(store, "laptop").job.state is JobState.RUNNING
+
+
+def test_how_many_crashes_it_takes_is_a_setting(store: SqlStore, clock: Clock) -> None:
+    job, _ = store.create_job(spec())
+    crash(store, clock, 1)
+    assert store.claim("runner-b", lease_seconds=LEASE, quarantine_after=1) is None
+    assert store.job(job.id).state is JobState.FAILED
+
+
+def test_what_a_job_waits_for_is_told_until_it_waits_no_longer(
+    store: SqlStore, clock: Clock
+) -> None:
+    claim = begun(store)
+    before = claim.job.updated_at
+    clock.advance(1.0)
+    store.renew(claim, lease_seconds=LEASE, waiting="no route to host")
+    found = store.job(claim.job.id)
+    assert (found.waiting, found.updated_at) == ("no route to host", before)
+    store.renew(claim, lease_seconds=LEASE)
+    assert store.job(claim.job.id).waiting is None
+    store.renew(claim, lease_seconds=LEASE, waiting="no route to host")
+    store.release(claim, JobState.QUEUED)
+    assert store.job(claim.job.id).waiting is None

@@ -158,6 +158,7 @@ def _runtime(
         cpus=settings.cpus,
         concurrent_jobs=settings.concurrent_jobs,
         lease_seconds=settings.lease_seconds,
+        quarantine_after=settings.quarantine_after,
         cache=settings.cache,
         longest_job=settings.api_max_job_seconds,
         should_stop=should_stop,

@@ -26,10 +26,10 @@ class JobNews:
         self._service = service
         self._job_id = job_id
         self._after = after
-        self._told: JobState | None = None
+        self._told: tuple[JobState, str | None] | None = None
 
     def poll(self) -> Iterator[JobEvent]:
-        """Iterations that were committed since the last time, then the state if it is another."""
+        """Iterations that were committed since the last time, then the state if there is news."""
         # The job first: whatever it counts as committed is then among the iterations.
         job = self._service.job(self._job_id)
         more = True
@@ -39,8 +39,8 @@ class JobNews:
                 self._after = iteration.index
                 yield IterationView.from_iteration(iteration)
             more = page.next is not None
-        if job.state is not self._told:
-            self._told = job.state
+        if (job.state, job.waiting) != self._told:
+            self._told = (job.state, job.waiting)
             yield StateView.from_job(job)
         if job.state.terminal:
             self._service.store.verify()

@@ -49,7 +49,7 @@ from gaitswarm.views import (
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
-from services.optimizer.run.coordinator import Backoff
+from services.optimizer.run.outage import Backoff
 from sim.identification.recorded_walk import RecordedWalk
 
 T = TypeVar("T")

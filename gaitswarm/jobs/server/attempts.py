@@ -30,7 +30,7 @@ from gaitswarm.jobs.port import JobEvent
 from gaitswarm.jobs.server.call import Call
 from gaitswarm.views import IterationView, ProblemView, StateView
 from services.optimizer.jobs.job import JobState
-from services.optimizer.run.coordinator import Backoff
+from services.optimizer.run.outage import Backoff
 
 T = TypeVar("T")
 

@@ -88,6 +88,9 @@ def commanded(state: JobState, command: Command) -> JobState:
         raise Conflict(f"cannot {command} a job that is {state}; {hint}") from None
 
 
+QUARANTINE_AFTER: Final = 5
+"""Runner processes in a row that go down with a job before it is quarantined."""
+
 LARGEST_BUDGET: Final = 1_000_000
 """Iterations, as in a spec."""
 
@@ -184,6 +187,7 @@ class Job:
         lineage: where it comes from, if it was forked from another job.
         owner: name of the token that it was submitted with, if any.
         submitted_iterations: budget that it was submitted with.
+        waiting: what it waits for while it runs, such as workers that are away; None if nothing.
     """
 
     id: str
@@ -200,6 +204,7 @@ class Job:
     lineage: Lineage | None = None
     owner: str | None = None
     submitted_iterations: int = 0
+    waiting: str | None = None
 
     @property
     def spec(self) -> AnySpec:
@@ -279,7 +284,7 @@ class TimeLeft:
 
     Attributes:
         eta_seconds: time to the end of the budget [s]; 0 for a job that succeeded, None unless it
-            runs and has committed something.
+            runs, waits for nothing and has committed something.
         evaluations_per_second: designs judged [1/s]; None before the first commit.
         simulations_per_second: walks, one per case and design that was not known [1/s]; None before
             the first commit, and where the spec cannot be read.
@@ -309,7 +314,7 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
     eta: float | None = None
     if job.state is JobState.SUCCEEDED:
         eta = 0.0
-    elif job.state is JobState.RUNNING and job.readable:
+    elif job.state is JobState.RUNNING and job.readable and job.waiting is None:
         own = progress.iterations - (job.lineage.own_from if job.lineage else 0)
         one = progress.compute_seconds / own
         remaining = max(0, job.spec.budget - progress.evaluations) / rate

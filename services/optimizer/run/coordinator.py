@@ -13,7 +13,7 @@ Evaluated              reevaluating     Commit                       committing
 Committed(running)     committing       Evaluate                     evaluating
 Committed(any other)   committing       -                            ended
 Extended               committing       Commit                       committing
-EvaluatorLost          [re]evaluating   Wait, or Release(failed)     waiting, or ended
+EvaluatorLost          [re]evaluating   Wait                         waiting
 Waited                 waiting          Evaluate                     [re]evaluating, as before
 EvaluationFailed       [re]evaluating   Release(failed)              ended
 PauseSeen              waiting          Release(queued)              ended
@@ -25,6 +25,8 @@ judged in double. It is committed with its iteration; what is asked next does no
 
 A pause that comes while walks are run is the store's to see: the commit then answers `paused`.
 The store likewise pauses a pausing job that is released as queued.
+
+Workers that are away are waited for without end, after pauses that grow to a bound.
 
 A claim has changed if the numbers would depend on something else than those that the job has, and
 nobody has accepted that.
@@ -68,37 +70,9 @@ from services.optimizer.run.events import (
     Wait,
     Waited,
 )
+from services.optimizer.run.outage import Backoff
 from services.optimizer.search.optimizer import Optimizer
 from sim.identification.recorded_walk import Recordings
-
-
-@dataclass(frozen=True, slots=True)
-class Backoff:
-    """Exponential backoff: `first` [s], doubled at each attempt up to `longest` [s].
-
-    Attributes:
-        first: The first delay [s].
-        longest: No delay is longer [s].
-        attempts: How often a failure is answered by another try before giving up.
-    """
-
-    first: float = 1.0
-    longest: float = 60.0
-    attempts: int = 8
-
-    def delay(self, failures: int) -> float | None:
-        """How long to wait before the next attempt.
-
-        Args:
-            failures: In a row, so far (>= 1).
-
-        Returns:
-            Seconds to wait; None: give up.
-        """
-        if failures > self.attempts:
-            return None
-        # The exponent is bounded, so that a long row of attempts cannot overflow.
-        return float(min(self.first * 2.0 ** min(failures - 1, 60), self.longest))
 
 
 class Phase(StrEnum):
@@ -315,15 +289,8 @@ def _walk(state: Coordination) -> tuple[Coordination, tuple[Action, ...]]:
 
 def _try_again(state: Coordination, reason: str) -> tuple[Coordination, tuple[Action, ...]]:
     failures = state.failures + 1
-    delay = state.backoff.delay(failures)
-    if delay is None:
-        return _release(
-            state,
-            JobState.FAILED,
-            f"the workers could not be reached in {failures} attempts: {reason};"
-            " resume the job when they can",
-        )
-    return replace(state, phase=Phase.WAITING, failures=failures), (Wait(delay, reason),)
+    wait = Wait(state.backoff.pause(failures), reason)
+    return replace(state, phase=Phase.WAITING, failures=failures), (wait,)
 
 
 def _release(

@@ -11,10 +11,11 @@ from typing import Final
 from services.optimizer.errors import GaitswarmError, LeaseLost
 from services.optimizer.jobs.iteration import CompletedIteration, Iteration
 from services.optimizer.jobs.job import Claim, Job, JobState
-from services.optimizer.run.coordinator import Backoff
 from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
+from services.optimizer.run.execution import OnCommit, OnRetry, Surroundings, run_claim
 from services.optimizer.run.heartbeat import Heartbeat
-from services.optimizer.run.runner import OnCommit, OnRetry, Surroundings, run_claim, runner_name
+from services.optimizer.run.outage import Backoff
+from services.optimizer.run.runner import runner_name
 from services.optimizer.store.base import Store
 
 EMBEDDED_LEASE_SECONDS: Final = 5.0

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
-from services.optimizer.errors import LeaseLost, StoreUnavailable
+from services.optimizer.errors import LeaseLost
 from services.optimizer.jobs.job import Claim, JobState
+from services.optimizer.run.outage import Outage, is_infrastructure
 from services.optimizer.store.base import Store
 
 _BEATS_PER_LEASE: Final = 3
@@ -23,14 +23,15 @@ _log = logging.getLogger(__name__)
 class Heartbeat:
     """Renews a claim from a thread of its own, from entering to leaving the `with` block.
 
-    A store that does not answer is tried again until the lease must have run out; then the job
-    counts as lost, because another runner may have it.
+    A store that does not answer is tried again, however long that takes: it refuses whatever is
+    written under a claim that another runner has taken over meanwhile.
 
     Args:
         store: Where the job is kept.
         claim: What is renewed.
         lease_seconds: How long each renewal holds [s].
-        clock: Monotonic time [s].
+        waiting: Tells why the job waits; None while it does not. Users see it.
+        outage: Where it is noted that the store is away.
     """
 
     def __init__(
@@ -39,12 +40,14 @@ class Heartbeat:
         claim: Claim,
         *,
         lease_seconds: float,
-        clock: Callable[[], float] = time.monotonic,
+        waiting: Callable[[], str | None] = lambda: None,
+        outage: Outage | None = None,
     ) -> None:
         self._store = store
         self._claim = claim
         self._lease_seconds = lease_seconds
-        self._clock = clock
+        self._waiting = waiting
+        self._outage = outage or Outage()
         self._interval = min(lease_seconds / _BEATS_PER_LEASE, _LONGEST_INTERVAL)
         self._ended = threading.Event()
         self._lost = threading.Event()
@@ -55,7 +58,7 @@ class Heartbeat:
 
     @property
     def lost(self) -> bool:
-        """The job was cancelled, or is or may be another runner's."""
+        """The job was cancelled, or is another runner's."""
         return self._lost.is_set()
 
     @property
@@ -77,20 +80,26 @@ class Heartbeat:
         self._thread.join()
 
     def _beat(self) -> None:
-        good_until = self._clock() + self._lease_seconds
+        failed = False
         while not self._ended.wait(self._interval):
-            sent = self._clock()
             try:
-                self._state = self._store.renew(self._claim, lease_seconds=self._lease_seconds)
-                good_until = sent + self._lease_seconds
+                self._state = self._store.renew(
+                    self._claim, lease_seconds=self._lease_seconds, waiting=self._waiting()
+                )
             except LeaseLost as error:
                 # A commit that ends the job gives up the lease between two beats.
                 if not self._ended.is_set():
                     _log.info("job %s: %s", self._claim.job.id, error)
                 self._lost.set()
                 return
-            except StoreUnavailable as error:
-                _log.warning("job %s: no heartbeat: %s", self._claim.job.id, error)
-                if self._clock() >= good_until:
-                    self._lost.set()
-                    return
+            except Exception as error:
+                if not is_infrastructure(error):
+                    raise
+                failed = True
+                if self._outage.failed(str(error)):
+                    _log.warning("job %s: no heartbeat: %s", self._claim.job.id, error)
+            else:
+                # A beat that was sent before another access failed says nothing of that.
+                if failed:
+                    self._outage.ended()
+                failed = False

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from services.optimizer.access import Tokens
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
+from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.reading import CommittedHistory, Page
@@ -184,29 +184,39 @@ class Store(CommittedHistory, Protocol):
         """
 
     def claim(
-        self, runner: str, *, lease_seconds: float, job_id: str | None = None
+        self,
+        runner: str,
+        *,
+        lease_seconds: float,
+        job_id: str | None = None,
+        quarantine_after: int = QUARANTINE_AFTER,
     ) -> Claim | None:
         """Take the oldest job that is queued, or running/pausing with a lease that ran out.
 
         The claimed job is running, its token one higher than any before. A pausing job without a
-        live lease becomes paused, and one that cannot be read fails with the reason; neither is
-        claimed, and neither keeps others from being claimed.
+        live lease becomes paused; one that cannot be read fails with the reason, and so does one
+        that is quarantined. None of them is claimed, and none keeps others from being claimed.
+
+        A claim counts as a crash if its lease ran out without release, and another runner takes the
+        job over. A commit sets the count to zero, and so does the user who resumes the job.
 
         Args:
             runner: Name of whoever takes it.
             lease_seconds: For how long, unless the claim is renewed [s].
             job_id: The only job that is wanted; None for any.
+            quarantine_after: A job with so many crashes in a row fails instead of being claimed.
 
         Returns:
             The claim, with all that a run needs; None if no job is to be had.
         """
 
-    def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
+    def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> JobState:
         """Prolong a lease: the heartbeat of whoever runs the job.
 
         Args:
             claim: On the job.
             lease_seconds: From now on [s].
+            waiting: What the job waits for, for people; None for nothing.
 
         Returns:
             The job's state, so that a pause is seen.

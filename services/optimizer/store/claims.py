@@ -75,8 +75,48 @@ def lease_is_live(row: Row, now: datetime) -> bool:
     return expires is not None and expires > now
 
 
+def crashes_before(row: Row, runner: str) -> int:
+    """Runner processes in a row that went down with a job without committing an iteration.
+
+    A lease that ran out counts as one, unless its owner is the one who asks, and so lives.
+
+    Args:
+        row: The job's row, as it is found by whoever may claim it.
+        runner: Who asks.
+
+    Returns:
+        Their number.
+    """
+    owner = row["lease_owner"]
+    return (row["crashes"] or 0) + (owner is not None and owner != runner)
+
+
+def quarantine(connection: Connection, row: Row, crashes: int, now: datetime) -> None:
+    """Let a locked job fail with which runner after runner went down.
+
+    Args:
+        connection: The transaction in which the job was locked.
+        row: The job's row.
+        crashes: How many went down.
+        now: The time at which it fails.
+    """
+    error = (
+        f"quarantined: {crashes} runner processes in a row were killed or not heard of while they"
+        f" ran its iteration {row['iterations']}, the last of them {row['lease_owner']}. See there"
+        " what ended it, such as a lack of memory; resume the job to try again"
+    )
+    columns = entering(JobState.FAILED, now) | {"error": error, "crashes": crashes}
+    update_job(connection, row, columns)
+
+
 def take_job(
-    connection: Connection, row: Row, runner: str, lease_seconds: float, now: datetime
+    connection: Connection,
+    row: Row,
+    runner: str,
+    lease_seconds: float,
+    now: datetime,
+    *,
+    crashes: int = 0,
 ) -> Claim:
     """Make a locked job, which nobody else holds, the runner's: it runs, under a higher token.
 
@@ -86,6 +126,7 @@ def take_job(
         runner: Who takes it.
         lease_seconds: For how long, unless the claim is renewed [s].
         now: The time at which it is taken.
+        crashes: As `crashes_before` counts them.
 
     Returns:
         The claim.
@@ -100,6 +141,7 @@ def take_job(
         "lease_owner": runner,
         "lease_token": token,
         "lease_expires_at": now + timedelta(seconds=lease_seconds),
+        "crashes": crashes or None,
     }
     job = to_job(update_job(connection, row, changes))
     return Claim(job, runner, token, work.ask, work.recordings, work.answered)

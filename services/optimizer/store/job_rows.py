@@ -70,6 +70,7 @@ def to_job(row: Row) -> Job:
         lineage=lineage,
         owner=row["owner"],
         submitted_iterations=submitted_iterations,
+        waiting=row["waiting"],
     )
 
 

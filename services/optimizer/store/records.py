@@ -210,7 +210,7 @@ def complete_iteration(
 
 
 def entering(state: JobState, now: datetime) -> dict[str, Any]:
-    """Columns that follow from a state; only a job under way keeps its lease.
+    """Columns that follow from a state; only a job under way keeps its lease, none waits yet.
 
     The token stays in any case, so that the next one is higher.
 
@@ -225,6 +225,7 @@ def entering(state: JobState, now: datetime) -> dict[str, Any]:
         "state": state,
         "updated_at": now,
         "finished_at": now if state.terminal else None,
+        "waiting": None,
     }
     if state not in (JobState.RUNNING, JobState.PAUSING):
         columns |= {"lease_owner": None, "lease_expires_at": None}
@@ -273,6 +274,7 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
         Values by name of their columns.
     """
     columns: dict[str, Any] = {
+        "crashes": None,
         "iterations": done.iteration + 1,
         "evaluations": job["evaluations"] + len(done.fitness),
         "evaluations_saved": (job["evaluations_saved"] or 0) + done.saved,

@@ -14,13 +14,24 @@ from services.optimizer.errors import InvalidRequest, Unreadable
 from services.optimizer.jobs.documents import check_budget
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, commanded, extended
+from services.optimizer.jobs.job import (
+    QUARANTINE_AFTER,
+    Claim,
+    Command,
+    Job,
+    JobOrder,
+    JobState,
+    commanded,
+    extended,
+)
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.claims import (
     claimable,
+    crashes_before,
     held,
     lease_is_live,
+    quarantine,
     require_budget_of,
     set_aside,
     take_job,
@@ -214,6 +225,7 @@ class SqlStore(SqlHistory):
             if command is Command.RESUME:
                 queued = state is JobState.QUEUED
                 changes |= {"error": None, "accepts_changes": queued and accept_changes}
+                changes |= {"crashes": None}
             return to_job(update_job(connection, row, changes))
 
     def extend(self, job_id: str, iterations: int) -> Job:
@@ -248,7 +260,12 @@ class SqlStore(SqlHistory):
     # the runner's side
 
     def claim(
-        self, runner: str, *, lease_seconds: float, job_id: str | None = None
+        self,
+        runner: str,
+        *,
+        lease_seconds: float,
+        job_id: str | None = None,
+        quarantine_after: int = QUARANTINE_AFTER,
     ) -> Claim | None:
         """Take a job that waits for a runner, for as long as the lease lasts."""
         with self._database.transaction(write=True) as connection:
@@ -261,20 +278,25 @@ class SqlStore(SqlHistory):
                 if row["state"] == JobState.PAUSING:
                     update_job(connection, row, entering(JobState.PAUSED, now))
                     continue
+                crashes = crashes_before(row, runner)
+                if crashes >= quarantine_after:
+                    quarantine(connection, row, crashes, now)
+                    continue
                 try:
-                    return take_job(connection, row, runner, lease_seconds, now)
+                    return take_job(connection, row, runner, lease_seconds, now, crashes=crashes)
                 except Unreadable as error:
                     # The next job must not wait for somebody to mend this one.
                     _log.warning("job %s is set aside: %s", row["id"], error)
                     set_aside(connection, row, error, now)
         return None
 
-    def renew(self, claim: Claim, *, lease_seconds: float) -> JobState:
+    def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> JobState:
         """Prolong a lease."""
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             expires = self._clock(connection) + timedelta(seconds=lease_seconds)
-            update_job(connection, row, {"lease_expires_at": expires})
+            reason = None if waiting is None else storable(waiting)
+            update_job(connection, row, {"lease_expires_at": expires, "waiting": reason})
             return JobState(row["state"])
 
     def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:

@@ -173,6 +173,10 @@ jobs: Final = Table(
     Column("lineage", Document(none_as_null=True)),
     # Name of the token that it was submitted with; NULL for none.
     Column("owner", Text),
+    # Claims in a row that ended without a word, which tells a crash; NULL is none.
+    Column("crashes", Integer),
+    # What a running job waits for, as whoever runs it says; NULL for nothing.
+    Column("waiting", Text),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

@@ -10,6 +10,8 @@ export interface Followed {
   readonly iterations: readonly Iteration[]
   readonly state: JobState | null
   readonly error: string | null
+  /** What it waits for, such as workers that are away. */
+  readonly waiting: string | null
   readonly connection: Connection
   /** When the stream broke [ms]; null while it is whole. */
   readonly staleSince: number | null
@@ -50,6 +52,7 @@ export class EventStream {
   private readonly iterations: Iteration[]
   private state: JobState | null = null
   private error: string | null = null
+  private waiting: string | null = null
   private connection: Connection = 'connecting'
   private staleSince: number | null = null
   private source: Source | null = null
@@ -135,9 +138,10 @@ export class EventStream {
     this.tell()
   }
 
-  private moved(news: { state: JobState; error: string | null }): void {
+  private moved(news: { state: JobState; error: string | null; waiting?: string | null }): void {
     this.state = news.state
     this.error = news.error
+    this.waiting = news.waiting ?? null
     if (ENDINGS.has(news.state)) {
       this.connection = 'ended'
       this.staleSince = null
@@ -170,6 +174,7 @@ export class EventStream {
         iterations: [...this.iterations],
         state: this.state,
         error: this.error,
+        waiting: this.waiting,
         connection: this.connection,
         staleSince: this.staleSince,
       })

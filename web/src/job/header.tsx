@@ -42,6 +42,12 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
         </div>
         <JobActions job={job} onJob={live.replace} />
       </div>
+      {job.waiting && (
+        <div class="notice" data-tone="warn" role="status" data-waiting>
+          <strong>It waits, and goes on by itself.</strong>
+          <p>{job.waiting}</p>
+        </div>
+      )}
       {job.error && (
         <div class="notice" data-tone="bad" role="alert" data-error>
           <strong>{isReadable(job) ? 'It failed.' : 'It cannot be read.'}</strong>

@@ -19,6 +19,7 @@ const NOTHING_YET: Followed = {
   iterations: [],
   state: null,
   error: null,
+  waiting: null,
   connection: 'connecting',
   staleSince: null,
 }
@@ -80,7 +81,7 @@ export function useJob(id: string): LiveJob {
   // A new state is asked about at once, new iterations now and then.
   useEffect(() => {
     if (followed.state !== null) ask()
-  }, [followed.state, followed.connection])
+  }, [followed.state, followed.waiting, followed.connection])
   useEffect(() => {
     if (followed.iterations.length === 0) return
     const wait = Math.max(0, asked.current + ASK_MS - Date.now())

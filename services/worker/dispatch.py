@@ -1,25 +1,27 @@
-"""What both evaluators share: cutting a request into tasks, fair order, results by index."""
+"""Cuts requests into tasks, hands them out fairly, gathers results."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
-from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
+from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from services.worker.cutting import Chunk, cut
+from services.worker.durations import CaseTime, Durations, costs_of
+from services.worker.failures import killed_workers, misshapen, unlike
 from services.worker.fair_queue import FairQueue
 from services.worker.pace import Pace, TaskTime
 from services.worker.tasks import Answer, Task, TaskTotals
+from services.worker.tries import Running, Tries, Verdict, straggler
 from sim.case import LongCase, WalkingCase
 from sim.kernel.walk import Precision
 from sim.outcome import Outcome
-from sim.provenance import Provenance
 
 _GLANCE: Final = 0.1
 """Seconds between looks at `should_stop`."""
@@ -41,6 +43,8 @@ class Batch:
         outcomes: One per case, filled in as results come.
         missing: Chunks that have no result yet.
         times: Of the tasks whose results have come.
+        case_times: Of the same, by case.
+        tries: Of the chunks that were handed out.
         error: With which the request failed; None if it has not.
         dropped: Whether nobody waits for it any more.
     """
@@ -49,6 +53,8 @@ class Batch:
     outcomes: tuple[Outcome, ...]
     missing: set[Chunk]
     times: list[TaskTime] = field(default_factory=list)
+    case_times: list[CaseTime] = field(default_factory=list)
+    tries: dict[Chunk, Tries] = field(default_factory=dict)
     error: BaseException | None = None
     dropped: bool = False
 
@@ -76,14 +82,17 @@ class Work:
     Attributes:
         batch: Which it belongs to.
         chunk: Some of the batch's designs in some of its cases.
-        attempts: How often it was sent out before.
         taken: When it was taken to be run; monotonic [s].
     """
 
     batch: Batch
     chunk: Chunk
-    attempts: int = 0
     taken: float = 0.0
+
+    @property
+    def costs(self) -> dict[str, float]:
+        """Simulated seconds by case."""
+        return costs_of(self.chunk, self.batch.request.cases)
 
     @property
     def task(self) -> Task:
@@ -96,24 +105,30 @@ class Work:
 class Dispatcher:
     """Hands the chunks of all requests to whoever takes them, and puts results where they belong.
 
-    Thread-safe. `evaluate` is called by those who want results, `take`, `complete`, `again` and
-    `fail` by those who run the tasks.
+    Thread-safe. `evaluate` is called by those who want results, `take`, `copy`, `complete`, `again`
+    and `fail` by those who run the tasks.
 
     Attributes:
         slots: Tasks that run at the same time.
         lanes: Tells how many designs the compiled kernel of a precision steps at once.
         shared: Whether tasks that run at the same time share their walks, as they do in threads.
         totals: Of all tasks whose answers were of use.
+        clock: Monotonic time [s]; replaced in tests.
     """
 
     slots: int
     lanes: Callable[[Precision], int]
     shared: bool = False
     totals: TaskTotals = field(default_factory=TaskTotals)
+    clock: Callable[[], float] = time.monotonic
     _queue: FairQueue[Work] = field(default_factory=FairQueue)
     _changed: threading.Condition = field(default_factory=threading.Condition)
     _closed: str | None = None
     _paces: dict[str, Pace] = field(default_factory=dict)
+    _durations: dict[str, Durations] = field(default_factory=dict)
+    # Handed out and not settled, in order; and since when there has been a slot for each.
+    _out: dict[Work, None] = field(default_factory=dict)
+    _all_run_since: float | None = 0.0
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
@@ -150,9 +165,30 @@ class Dispatcher:
         with self._changed:
             self._changed.wait_for(lambda: bool(self._queue) or self.closed, timeout)
             work = None if self.closed else self._queue.pop()
-        if work is not None:
-            work.taken = time.monotonic()
+            if work is not None:
+                self._hand_out(work)
         return work
+
+    def copy(self) -> Work | None:
+        """A chunk to be run a second time, in a slot that has nothing else to do.
+
+        Returns:
+            A chunk that is under way and takes far longer than it should; None if there is none.
+        """
+        with self._changed:
+            for work in [work for work in self._out if not work.batch.awaits(work.chunk)]:
+                self._settled(work)
+            if self.closed or self._queue or len(self._out) >= self.slots:
+                return None
+            out = list(self._out)
+            found = straggler(map(self._running, out), slots=self.slots, waiting=len(self._queue))
+            if found is None:
+                return None
+            batch, chunk = out[found].batch, out[found].chunk
+            batch.tries[chunk] = replace(batch.tries[chunk], copied=True)
+            work = Work(batch, chunk)
+            self._hand_out(work)
+            return work
 
     def complete(self, work: Work, answer: Answer | Outcome) -> None:
         """The chunk has its result; a second one of the same chunk is the same and ignored.
@@ -165,6 +201,7 @@ class Dispatcher:
         chunk, batch = work.chunk, work.batch
         expected = batch.request.provenance
         with self._changed:
+            self._settled(work)
             if not batch.awaits(chunk):
                 return
             # A worker of an earlier version answers with the bare outcome.
@@ -173,7 +210,7 @@ class Dispatcher:
                 or answer.outcomes is None
                 or answer.provenance != expected
             ):
-                self._end(batch, _unlike(expected, answer))
+                self._end(batch, unlike(expected, answer))
                 return
             shapes = [outcome.objectives.shape for outcome in answer.outcomes]
             wanted = [
@@ -181,28 +218,37 @@ class Dispatcher:
                 for part in chunk.parts
             ]
             if shapes != wanted:
-                self._end(batch, _misshapen(shapes, wanted))
+                self._end(batch, misshapen(shapes, wanted))
                 return
             for part, outcome in zip(chunk.parts, answer.outcomes, strict=True):
                 into = batch.outcomes[part.case]
                 into.objectives[part.start : part.stop] = outcome.objectives
                 into.statuses[part.start : part.stop] = outcome.statuses
-            overhead = time.monotonic() - work.taken - answer.seconds
+            overhead = self.clock() - work.taken - answer.seconds
             batch.times.append(TaskTime(chunk.cost, answer.seconds, overhead))
+            batch.case_times.append(CaseTime(work.costs, answer.seconds))
             self.totals = self.totals.plus(answer)
             batch.missing.remove(chunk)
             self._changed.notify_all()
 
-    def again(self, work: Work) -> None:
-        """The chunk was lost with its worker: it is to be run again.
+    def again(self, work: Work, *, suspect: bool = True) -> None:
+        """The chunk was lost with its worker: it is run again, or its request fails.
 
         Args:
             work: The chunk as it was sent out.
+            suspect: Whether it may be what ended the worker. Then its request fails with
+                KilledWorker when too many have died of it.
         """
         with self._changed:
-            if work.batch.awaits(work.chunk):
-                retry = Work(work.batch, work.chunk, work.attempts + 1)
-                self._queue.push(work.batch.request.job_id, work.chunk.cost, retry)
+            self._settled(work)
+            batch, chunk = work.batch, work.chunk
+            if not batch.awaits(chunk):
+                return
+            batch.tries[chunk], verdict = batch.tries.get(chunk, Tries(1)).lost(suspect=suspect)
+            if verdict is Verdict.GIVEN_UP:
+                self._end(batch, killed_workers(batch.request, chunk, batch.tries[chunk].killed))
+            elif verdict is Verdict.AGAIN:
+                self._queue.push(batch.request.job_id, chunk.cost, Work(batch, chunk))
                 self._changed.notify_all()
 
     def fail(self, work: Work, error: BaseException) -> None:
@@ -213,6 +259,7 @@ class Dispatcher:
             error: What the request fails with.
         """
         with self._changed:
+            self._settled(work)
             if work.batch.awaits(work.chunk):
                 self._end(work.batch, error)
 
@@ -255,8 +302,35 @@ class Dispatcher:
             job_id = batch.request.job_id
             pace = self._paces.pop(job_id, Pace()).after(batch.times)
             self._paces[job_id] = pace
+            known = self._durations.pop(job_id, Durations())
+            self._durations[job_id] = known.after(batch.case_times)
             if len(self._paces) > _PACES_KEPT:
                 del self._paces[next(iter(self._paces))]
+                del self._durations[next(iter(self._durations))]
+
+    def _hand_out(self, work: Work) -> None:
+        """To a worker; the caller holds the lock, and so do those of the next two."""
+        work.taken = self.clock()
+        tries = work.batch.tries
+        tries[work.chunk] = tries.get(work.chunk, Tries()).sent()
+        self._out[work] = None
+        if len(self._out) > self.slots:
+            self._all_run_since = None
+
+    def _settled(self, work: Work) -> None:
+        self._out.pop(work, None)
+        if self._all_run_since is None and len(self._out) <= self.slots:
+            # Until now it may have lain at hand, behind another one.
+            self._all_run_since = self.clock()
+
+    def _running(self, work: Work) -> Running:
+        known = self._durations.get(work.batch.request.job_id, Durations())
+        begun = max(work.taken, self._all_run_since or 0.0)
+        return Running(
+            self.clock() - begun,
+            known.after(work.batch.case_times).predicted(work.costs),
+            work.batch.tries[work.chunk],
+        )
 
     def _await(self, batch: Batch, should_stop: Callable[[], bool]) -> None:
         while True:
@@ -285,21 +359,3 @@ class Dispatcher:
     def _refuse_if_closed(self) -> None:
         if self._closed is not None:
             raise EvaluatorUnavailable(self._closed)
-
-
-def _misshapen(shapes: list[tuple[int, ...]], wanted: list[tuple[int, int]]) -> RuntimeError:
-    return RuntimeError(
-        f"a worker sent objectives of shapes {shapes} for a chunk of {wanted};"
-        " it runs other code than this process"
-    )
-
-
-def _unlike(expected: Provenance, answer: Answer | Outcome) -> ProvenanceChanged:
-    worker, why = "a worker", "its gaitswarm does not say what it computes"
-    if isinstance(answer, Answer):
-        worker += f" on {answer.host}"
-        why = "; ".join(expected.changes(answer.provenance))
-    return ProvenanceChanged(
-        f"{worker} does not compute what this job's numbers depend on: {why}. Its walks were not"
-        " used; give all workers the same gaitswarm and a C compiler, and resume the job"
-    )

@@ -21,9 +21,6 @@ from sim.outcome import Outcome
 _LOOK_AHEAD: Final = 2
 """Tasks with Ray per slot: one that runs, and one that is at hand when it ends."""
 
-_ATTEMPTS: Final = 4
-"""How often a task is sent out whose worker died."""
-
 _GLANCE: Final = 0.02
 """Seconds between looks for new work, while a slot is free."""
 
@@ -217,6 +214,7 @@ class _Pump:
         self._warm_up = session.ray.remote(**options)(warm_up)
         self._most = session.slots * _LOOK_AHEAD
         self._flying: dict[Any, Work] = {}
+        self._cancelled: set[Any] = set()
         self._session = session
         self._misses = 0
         self._next_pulse = time.monotonic() + PULSE_SECONDS
@@ -228,6 +226,7 @@ class _Pump:
         while not self._dispatcher.closed:
             self._send()
             self._collect()
+            self._cancel_dropped()
             self._feel_pulse()
             if not self._warm.is_set():
                 self._note_warmth(starting)
@@ -241,8 +240,12 @@ class _Pump:
         while len(self._flying) < self._most:
             work = self._dispatcher.take(timeout=0.0 if self._flying else _IDLE)
             if work is None:
-                return
+                break
             self._flying[self._walk.remote(work.task)] = work
+        if len(self._flying) < self._dispatcher.slots:
+            copy = self._dispatcher.copy()
+            if copy is not None:
+                self._flying[self._walk.remote(copy.task)] = copy
 
     def _collect(self) -> None:
         if not self._flying:
@@ -253,7 +256,15 @@ class _Pump:
             patience = _GLANCE_AHEAD if all_run else _GLANCE
         done, _ = self._ray.wait(list(self._flying), num_returns=1, timeout=patience)
         for reference in done:
+            self._cancelled.discard(reference)
             self._settle(reference, self._flying.pop(reference))
+
+    def _cancel_dropped(self) -> None:
+        """What nobody waits for any more, or another worker was quicker with, takes no slot."""
+        for reference, work in self._flying.items():
+            if not work.batch.awaits(work.chunk) and reference not in self._cancelled:
+                self._cancelled.add(reference)
+                self._ray.cancel(reference, force=False)
 
     def _feel_pulse(self) -> None:
         if time.monotonic() < self._next_pulse:
@@ -271,23 +282,16 @@ class _Pump:
         exceptions = self._ray.exceptions
         try:
             result = self._ray.get(reference)
+        except exceptions.TaskCancelledError:
+            self._dispatcher.again(work, suspect=False)
         except exceptions.RayTaskError as error:
             self._dispatcher.fail(work, RuntimeError(f"a worker cannot run walks: {error}"))
-        except (exceptions.WorkerCrashedError, exceptions.OutOfMemoryError) as error:
-            self._send_again(work, error)
-        except exceptions.NodeDiedError as error:
-            self._send_again(work, error)
+        except (exceptions.WorkerCrashedError, exceptions.OutOfMemoryError):
+            self._dispatcher.again(work)
+        except (exceptions.NodeDiedError, exceptions.LocalRayletDiedError):
+            self._dispatcher.again(work, suspect=False)
         else:
             if isinstance(result, Failure):
                 self._dispatcher.fail(work, result.error)
             else:
                 self._dispatcher.complete(work, result)
-
-    def _send_again(self, work: Work, error: Exception) -> None:
-        if work.attempts + 1 < _ATTEMPTS:
-            self._dispatcher.again(work)
-            return
-        self._dispatcher.fail(
-            work,
-            EvaluatorUnavailable(f"workers died {_ATTEMPTS} times at the same walks: {error}"),
-        )

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.run.outage import is_infrastructure
 from services.worker.cutting import Part
 from sim.case import Case, run_together
 from sim.controllers.quantisation import timing_tables
@@ -195,6 +197,10 @@ def run_in_worker(task: Task) -> Answer | Failure:
     try:
         return task.run()
     except Exception as error:  # noqa: BLE001 - it is raised again where the result is wanted
+        if is_infrastructure(error):
+            # Told here, as what caused an error does not come along.
+            reason = f"a worker on {platform.node()}: {type(error).__name__}: {error}"
+            return Failure(EvaluatorUnavailable(reason))
         return Failure(transportable(error))
 
 

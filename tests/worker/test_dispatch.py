@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.errors import ProvenanceChanged
+from services.optimizer.errors import KilledWorker, ProvenanceChanged
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.cutting import Part
 from services.worker.dispatch import Dispatcher, Work
@@ -96,6 +96,110 @@ def test_a_chunk_that_was_sent_again_after_its_result_came_is_not_run_again(
     dispatcher.complete(work, answer_of(work))
     dispatcher.again(work)
     assert dispatcher.take(0.0) is None
+
+
+def test_a_chunk_that_three_workers_died_of_fails_the_request_and_names_its_walks(
+    dispatcher: Dispatcher, results: Future[Results]
+) -> None:
+    first, *others = taken(dispatcher)
+    for other in others:
+        dispatcher.complete(other, answer_of(other))
+    work: Work | None = first
+    for _ in range(3):
+        assert work is not None and work.chunk == first.chunk
+        dispatcher.again(work)
+        work = dispatcher.take(0.0)
+    assert work is None
+    (part,) = first.chunk.parts
+    name = first.batch.request.cases[part.case].name
+    with pytest.raises(
+        KilledWorker, match=f"3 worker.*designs {part.start} to {part.stop - 1} .*'{name}'"
+    ):
+        results.result(PATIENCE)
+
+
+def test_a_chunk_whose_nodes_go_is_run_again_for_ever(
+    dispatcher: Dispatcher, results: Future[Results]
+) -> None:
+    work, *others = taken(dispatcher)
+    for _ in range(20):
+        dispatcher.again(work, suspect=False)
+        again = dispatcher.take(0.0)
+        assert again is not None and again.chunk == work.chunk
+        work = again
+    for each in (work, *others):
+        dispatcher.complete(each, answer_of(each))
+    assert len(results.result(PATIENCE)) == 2
+
+
+class Late:
+    """A request of which one chunk takes long, once its pace is known."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.dispatcher = Dispatcher(slots=4, lanes=lambda _: LANES, clock=lambda: self.now)
+        self.pool = ThreadPoolExecutor(1)
+        wanted = request(COUNT)
+        learned = self.pool.submit(self.dispatcher.evaluate, wanted, lambda: False)
+        for work in taken(self.dispatcher):
+            self.end(work)
+        learned.result(PATIENCE)
+        self.results = self.pool.submit(self.dispatcher.evaluate, wanted, lambda: False)
+        self.late, *self.others = taken(self.dispatcher)
+        assert len(self.others) >= self.dispatcher.slots
+
+    def end(self, work: Work) -> None:
+        # A second for each simulated one.
+        self.dispatcher.complete(work, replace(answer_of(work), seconds=work.chunk.cost))
+
+    def close(self) -> None:
+        self.dispatcher.close("the test has ended")
+        self.pool.shutdown()
+
+
+@pytest.fixture
+def late() -> Iterator[Late]:
+    opened = Late()
+    yield opened
+    opened.close()
+
+
+def test_a_chunk_that_takes_far_too_long_is_copied_once_and_the_first_answer_wins(
+    late: Late,
+) -> None:
+    for work in late.others:
+        late.end(work)
+    assert late.dispatcher.copy() is None
+    late.now += 4.0 * late.late.chunk.cost
+    copy = late.dispatcher.copy()
+    assert copy is not None and copy is not late.late and copy.chunk == late.late.chunk
+    late.now += 100.0 * late.late.chunk.cost
+    assert late.dispatcher.copy() is None
+    late.end(copy)
+    outcomes = late.results.result(PATIENCE)
+    assert not late.late.batch.awaits(late.late.chunk)
+    late.dispatcher.again(late.late)
+    assert late.dispatcher.take(0.0) is None
+    for part, expected in zip(copy.chunk.parts, results_of(copy), strict=True):
+        rows = outcomes[part.case].objectives[part.start : part.stop]
+        np.testing.assert_array_equal(rows, expected.objectives)
+
+
+def test_no_chunk_is_copied_while_no_slot_is_free(late: Late) -> None:
+    slots = late.dispatcher.slots
+    for work in late.others[slots - 1 :]:
+        late.end(work)
+    late.now += 100.0 * late.late.chunk.cost
+    assert late.dispatcher.copy() is None
+    late.end(late.others[0])
+    assert late.dispatcher.copy() is not None
+
+
+def test_the_time_that_a_chunk_lay_at_hand_does_not_make_it_late(late: Late) -> None:
+    late.now += 100.0 * late.late.chunk.cost
+    for work in late.others:
+        late.end(work)
+    assert late.dispatcher.copy() is None
 
 
 def test_an_error_of_a_chunk_whose_result_has_come_fails_nothing(

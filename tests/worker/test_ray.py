@@ -12,18 +12,23 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.errors import EvaluatorUnavailable, KilledWorker
 from services.worker.ray_evaluator import RayEvaluator
 from services.worker.tasks import transportable
+from sim.case import Case
 from sim.errors import SimulationError, SimulationInputError, UnreachablePose
+from sim.outcome import Outcome
 from tests.examples.paths import ROOT
 from tests.examples.processes import output, within
 from tests.worker.processes import Process, descendants, walkers
-from tests.worker.requests import bits, never, request
+from tests.worker.requests import bits, never, request, walked_at_once
 
 
 @pytest.mark.slow
@@ -47,6 +52,63 @@ def test_walks_whose_worker_is_killed_are_walked_again_to_the_same_bits(
     found = ray_evaluator.evaluate(wanted, never)
     killer.join()
     assert len(killed) == 1
+    assert bits(found) == expected
+
+
+class Deadly:
+    """A case that ends its process."""
+
+    def __init__(self, like: Case, deaths: Path) -> None:
+        self.name, self.duration, self.robots = "deadly", like.duration, like.robots
+        self.objectives, self.precision = like.objectives, like.precision
+        self.deaths = deaths
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        with self.deaths.open("a") as file:
+            file.write(f"{os.getpid()}\n")
+        os.kill(os.getpid(), signal.SIGKILL)
+        raise AssertionError(designs)
+
+
+@pytest.mark.slow
+def test_walks_that_kill_their_workers_are_tried_on_three_and_then_given_up(
+    ray_evaluator: RayEvaluator, tmp_path: Path
+) -> None:
+    sound = request(2)
+    deadly = Deadly(sound.cases[0], tmp_path / "deaths")
+    with pytest.raises(KilledWorker, match=r"3 worker .* designs 0 to 1 .* in 'deadly'"):
+        ray_evaluator.evaluate(replace(sound, cases=(deadly,)), never)
+    died = deadly.deaths.read_text().split()
+    assert len(died) == len(set(died)) == 3
+    assert not ray_evaluator.lost
+    assert bits(ray_evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
+
+
+@pytest.mark.slow
+def test_walks_of_a_worker_that_hangs_are_walked_by_another_to_the_same_bits(
+    ray_evaluator: RayEvaluator,
+) -> None:
+    wanted = request(300, job_id="hangs")
+    expected = bits(ray_evaluator.evaluate(wanted, never))
+    stopped: list[int] = []
+
+    def stop_one_at_work() -> None:
+        while not stopped:
+            for worker in walkers(os.getpid()):
+                if "run_in_worker" in worker.title:
+                    os.kill(worker.pid, signal.SIGSTOP)
+                    stopped.append(worker.pid)
+                    return
+
+    stopper = threading.Thread(target=stop_one_at_work)
+    stopper.start()
+    try:
+        found = ray_evaluator.evaluate(wanted, never)
+    finally:
+        stopper.join()
+        for pid in stopped:
+            os.kill(pid, signal.SIGCONT)
+    assert len(stopped) == 1
     assert bits(found) == expected
 
 

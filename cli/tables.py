@@ -241,7 +241,7 @@ def print_job(job: JobView) -> None:
         "speed": None
         if job.evaluations_per_second is None
         else f"{job.evaluations_per_second:.1f} designs/s",
-        "time left": None if job.eta_seconds is None else duration(job.eta_seconds),
+        "time left": _time_left(job),
         "precision": job.precision,
         "best fitness": number(job.best_fitness),
     }
@@ -268,6 +268,12 @@ def lineage_line(lineage: Lineage) -> str:
         f"{first}a new search{changed} from the best designs of its iterations before"
         f" {lineage.from_iteration}: {lineage.reason}"
     )
+
+
+def _time_left(job: JobSummaryView) -> str | None:
+    if job.state.terminal:
+        return None
+    return job.eta_basis if job.eta_seconds is None else duration(job.eta_seconds)
 
 
 def _spent(job: JobSummaryView) -> str:

@@ -20,10 +20,10 @@ from services.optimizer.jobs.job import (
     Job,
     JobState,
     UnreadableSpec,
-    time_left,
 )
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import ProvenanceRecord
+from services.optimizer.jobs.time_left import time_left
 from sim.kernel.walk import Precision
 
 JobKind = Literal["tuning", "identification", "calibration", "tournament", "certificate"]
@@ -150,9 +150,15 @@ class JobSummaryView(View):
         examples=[None],
     )
     eta_seconds: float | None = Field(
-        description="Estimated time to the end of the budget at the rate so far [s]: 0 for a job"
-        " that succeeded, null unless it runs, waits for nothing and has committed an iteration.",
+        description="Estimated time to the end of the budget at the pace of the last iterations"
+        " [s]: 0 for a job that succeeded, null unless it runs, waits for nothing and has committed"
+        " an iteration.",
         examples=[16.1],
+    )
+    eta_basis: str = Field(
+        default="",
+        description="What `eta_seconds` is derived from, or why it is not known.",
+        examples=["at the pace of its last iterations, 1.23 s each"],
     )
     lineage: Lineage | None = Field(
         default=None,
@@ -340,6 +346,7 @@ def _summary(job: Job) -> dict[str, object]:
         "simulations_per_second": rates.simulations_per_second,
         "waiting": job.waiting,
         "eta_seconds": rates.eta_seconds,
+        "eta_basis": rates.basis,
         "lineage": job.lineage,
         "owner": job.owner,
         "created_at": job.created_at,

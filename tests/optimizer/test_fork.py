@@ -12,8 +12,9 @@ import pytest
 
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
 from services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistory
-from services.optimizer.jobs.job import Job, JobState, time_left
+from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.time_left import time_left
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from services.optimizer.errors import EvaluatorUnavailable, KilledWorker, StoreUnavailable
 from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobState, time_left
+from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.jobs.time_left import time_left
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.run.outage import Backoff

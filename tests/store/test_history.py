@@ -84,6 +84,7 @@ def test_of_equal_designs_the_earliest_is_the_best(store: SqlStore) -> None:
 def test_progress_counts_what_is_committed(store: SqlStore) -> None:
     progress = store.job(run(store, (4.0, 3.0), (2.0, INF)).job.id).progress
     assert (progress.iterations, progress.evaluations, progress.compute_seconds) == (2, 4, 1.0)
+    assert progress.recent_seconds == 0.25
     assert (progress.best_fitness, progress.best_iteration, progress.best_particle) == (2.0, 1, 0)
 
 

@@ -11,8 +11,9 @@ import pytest
 
 from gaitswarm.settings import Settings
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import Job, JobState, Progress, TimeLeft, time_left
+from services.optimizer.jobs.job import Job, JobState, Progress
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.time_left import TimeLeft, recent_pace, time_left
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.walks import SHORT_WALK
@@ -43,6 +44,42 @@ def test_a_late_iteration_counts_for_no_more_than_one() -> None:
     assert time_left(replace(running, progress=Progress(10, 50, compute_seconds=8.0)), NOW) == (
         TimeLeft(0.0, 6.25, 12.5)
     )
+
+
+def test_an_iteration_that_is_far_too_late_is_told() -> None:
+    running = job(JobState.RUNNING, iterations=4)
+    assert "under way" not in time_left(running, NOW + timedelta(seconds=3.9)).basis
+    late = time_left(running, NOW + timedelta(seconds=60.0))
+    assert late.basis == (
+        "at the pace of its last iterations, 2 s each; the one under way has taken 60 s"
+    )
+
+
+def test_the_rest_takes_as_long_as_the_last_iterations_where_their_pace_is_another() -> None:
+    pace = 0.4
+    for _ in range(4):
+        # Half of the workers have gone.
+        pace = recent_pace(pace, 0.8)
+    running = job(JobState.RUNNING, iterations=4)
+    slower = replace(running, progress=replace(running.progress, recent_seconds=pace))
+    found = time_left(slower, NOW)
+    assert found.eta_seconds == pytest.approx(30 * pace) and 20.0 < 30 * pace < 24.0
+    assert found.evaluations_per_second == 2.5
+
+
+@pytest.mark.parametrize(
+    ("found", "why"),
+    [
+        (job(JobState.QUEUED, iterations=4), "queued"),
+        (job(JobState.PAUSED, iterations=4), "paused"),
+        (replace(job(JobState.RUNNING, iterations=4), waiting="no route"), "while it waits"),
+        (job(JobState.RUNNING, iterations=0, seconds=0.0), "first iteration"),
+    ],
+    ids=["queued", "paused", "waiting", "nothing committed"],
+)
+def test_a_job_whose_end_is_not_known_says_why(found: Job, why: str) -> None:
+    left = time_left(found, NOW)
+    assert left.eta_seconds is None and left.basis.startswith("not known") and why in left.basis
 
 
 def test_a_clock_that_lags_behind_the_database_adds_nothing() -> None:

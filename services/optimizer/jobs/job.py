@@ -133,6 +133,8 @@ class Progress:
         best_particle: particle that found it.
         compute_seconds: time that evaluating them took [s].
         evaluations_saved: of the designs, those whose outcome was known without a walk.
+        recent_seconds: that a design took in the last iterations, as `recent_pace` weighs them [s];
+            None if that was not noted.
     """
 
     iterations: int = 0
@@ -142,6 +144,7 @@ class Progress:
     best_particle: int | None = None
     compute_seconds: float = 0.0
     evaluations_saved: int = 0
+    recent_seconds: float | None = None
 
     @property
     def evaluations_walked(self) -> int:
@@ -276,49 +279,3 @@ class Claim:
     ask: Ask | None
     recordings: Recordings = field(default_factory=dict)
     answered: Answered | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class TimeLeft:
-    """Rates so far, and the rest of the budget at that rate.
-
-    Attributes:
-        eta_seconds: time to the end of the budget [s]; 0 for a job that succeeded, None unless it
-            runs, waits for nothing and has committed something.
-        evaluations_per_second: designs judged [1/s]; None before the first commit.
-        simulations_per_second: walks, one per case and design that was not known [1/s]; None before
-            the first commit, and where the spec cannot be read.
-    """
-
-    eta_seconds: float | None
-    evaluations_per_second: float | None
-    simulations_per_second: float | None
-
-
-def time_left(job: Job, now: datetime) -> TimeLeft:
-    """Estimate when a job ends, from its own committed iterations.
-
-    Rates are over the time spent evaluating, so pauses and the time in the queue do not count.
-
-    Args:
-        job: as it was read.
-        now: aware; the iteration under way counts as done in part, by the time since the last one.
-
-    Returns:
-        Rates and time left.
-    """
-    progress = job.progress
-    if job.own_evaluations == 0 or progress.compute_seconds <= 0.0:
-        return TimeLeft(0.0 if job.state is JobState.SUCCEEDED else None, None, None)
-    rate = job.own_evaluations / progress.compute_seconds
-    eta: float | None = None
-    if job.state is JobState.SUCCEEDED:
-        eta = 0.0
-    elif job.state is JobState.RUNNING and job.readable and job.waiting is None:
-        own = progress.iterations - (job.lineage.own_from if job.lineage else 0)
-        one = progress.compute_seconds / own
-        remaining = max(0, job.spec.budget - progress.evaluations) / rate
-        under_way = min(one, max(0.0, (now - job.updated_at).total_seconds()))
-        eta = max(0.0, remaining - under_way)
-    walked = progress.evaluations_walked / progress.compute_seconds
-    return TimeLeft(eta, rate, walked * len(job.spec.case_names) if job.readable else None)

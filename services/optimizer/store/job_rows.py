@@ -64,6 +64,7 @@ def to_job(row: Row) -> Job:
             best_iteration=row["best_iteration"],
             best_particle=row["best_particle"],
             compute_seconds=row["compute_seconds"],
+            recent_seconds=row["recent_seconds"],
         ),
         provenance=provenance,
         accepts_changes=bool(row["accepts_changes"]),

@@ -14,6 +14,7 @@ from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.provenance import JobProvenance, with_record
+from services.optimizer.jobs.time_left import recent_pace
 from services.optimizer.store.columns import select_columns
 from services.optimizer.store.job_rows import provenance_document, provenance_records, to_job
 from services.optimizer.store.rows import (
@@ -279,6 +280,9 @@ def progress_after(job: Row, done: CompletedIteration) -> dict[str, Any]:
         "evaluations": job["evaluations"] + len(done.fitness),
         "evaluations_saved": (job["evaluations_saved"] or 0) + done.saved,
         "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
+        "recent_seconds": recent_pace(
+            job["recent_seconds"], done.evaluate_seconds / max(1, len(done.fitness))
+        ),
     }
     if done.best is not None:
         particle, fitness = done.best

@@ -177,6 +177,8 @@ jobs: Final = Table(
     Column("crashes", Integer),
     # What a running job waits for, as whoever runs it says; NULL for nothing.
     Column("waiting", Text),
+    # That a design took in the last iterations, these the more the later; NULL before the first.
+    Column("recent_seconds", Double),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

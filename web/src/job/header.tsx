@@ -122,12 +122,18 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
       <Figure label="Walk rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
       <Figure
         label="Time left"
-        value={job.state === 'succeeded' ? 'done' : formatDuration(job.eta_seconds)}
+        value={timeLeft(job)}
       />
       <Figure label="Computing time" value={formatDuration(job.compute_seconds)} />
       <Figure label="Submitted" value={`${formatAge(job.created_at, now)} ago`} />
     </dl>
   )
+}
+
+function timeLeft(job: StoredJob): string {
+  if (job.state === 'succeeded') return 'done'
+  if (job.state === 'running' && job.eta_seconds === null) return job.eta_basis
+  return formatDuration(job.eta_seconds)
 }
 
 function Figure({ label, value }: { label: string; value: string }) {

@@ -62,6 +62,7 @@ def exit_code(error: BaseException) -> ExitCode | None:
     kinds: tuple[tuple[type[BaseException], ExitCode], ...] = (
         (JobEnded, ExitCode.JOB_FAILED),
         (CheckFailed, ExitCode.JOB_FAILED),
+        (errors.KilledWorker, ExitCode.JOB_FAILED),
         (OutputFailed, ExitCode.UNAVAILABLE),
         (errors.InvalidRequest, ExitCode.BAD_INPUT),
         (SimulationInputError, ExitCode.BAD_INPUT),

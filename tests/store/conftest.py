@@ -12,12 +12,9 @@ from sqlalchemy import text
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import Clock
-from tests.store.postgres_server import postgres_binaries, postgres_server
+from tests.store.postgres_server import PostgresServer, postgres_server, server_binaries
 
-_BINARIES = postgres_binaries()
-_DATABASES = ["sqlite"] + (
-    [pytest.param("postgresql", marks=pytest.mark.slow)] if _BINARIES is not None else []
-)
+_DATABASES = ["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)]
 
 
 @pytest.fixture(scope="session")
@@ -29,15 +26,15 @@ def migrated_sqlite(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def postgresql_server() -> Iterator[str]:
-    assert _BINARIES is not None
-    with postgres_server(_BINARIES) as url:
-        yield url
+def postgresql_server() -> Iterator[PostgresServer]:
+    """A server that lasts; a test that stops one starts its own."""
+    with postgres_server(server_binaries()) as server:
+        yield server
 
 
 @pytest.fixture(scope="session")
-def migrated_postgresql(postgresql_server: str) -> str:
-    url = f"{postgresql_server}/postgres"
+def migrated_postgresql(postgresql_server: PostgresServer) -> str:
+    url = f"{postgresql_server.url}/postgres"
     open_store(url).close()
     return url
 
@@ -65,7 +62,7 @@ def fresh_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     if request.param == "sqlite":
         yield f"sqlite:///{tmp_path / 'fresh.db'}"
         return
-    server: str = request.getfixturevalue("postgresql_server")
+    server: str = request.getfixturevalue("postgresql_server").url
     server_engine = connect(parse_url(f"{server}/postgres")).engine
     outside = server_engine.execution_options(isolation_level="AUTOCOMMIT")
     with outside.connect() as connection:

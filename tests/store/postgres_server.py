@@ -10,8 +10,14 @@ import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import pytest
+
+# Read here: the tests themselves see none of the user's settings.
+REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_POSTGRES"))
 
 
 def postgres_binaries() -> Path | None:
@@ -25,34 +31,76 @@ def postgres_binaries() -> Path | None:
     return Path(on_path).parent if on_path else None
 
 
+def missing_postgres() -> str:
+    """What tests say that cannot have a server; "" where PostgreSQL is installed.
+
+    Raises pytest's failure where they must run, as in continuous integration.
+    """
+    if postgres_binaries() is not None:
+        return ""
+    missing = "PostgreSQL is not installed (Debian: apt install postgresql)"
+    if REQUIRED:
+        pytest.fail(f"the tests on PostgreSQL must run here, but {missing}")
+    return f"NOT TESTED ON POSTGRESQL: {missing}"
+
+
+def server_binaries() -> Path:
+    """Folder of initdb and pg_ctl; skips the test where there is none, or fails it."""
+    missing = missing_postgres()
+    if missing:
+        pytest.skip(missing)
+    binaries = postgres_binaries()
+    assert binaries is not None
+    return binaries
+
+
+@dataclass(frozen=True)
+class PostgresServer:
+    """A server of the tests' own.
+
+    url: without the database, `postgresql://...:port`.
+    """
+
+    binaries: Path
+    folder: Path
+    port: int
+    user: pwd.struct_passwd | None
+
+    @property
+    def url(self) -> str:
+        return f"postgresql://gaitswarm@127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        """Start it, and wait until it answers."""
+        options = f"-c listen_addresses=127.0.0.1 -c port={self.port} -k {self.folder} -c fsync=off"
+        log = self.folder / "log"
+        self._control("start", "-l", log, "-o", options)
+
+    def stop(self) -> None:
+        """Let it die as in a crash: no goodbye to clients, and recovery at the next start."""
+        self._control("stop", "-m", "immediate")
+
+    def _control(self, action: str, *options: Path | str) -> None:
+        data = self.folder / "data"
+        _run([self.binaries / "pg_ctl", action, "-w", "-D", data, *options], self.user)
+
+
 @contextmanager
-def postgres_server(binaries: Path) -> Iterator[str]:
-    """URL prefix of a running server, without the database: `postgresql://...:port`."""
+def postgres_server(binaries: Path) -> Iterator[PostgresServer]:
+    """A running server; it is gone at the end."""
     folder = Path(tempfile.mkdtemp(prefix="gaitswarm-pg-"))
     user = _unprivileged_user()
     try:
         if user is not None:
             os.chown(folder, user.pw_uid, user.pw_gid)
-        data, port = folder / "data", _free_port()
-        _run(
-            [binaries / "initdb", "-D", data, "-U", "gaitswarm", "-A", "trust", "-E", "UTF8", "-N"],
-            user,
-        )
-        options = f"-c listen_addresses=127.0.0.1 -c port={port} -k {folder} -c fsync=off"
-        start: list[Path | str] = [
-            binaries / "pg_ctl",
-            "start",
-            "-w",
-            "-D",
-            data,
-            "-l",
-            folder / "log",
-        ]
-        _run([*start, "-o", options], user)
+        trust = ["-U", "gaitswarm", "-A", "trust", "-E", "UTF8", "-N"]
+        _run([binaries / "initdb", "-D", folder / "data", *trust], user)
+        server = PostgresServer(binaries, folder, _free_port(), user)
+        server.start()
         try:
-            yield f"postgresql://gaitswarm@127.0.0.1:{port}"
+            yield server
         finally:
-            _run([binaries / "pg_ctl", "stop", "-w", "-m", "immediate", "-D", data], user)
+            server.stop()
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -13,14 +13,12 @@ import pytest
 from services.optimizer.store.sql_store import open_store
 from tests.examples.processes import python
 from tests.store.examples import LEASE, spec
-from tests.store.postgres_server import postgres_binaries
 
 COMPILER = shutil.which("cc")
 
 pytestmark = [
     pytest.mark.slow,
     # All that can open an SQLite file share one machine, and so one clock.
-    pytest.mark.skipif(postgres_binaries() is None, reason="needs PostgreSQL"),
     pytest.mark.skipif(COMPILER is None, reason="needs a C compiler"),
     pytest.mark.parametrize("database_url", ["postgresql"], indirect=True),
 ]

@@ -23,7 +23,6 @@ from services.optimizer.store.sql_store import SqlStore, open_store
 from services.optimizer.store.tables import metadata
 from tests.examples.processes import loaded_by
 from tests.store.examples import LEASE, spec
-from tests.store.postgres_server import postgres_binaries
 
 
 def edit(url: str, statement: str) -> None:
@@ -283,7 +282,6 @@ def test_what_a_reading_transaction_sees_of_others_depends_on_the_database(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(postgres_binaries() is None, reason="needs PostgreSQL")
 @pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
 def test_a_server_that_takes_no_writes_is_unavailable(database_url: str) -> None:
     # As a standby that the address leads to while another server becomes the primary.

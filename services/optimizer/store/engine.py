@@ -34,6 +34,7 @@ from sqlalchemy.exc import (
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from services.optimizer.errors import StoreUnavailable
+from services.optimizer.store.postgresql import postgresql_engine
 
 BUSY_SECONDS: Final = 15.0
 """How long a transaction waits for another's lock before the store counts as unavailable."""
@@ -148,8 +149,8 @@ def connect(url: URL, *, for_migration: bool = False) -> Database:
 
     Args:
         url: As `parse_url` has it.
-        for_migration: No pool, and on SQLite no enforcement of foreign keys, because a batch
-            migration drops and renames tables that others refer to.
+        for_migration: No pool, no limit on the time of statements, and on SQLite no enforcement of
+            foreign keys, because a batch migration drops and renames tables that others refer to.
 
     Returns:
         The database; whoever connects closes it.
@@ -162,7 +163,8 @@ def connect(url: URL, *, for_migration: bool = False) -> Database:
     if url.get_backend_name() == "sqlite":
         engine = _sqlite_engine(url, options, foreign_keys=not for_migration)
         return Database(engine, url.database or "")
-    return Database(_postgresql_engine(url, options), url.render_as_string(hide_password=True))
+    server = postgresql_engine(url, options, lock_seconds=BUSY_SECONDS, maintenance=for_migration)
+    return Database(server, url.render_as_string(hide_password=True))
 
 
 def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> Engine:
@@ -200,26 +202,6 @@ def _journal_ahead(connection: sqlite3.Connection) -> None:
             if "locked" not in str(error) or time.monotonic() > deadline:
                 raise
             time.sleep(0.01)
-
-
-def _postgresql_engine(url: URL, options: dict[str, Any]) -> Engine:
-    connect_args: dict[str, Any] = {}
-    if "connect_timeout" not in url.query:
-        connect_args["connect_timeout"] = round(BUSY_SECONDS)
-    if "options" not in url.query:
-        # A lock waits no longer than on SQLite; a client that vanished must not hold one for ever.
-        milliseconds = round(BUSY_SECONDS * 1000)
-        connect_args["options"] = (
-            f"-c lock_timeout={milliseconds}"
-            f" -c idle_in_transaction_session_timeout={4 * milliseconds}"
-        )
-    try:
-        # A connection that a restart of the server has cut is replaced before it is used.
-        return create_engine(url, connect_args=connect_args, pool_pre_ping=True, **options)
-    except ModuleNotFoundError as error:
-        raise StoreUnavailable(
-            f"PostgreSQL needs {error.name}: install gaitswarm[postgres]"
-        ) from error
 
 
 def _strict_json(value: object) -> str:

@@ -44,6 +44,7 @@ from services.optimizer.store.engine import (
     database_time,
     parse_url,
 )
+from services.optimizer.store.file_system import check_file_system
 from services.optimizer.store.history import SqlHistory, checked_limit
 from services.optimizer.store.job_list import (
     Among,
@@ -100,6 +101,7 @@ def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
         StoreUnavailable: The database cannot be used; names it and says what to do.
     """
     parsed = parse_url(url)
+    check_file_system(parsed)
     migrate(parsed)
     return SqlStore(connect(parsed), clock=clock)
 

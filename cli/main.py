@@ -14,6 +14,7 @@ from typing import Any, TextIO, cast
 import typer
 from typer.core import TyperGroup
 
+from cli.commands.database import db
 from cli.commands.designs import (
     certify,
     compare,
@@ -88,6 +89,7 @@ for _module in (
     fork,
     history,
     token,
+    db,
     simulate,
     compare,
     study,

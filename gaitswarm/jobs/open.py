@@ -42,13 +42,7 @@ def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
     from services.runtime import open_store
 
     settings = read_settings(db=None if db is None else os.fspath(db))
-    url = database_to_write(settings) if create else settings.database
-    file = _sqlite_file(url)
-    if file is not None and not create and not file.exists():
-        raise NotFound(
-            f"there is no database {file} yet; `gaitswarm optimize` makes it with its first job,"
-            " and --db or --server names another place"
-        )
+    url = database_to_write(settings) if create else database_to_read(settings)
     return DatabaseJobs(JobService(open_store(url)), url)
 
 
@@ -159,6 +153,27 @@ def database_to_write(settings: Settings) -> str:
                 f"cannot make {folder} for the database: {error.strerror}; name another place with"
                 " --db or GAITSWARM_DB, or another data directory with XDG_DATA_HOME"
             ) from error
+    return settings.database
+
+
+def database_to_read(settings: Settings) -> str:
+    """The database of the settings, for a process that makes none.
+
+    Args:
+        settings: Of this process.
+
+    Returns:
+        Its URL.
+
+    Raises:
+        NotFound: It is an SQLite file, and there is none.
+    """
+    file = _sqlite_file(settings.database)
+    if file is not None and not file.exists():
+        raise NotFound(
+            f"there is no database {file} yet; `gaitswarm optimize` makes it with its first job,"
+            " and --db or --server names another place"
+        )
     return settings.database
 
 

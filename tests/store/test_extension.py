@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from alembic import command
-from alembic.config import Config
-from sqlalchemy import text
 
 from services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, NotFound
 from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.search.registry import OPTIMIZERS
-from services.optimizer.store import migrate
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.migrate import upgrade
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.certificate.examples import small
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_job_states import in_state
+from tests.store.test_upgrades import JOB, store_older
 
 
 @pytest.mark.parametrize("state", [s for s in JobState if s is not JobState.CANCELLED])
@@ -116,23 +112,10 @@ def test_the_same_key_still_means_the_job_as_it_was_submitted(store: SqlStore) -
 
 
 def test_a_job_of_an_older_schema_has_the_budget_of_its_spec(fresh_url: str) -> None:
-    database = connect(parse_url(fresh_url), for_migration=True)
-    config = Config()
-    config.set_main_option("script_location", str(Path(migrate.__file__).with_name("migrations")))
-    with database.transaction(write=True) as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, "0002")
-        connection.execute(
-            text(
-                "INSERT INTO jobs (id, state, spec, created_at, updated_at, lease_token,"
-                " iterations, evaluations, compute_seconds) VALUES ('bcdfghjkmnpq', 'queued',"
-                " :spec, '2030-01-01 00:00:00', '2030-01-01 00:00:00', 0, 0, 0, 0.0)"
-            ),
-            {"spec": spec(iterations=7).resolved().model_dump_json()},
-        )
-    database.close()
+    store_older(fresh_url)
+    upgrade(fresh_url)
     store = open_store(fresh_url)
-    job = store.command("bcdfghjkmnpq", Command.PAUSE)
+    job = store.command(JOB, Command.PAUSE)
     assert (job.spec.iterations, job.state) == (7, JobState.PAUSED)
-    assert store.extend("bcdfghjkmnpq", 9).spec.iterations == 9
+    assert store.extend(JOB, 9).spec.iterations == 9
     store.close()

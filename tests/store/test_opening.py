@@ -16,9 +16,9 @@ from sqlalchemy import text
 
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.store import engine as engine_module
-from services.optimizer.store import migrate as migrations
 from services.optimizer.store.engine import Database, connect, parse_url
-from services.optimizer.store.migrate import head, lock_for_migration
+from services.optimizer.store.migrate import lock_for_migration
+from services.optimizer.store.revisions import MIGRATIONS, head
 from services.optimizer.store.sql_store import SqlStore, open_store
 from services.optimizer.store.tables import metadata
 from tests.examples.processes import loaded_by
@@ -91,7 +91,7 @@ def test_the_migrations_make_exactly_the_tables_that_the_code_uses(fresh_url: st
 
 
 def test_the_newest_revision_is_the_head_of_all_migrations() -> None:
-    scripts = ScriptDirectory(Path(migrations.__file__).with_name("migrations"))
+    scripts = ScriptDirectory(MIGRATIONS)
     assert scripts.get_heads() == [head()]
     assert len({script.revision for script in scripts.walk_revisions()}) == int(head())
 

@@ -115,13 +115,16 @@ class Database:
     name: str
 
     @contextmanager
-    def transaction(self, *, write: bool) -> Iterator[Connection]:
+    def transaction(
+        self, *, write: bool, before: Callable[[Connection], None] | None = None
+    ) -> Iterator[Connection]:
         """Commit at the end, roll back on any exception.
 
         Args:
             write: Whether anything will be written. On SQLite a transaction that only reads never
                 waits for a writer, and sees one state of the database throughout; on PostgreSQL
                 (READ COMMITTED) each of its statements sees what is committed when it begins.
+            before: Called with the connection before the transaction begins.
 
         Yields:
             A connection inside the transaction.
@@ -132,6 +135,8 @@ class Database:
         try:
             with self.engine.connect() as connection:
                 connection.execution_options(**{_WRITE: write})
+                if before is not None:
+                    before(connection)
                 with connection.begin():
                     yield connection
         except (DatabaseError, InterfaceError, PoolTimeout) as error:

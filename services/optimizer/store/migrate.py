@@ -1,78 +1,86 @@
-"""Schema revisions: bring a database to the newest, or say why it cannot be used."""
+"""Makes the tables of a database, and brings those of an older one to the newest schema."""
 
 from __future__ import annotations
 
 import threading
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from typing import Final
 
-from sqlalchemy import URL, Connection, inspect
+from sqlalchemy import URL, Connection
 from sqlalchemy.exc import DBAPIError
 
 from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.engine import Database, connect
-
-_MIGRATIONS: Final = Path(__file__).with_name("migrations")
+from services.optimizer.store.engine import Database, connect, parse_url
+from services.optimizer.store.file_system import check_file_system
+from services.optimizer.store.in_use import exclusive
+from services.optimizer.store.revisions import (
+    MIGRATIONS,
+    head,
+    read_revision,
+    require_known,
+    require_newest,
+)
 
 # "gaitswarm migrates", as a number that no other program is likely to lock by.
-_ADVISORY_LOCK: Final = 0x6761_6974_7377_6D01
+_MIGRATING: Final = 0x6761_6974_7377_6D01
 
 # Alembic keeps the migration under way in module globals.
 _one_at_a_time: Final = threading.Lock()
 
 
-def migrate(url: URL) -> None:
-    """Bring a database to the newest revision; safe when several processes do so at once.
+def create(url: URL) -> None:
+    """Make the tables of an empty database; safe when several processes do so at once.
 
     Args:
         url: Of the database, as `parse_url` has it; an SQLite file is created.
 
     Raises:
-        StoreUnavailable: It cannot be opened or migrated, or was made by a newer gaitswarm.
+        StoreUnavailable: It cannot be opened, or has another schema than the newest.
     """
-    database = connect(url, for_migration=True)
-    try:
+    with closing(connect(url, for_migration=True)) as database:
         # Looking first: an open database that is up to date needs no write lock.
-        with database.transaction(write=False) as connection:
-            if _revision(connection, database.name) == head():
-                return
-        with database.transaction(write=True) as connection:
-            lock_for_migration(connection)
-            if _revision(connection, database.name) != head():
-                _upgrade(connection, database.name)
-    except DBAPIError as error:
-        raise StoreUnavailable(
-            f"database {database.name} cannot be migrated: {error.orig}; it needs a user who may"
-            " create tables in it, and no other program's tables of the same names"
-        ) from error
-    finally:
-        database.close()
+        if _empty(database):
+            with _explained(database), database.transaction(write=True) as connection:
+                lock_for_migration(connection)
+                if read_revision(connection) is None:
+                    _migrate(connection, database.name)
 
 
-def check_revision(database: Database) -> None:
-    """Check that a database answers and has the newest revision.
+def _empty(database: Database) -> bool:
+    """Whether nothing is stored; StoreUnavailable for a database of another schema."""
+    with database.transaction(write=False) as connection:
+        revision = read_revision(connection)
+    if revision is not None:
+        require_newest(revision, database.name)
+    return revision is None
+
+
+def upgrade(url: str) -> str | None:
+    """Bring a database that nobody uses to the newest revision.
 
     Args:
-        database: The database.
+        url: Of the database, as for `open_store`.
+
+    Returns:
+        The revision that it had before; None for one that was empty.
 
     Raises:
-        StoreUnavailable: It does not; says what to do.
+        Conflict: It is in use.
+        StoreUnavailable: It cannot be opened or migrated, or was made by a newer gaitswarm.
     """
-    with database.transaction(write=False) as connection:
-        revision = _revision(connection, database.name)
-    if revision != head():
-        raise StoreUnavailable(
-            f"database {database.name} has schema revision {revision or 'none'}, this gaitswarm"
-            f" needs {head()}; restart it to migrate the database"
-        )
-
-
-def head() -> str:
-    """The newest revision that this program knows."""
-    known = _known_revisions()
-    if not known:
-        raise StoreUnavailable(f"gaitswarm is not wholly installed: no migrations in {_MIGRATIONS}")
-    return known[-1]
+    parsed = parse_url(url)
+    check_file_system(parsed)
+    with closing(connect(parsed, for_migration=True)) as database:
+        with database.transaction(write=False) as connection:
+            before = read_revision(connection)
+        if before is None:
+            create(parsed)
+        elif before != head():
+            require_known(before, database.name)
+            with _explained(database), exclusive(database) as connection:
+                _migrate(connection, database.name)
+        return before
 
 
 def lock_for_migration(connection: Connection) -> None:
@@ -82,38 +90,29 @@ def lock_for_migration(connection: Connection) -> None:
         connection: The transaction of the migration, with which the lock ends.
     """
     if connection.dialect.name == "postgresql":
-        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_ADVISORY_LOCK})")
+        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_MIGRATING})")
 
 
-def _known_revisions() -> list[str]:
-    """In their order, as the files' names begin with them."""
-    files = (_MIGRATIONS / "versions").glob("r*_*.py")
-    return sorted(file.name[1:].partition("_")[0] for file in files)
-
-
-def _revision(connection: Connection, name: str) -> str | None:
-    """Revision of the database, None if it has none; StoreUnavailable for an unknown one."""
-    if not inspect(connection).has_table("alembic_version"):
-        return None
-    found = connection.exec_driver_sql("SELECT version_num FROM alembic_version").first()
-    revision = None if found is None else str(found[0])
-    known = _known_revisions()
-    if revision is not None and revision not in known:
+@contextmanager
+def _explained(database: Database) -> Iterator[None]:
+    """What a database answers to a migration, for people."""
+    try:
+        yield
+    except DBAPIError as error:
         raise StoreUnavailable(
-            f"database {name} has schema revision {revision}, which this gaitswarm (up to"
-            f" {head()}) does not know; upgrade gaitswarm, or name another database"
-        )
-    return revision
+            f"database {database.name} cannot be migrated: {error.orig}; it needs a user who may"
+            " create tables in it, and no other program's tables of the same names"
+        ) from error
 
 
-def _upgrade(connection: Connection, name: str) -> None:
+def _migrate(connection: Connection, name: str) -> None:
     # Most databases are up to date, and nobody should wait for Alembic to look at them.
     from alembic import command  # noqa: PLC0415
     from alembic.config import Config  # noqa: PLC0415
 
     config = Config()
     # A percent sign in a path would be read as the configuration's interpolation.
-    config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
+    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
     config.attributes["connection"] = connection
     with _one_at_a_time:
         command.upgrade(config, "head")

@@ -46,6 +46,7 @@ from services.optimizer.store.engine import (
 )
 from services.optimizer.store.file_system import check_file_system
 from services.optimizer.store.history import SqlHistory, checked_limit
+from services.optimizer.store.in_use import admit
 from services.optimizer.store.job_list import (
     Among,
     among_jobs,
@@ -56,7 +57,7 @@ from services.optimizer.store.job_list import (
     to_cursor,
 )
 from services.optimizer.store.job_rows import request_digest, storable, to_job
-from services.optimizer.store.migrate import check_revision, migrate
+from services.optimizer.store.migrate import create
 from services.optimizer.store.reading import Page
 from services.optimizer.store.recordings import (
     insert_recording,
@@ -76,6 +77,7 @@ from services.optimizer.store.records import (
     state_after_release,
     update_job,
 )
+from services.optimizer.store.revisions import check_revision
 from services.optimizer.store.submissions import Submission, insert_job, repeated_job
 from services.optimizer.store.tables import jobs
 from services.optimizer.store.tokens import SqlTokens
@@ -87,7 +89,8 @@ _log = logging.getLogger(__name__)
 
 
 def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
-    """Open a database, creating an SQLite file, and migrate it to the newest schema.
+    """Open a database of the newest schema; an SQLite file, and the tables of an empty database,
+    are made.
 
     Args:
         url: `sqlite:///path`, a bare path, or `postgresql://user:password@host/database`.
@@ -102,8 +105,10 @@ def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
     """
     parsed = parse_url(url)
     check_file_system(parsed)
-    migrate(parsed)
-    return SqlStore(connect(parsed), clock=clock)
+    create(parsed)
+    database = connect(parsed)
+    admit(database)
+    return SqlStore(database, clock=clock)
 
 
 class SqlStore(SqlHistory):

@@ -1,0 +1,170 @@
+"""Only an explicit upgrade migrates a database that holds something, and only if nobody uses it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from contextlib import closing
+
+import pytest
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import text
+
+from services.optimizer.errors import Conflict, StoreUnavailable
+from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.in_use import exclusive
+from services.optimizer.store.migrate import upgrade
+from services.optimizer.store.revisions import MIGRATIONS, head, read_revision
+from services.optimizer.store.sql_store import open_store
+from tests.examples.paths import ROOT
+from tests.store.examples import spec
+from tests.store.test_opening import edit
+
+OLDER = "0002"
+
+JOB = "bcdfghjkmnpq"
+
+
+def store_older(url: str, *, state: str = "queued", lease_expires_at: str | None = None) -> None:
+    """Make a database of an older revision, with a job in it."""
+    database = connect(parse_url(url), for_migration=True)
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    with database.transaction(write=True) as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, OLDER)
+        connection.execute(
+            text(
+                "INSERT INTO jobs (id, state, spec, created_at, updated_at, lease_owner,"
+                " lease_expires_at, lease_token, iterations, evaluations, compute_seconds) VALUES"
+                " (:id, :state, :spec, '2026-01-01 00:00:00', '2026-01-01 00:00:00', 'elsewhere:7',"
+                " :expires, 0, 0, 0, 0.0)"
+            ),
+            {
+                "id": JOB,
+                "state": state,
+                "spec": spec(iterations=7).resolved().model_dump_json(),
+                "expires": lease_expires_at,
+            },
+        )
+    database.close()
+
+
+def revision(url: str) -> str | None:
+    with (
+        closing(connect(parse_url(url))) as database,
+        database.transaction(write=False) as connection,
+    ):
+        return read_revision(connection)
+
+
+def test_an_older_database_is_refused_and_left_as_it_is(fresh_url: str) -> None:
+    store_older(fresh_url)
+    with pytest.raises(StoreUnavailable, match=f"{OLDER}.* needs {head()}.*gaitswarm db upgrade"):
+        open_store(fresh_url)
+    assert revision(fresh_url) == OLDER
+
+
+def test_an_upgrade_brings_an_older_database_to_the_newest_schema_with_its_jobs(
+    fresh_url: str,
+) -> None:
+    store_older(fresh_url)
+    assert upgrade(fresh_url) == OLDER
+    assert upgrade(fresh_url) == head()
+    with closing(open_store(fresh_url)) as store:
+        assert store.job(JOB).spec.iterations == 7
+
+
+def test_an_upgrade_makes_the_tables_of_an_empty_database(fresh_url: str) -> None:
+    assert upgrade(fresh_url) is None
+    assert revision(fresh_url) == head()
+
+
+def test_no_upgrade_touches_what_a_newer_gaitswarm_has_made(fresh_url: str) -> None:
+    open_store(fresh_url).close()
+    edit(fresh_url, "UPDATE alembic_version SET version_num = '9999'")
+    with pytest.raises(StoreUnavailable, match=f"9999.*up to {head()}.*upgrade gaitswarm"):
+        upgrade(fresh_url)
+
+
+USER = """
+import sys
+from services.optimizer.store import revisions
+revisions.head = lambda: "0002"
+from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.in_use import admit
+database = connect(parse_url(sys.argv[1]))
+admit(database)
+with database.transaction(write=False):
+    pass
+print("open", flush=True)
+sys.stdin.readline()
+"""
+"""A process of that older revision, which has the database open and does nothing."""
+
+
+@pytest.mark.slow
+def test_a_database_that_an_idle_process_has_open_is_not_upgraded(fresh_url: str) -> None:
+    store_older(fresh_url)
+    process = subprocess.Popen(
+        [sys.executable, "-c", USER, fresh_url],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+    )
+    with process:
+        assert process.stdin is not None and process.stdout is not None
+        assert process.stdout.readline() == "open\n"
+        with pytest.raises(Conflict, match=r"in use by .*end all that use it first") as refused:
+            upgrade(fresh_url)
+        if fresh_url.startswith("postgresql"):
+            assert f":{process.pid}" in str(refused.value)
+        process.stdin.write("end\n")
+        process.stdin.flush()
+        process.wait(timeout=30.0)
+    assert upgrade(fresh_url) == OLDER
+
+
+def test_a_database_with_a_job_under_way_is_not_upgraded(fresh_url: str) -> None:
+    store_older(fresh_url, state="running", lease_expires_at="2126-01-01 00:00:00")
+    with pytest.raises(Conflict, match=f"job {JOB} is run by elsewhere:7"):
+        upgrade(fresh_url)
+    edit(fresh_url, "UPDATE jobs SET lease_expires_at = '2026-01-01 00:00:00'")
+    assert upgrade(fresh_url) == OLDER
+
+
+def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
+    fresh_url: str,
+) -> None:
+    with closing(open_store(fresh_url)) as store:
+        # As a network does that parts it from the server.
+        store.close()
+        edit(fresh_url, "UPDATE alembic_version SET version_num = '9999'")
+        for _ in range(2):
+            with pytest.raises(StoreUnavailable, match=f"9999.*up to {head()}"):
+                store.create_job(spec())
+
+
+def test_nobody_comes_in_during_an_upgrade(fresh_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.optimizer.store.engine.BUSY_SECONDS", 0.2)
+    open_store(fresh_url).close()
+    with (
+        closing(connect(parse_url(fresh_url), for_migration=True)) as database,
+        exclusive(database),
+        pytest.raises(StoreUnavailable, match=r"being upgraded|locked"),
+    ):
+        open_store(fresh_url).jobs()
+    with closing(open_store(fresh_url)) as store:
+        assert store.jobs().items == ()
+
+
+def test_an_upgrade_that_fails_on_its_way_changes_nothing(fresh_url: str) -> None:
+    store_older(fresh_url)
+    edit(fresh_url, "CREATE TABLE tokens (theirs TEXT)")
+    with pytest.raises(StoreUnavailable, match=r"tokens.*already exists"):
+        upgrade(fresh_url)
+    assert revision(fresh_url) == OLDER
+    edit(fresh_url, "DROP TABLE tokens")
+    assert upgrade(fresh_url) == OLDER

@@ -12,6 +12,7 @@ from anyio.to_thread import run_sync
 from fastapi import Depends, FastAPI, Path, Query, Request
 from pydantic import Field
 
+from api.topics import Topics
 from gaitswarm.settings import Settings
 from services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from services.optimizer.jobs.job import Job
@@ -61,8 +62,8 @@ class State(TypedDict):
     """`request.state` of every request: what the lifespan of the application yields.
 
     validations: threads that validate bodies. stopping: set by the server when it begins to stop;
-    event streams end then. runs_jobs: whether the runner beside it still claims jobs; None if there
-    is none.
+    event streams end then. topics: jobs that these streams follow. runs_jobs: whether the runner
+    beside it still claims jobs; None if there is none.
     """
 
     service: JobService
@@ -70,6 +71,7 @@ class State(TypedDict):
     slots: SimulationSlots
     validations: anyio.CapacityLimiter
     stopping: asyncio.Event
+    topics: Topics
     runs_jobs: Callable[[], bool] | None
 
 
@@ -90,14 +92,18 @@ def lifespan(
     @asynccontextmanager
     async def run(_app: FastAPI) -> AsyncIterator[State]:
         slots = SimulationSlots(settings.api_simulation_workers, settings.api_simulation_queue)
+        topics, stopping = Topics(), asyncio.Event()
+        waking = asyncio.create_task(topics.end_with(stopping))
         yield State(
             service=service,
             settings=settings,
             slots=slots,
             validations=anyio.CapacityLimiter(_VALIDATIONS),
-            stopping=asyncio.Event(),
+            stopping=stopping,
+            topics=topics,
             runs_jobs=runs_jobs,
         )
+        waking.cancel()
 
     return run
 
@@ -138,10 +144,20 @@ async def stopping(request: Request) -> asyncio.Event:
     return cast(asyncio.Event, request.state.stopping)
 
 
+async def topics(request: Request) -> Topics:
+    """Jobs that event streams follow.
+
+    Args:
+        request: under way.
+    """
+    return cast(Topics, request.state.topics)
+
+
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, Depends(settings)]
 Slots = Annotated[SimulationSlots, Depends(slots)]
 Stopping = Annotated[asyncio.Event, Depends(stopping)]
+FollowedJobs = Annotated[Topics, Depends(topics)]
 
 LARGEST_INDEX: Final = 2**31 - 1
 """Of an iteration, as the database's integers have it."""

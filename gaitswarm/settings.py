@@ -94,7 +94,10 @@ class Settings(BaseSettings):
         default=1 << 20, ge=1, description="Largest request body that is read [B]."
     )
     api_event_poll_seconds: float = Field(
-        default=0.5, gt=0.0, le=60.0, description="How often an event stream asks the store [s]."
+        default=0.5,
+        gt=0.0,
+        le=60.0,
+        description="How often jobs that streams follow are looked at, where nothing tells [s].",
     )
     api_simulation_workers: int = Field(
         default=2, ge=1, le=64, description="Walks on request that compute at the same time."

@@ -7,7 +7,6 @@ from collections.abc import AsyncGenerator, AsyncIterable
 from typing import Annotated, Final
 
 import anyio
-from anyio.to_thread import run_sync
 from fastapi import APIRouter, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
@@ -15,16 +14,16 @@ from api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
     ExistingJob,
+    FollowedJobs,
     ServerSettings,
     Service,
     Stopping,
 )
 from api.documentation import problems
+from api.topics import Topic
 from gaitswarm.views import PREFIX, IterationView, StateView
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.iteration import Iteration
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.service import JobService
+from services.optimizer.errors import NotFound, StoreUnavailable
+from services.optimizer.jobs.job import JobState
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
 
@@ -43,6 +42,9 @@ data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"eva
 _PAGE: Final = 200
 """Iterations read at once."""
 
+_LONGEST_WAIT: Final = 60.0
+"""Seconds after which a stream looks for itself, whatever it was told."""
+
 
 @router.get(
     "/events",
@@ -56,6 +58,7 @@ async def stream_events(
     job: ExistingJob,
     service: Service,
     settings: ServerSettings,
+    topics: FollowedJobs,
     stopping: Stopping,
     last_event_id: Annotated[
         int | None,
@@ -85,43 +88,47 @@ async def stream_events(
     from `Last-Event-ID` (or `after`). Comments keep idle connections alive.
     """
     start = after if last_event_id is None else last_event_id
-    events = _events(
-        service,
-        job.id,
-        after=start,
-        follow=follow,
-        limit=limit,
-        stopping=stopping,
-        poll_seconds=settings.api_event_poll_seconds,
-    )
-    async for event in events:
-        yield event
+    poll_seconds = settings.api_event_poll_seconds
+    with topics.follow(service, job.id, poll_seconds=poll_seconds) as topic:
+        events = _events(
+            topic,
+            after=start,
+            follow=follow,
+            limit=limit,
+            stopping=stopping,
+            pause_seconds=poll_seconds,
+        )
+        async for event in events:
+            yield event
 
 
 async def _events(
-    service: JobService,
-    job_id: str,
+    topic: Topic,
     *,
     after: int | None,
     follow: bool,
     limit: int | None,
     stopping: asyncio.Event,
-    poll_seconds: float,
+    pause_seconds: float,
 ) -> AsyncGenerator[ServerSentEvent, None]:
-    """Poll the store: what is committed first, then the state if it is another.
+    """What is committed first, then the state if it is another, then wait for a change.
 
-    No transaction is held between polls. Ends after a terminal state, after `limit` iterations,
-    with the server, or when caught up unless `follow`.
+    No transaction is held while it waits. Ends after a terminal state, after `limit` iterations,
+    with the server, with the job, or when caught up unless `follow`.
     """
     told: tuple[JobState, str | None] | None = None
     sent = 0
     while not stopping.is_set():
+        # Before the look: what changes after it makes another version, and is looked for again.
+        version = topic.version
         try:
-            job, iterations = await run_sync(_news, service, job_id, after)
+            job, iterations = await topic.news(after, limit=_PAGE)
         except StoreUnavailable:
             # The database is away: what is committed will still be there when it is back.
-            await _pause(stopping, poll_seconds)
+            await _pause(stopping, pause_seconds)
             continue
+        except NotFound:
+            return
         for iteration in iterations:
             after = iteration.index
             view = IterationView.from_iteration(iteration)
@@ -136,22 +143,10 @@ async def _events(
             yield ServerSentEvent(event="state", data=StateView.from_job(job))
         if job.state.terminal or not follow:
             return
-        await _pause(stopping, poll_seconds)
-
-
-def _news(service: JobService, job_id: str, after: int | None) -> tuple[Job, tuple[Iteration, ...]]:
-    """The job, and up to a page of its iterations after one.
-
-    The job is read first: whatever it counts as committed is then found among the iterations, so
-    nothing is missing when a terminal state ends the stream.
-    """
-    job = service.job(job_id)
-    if job.progress.iterations <= (-1 if after is None else after) + 1:
-        return job, ()
-    return job, service.iterations(job_id, after=after, limit=_PAGE).items
+        await topic.changed(version, seconds=_LONGEST_WAIT)
 
 
 async def _pause(stopping: asyncio.Event, seconds: float) -> None:
-    """Until the next poll, or until the server stops."""
+    """Until the database is asked again, or until the server stops."""
     with anyio.move_on_after(seconds):
         await stopping.wait()

@@ -11,7 +11,7 @@ from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.reading import CommittedHistory, Page
+from services.optimizer.store.reading import Changes, CommittedHistory, Page
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
@@ -21,6 +21,10 @@ class Store(CommittedHistory, Protocol):
     Methods that take an id raise NotFound for an unknown one. Methods that take a claim raise
     LeaseLost, and change nothing, if the claim's token is no longer the job's.
     """
+
+    @property
+    def changes(self) -> Changes:
+        """Of jobs, for those who wait for them."""
 
     @property
     def tokens(self) -> Tokens:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -26,6 +27,27 @@ class Page(Generic[T]):
 
     items: tuple[T, ...]
     next: str | None
+
+
+class Changes(Protocol):
+    """Changes of jobs, whichever process commits them. Thread-safe, as all of `Store` is."""
+
+    def watch(
+        self, job_id: str, wake: Callable[[], None], *, poll_seconds: float
+    ) -> AbstractContextManager[None]:
+        """Call a function on each change of a job's state or iterations.
+
+        What was committed before the block is entered may be told or not: who waits looks at the
+        job inside the block first. Several changes may be told as one, and none as some.
+
+        Args:
+            job_id: Of the job, whether it exists or not.
+            wake: Called in another thread; it must return at once.
+            poll_seconds: How late a change may be told, where databases tell of none [s].
+
+        Returns:
+            The block in which the function is called.
+        """
 
 
 class CommittedHistory(Protocol):

@@ -15,6 +15,7 @@ from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.provenance import JobProvenance, with_record
 from services.optimizer.jobs.time_left import recent_pace
+from services.optimizer.store.changes import announce
 from services.optimizer.store.columns import select_columns
 from services.optimizer.store.job_rows import provenance_document, provenance_records, to_job
 from services.optimizer.store.rows import (
@@ -85,6 +86,7 @@ def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> 
         The row as it is then.
     """
     connection.execute(update(jobs).where(jobs.c.id == row["id"]).values(**columns))
+    announce(connection, row["id"], frozenset(columns))
     return {**row, **columns}
 
 

@@ -26,6 +26,7 @@ from services.optimizer.jobs.job import (
 )
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.changes import SqlChanges
 from services.optimizer.store.claims import (
     claimable,
     crashes_before,
@@ -123,6 +124,7 @@ class SqlStore(SqlHistory):
         super().__init__(database)
         self._clock = clock
         self.tokens = SqlTokens(database, clock)
+        self.changes = SqlChanges(database)
 
     # jobs, as their users see them
 
@@ -359,6 +361,7 @@ class SqlStore(SqlHistory):
 
     def close(self) -> None:
         """Close the pooled connections."""
+        self.changes.close()
         self._database.close()
 
 

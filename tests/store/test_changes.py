@@ -1,0 +1,176 @@
+"""Whoever waits for a job hears of its changes, whichever process commits them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, closing
+
+import pytest
+from sqlalchemy import text
+
+from services.optimizer.jobs.job import Command
+from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.examples.processes import eventually
+from tests.store.examples import LEASE, ask, begun, completed, spec
+from tests.store.postgres_server import postgres_server, server_binaries
+
+NEVER = 3600.0
+"""Seconds between polls that no test waits for."""
+
+
+@pytest.fixture
+def waiting(database_url: str) -> Iterator[SqlStore]:
+    """A store of another process, as good as: it shares no connection with `store`."""
+    with closing(open_store(database_url)) as store:
+        yield store
+
+
+@pytest.fixture
+def poll_seconds(database_url: str) -> float:
+    """On PostgreSQL changes are told, so that nobody has to look."""
+    return NEVER if database_url.startswith("postgresql") else 0.02
+
+
+def listening(url: str) -> list[int]:
+    """Process ids of the server's connections that listen."""
+    query = text("SELECT pid FROM pg_stat_activity WHERE query LIKE 'LISTEN%'")
+    with (
+        closing(connect(parse_url(url))) as database,
+        database.transaction(write=False) as connection,
+    ):
+        return list(connection.execute(query).scalars())
+
+
+def settle(url: str, waiting: SqlStore, woken: threading.Event) -> None:
+    """Wait until whoever watches has looked once, which may wake without a change."""
+    if url.startswith("postgresql"):
+        eventually(lambda: len(listening(url)) == 1)
+    eventually(woken.is_set)
+    woken.clear()
+    assert waiting.jobs().items
+
+
+def test_commits_and_commands_of_another_process_are_told(
+    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+) -> None:
+    claim = begun(store)
+    woken = threading.Event()
+    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=poll_seconds):
+        settle(database_url, waiting, woken)
+        store.commit(claim, completed(0), ask(1))
+        assert woken.wait(10.0)
+        woken.clear()
+        store.command(claim.job.id, Command.PAUSE)
+        assert woken.wait(10.0)
+
+
+def test_neither_heartbeats_nor_other_jobs_are_told(
+    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+) -> None:
+    claim = begun(store)
+    other, _ = store.create_job(spec())
+    mine, theirs = threading.Event(), threading.Event()
+    with (
+        waiting.changes.watch(claim.job.id, mine.set, poll_seconds=poll_seconds),
+        waiting.changes.watch(other.id, theirs.set, poll_seconds=poll_seconds),
+    ):
+        settle(database_url, waiting, mine)
+        store.renew(claim, lease_seconds=LEASE)
+        store.command(other.id, Command.CANCEL)
+        assert theirs.wait(10.0)
+        assert not mine.is_set()
+
+
+def test_all_who_wait_in_a_process_share_a_thread_and_a_connection(
+    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+) -> None:
+    jobs = [store.create_job(spec())[0] for _ in range(20)]
+    woken = [threading.Event() for _ in jobs]
+
+    def threads() -> int:
+        return sum(thread.name == "changes" for thread in threading.enumerate())
+
+    before = threads()
+    with ExitStack() as watches:
+        for job, event in zip(jobs, woken, strict=True):
+            watch = waiting.changes.watch(job.id, event.set, poll_seconds=poll_seconds)
+            watches.enter_context(watch)
+        assert threads() == before + 1
+        if database_url.startswith("postgresql"):
+            eventually(lambda: len(listening(database_url)) == 1)
+        for job, event in zip(jobs, woken, strict=True):
+            event.clear()
+            store.command(job.id, Command.CANCEL)
+            assert event.wait(10.0)
+    waiting.close()
+    assert threads() == before
+
+
+@pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
+@pytest.mark.slow
+def test_what_is_committed_while_the_listener_is_lost_is_told_as_well(
+    store: SqlStore, waiting: SqlStore, database_url: str
+) -> None:
+    claim = begun(store)
+    woken = threading.Event()
+    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.2):
+        settle(database_url, waiting, woken)
+        (lost,) = listening(database_url)
+        with (
+            closing(connect(parse_url(database_url))) as database,
+            database.transaction(write=True) as connection,
+        ):
+            connection.execute(text("SELECT pg_terminate_backend(:pid)"), {"pid": lost})
+        store.commit(claim, completed(0), ask(1))
+        assert woken.wait(10.0)
+        eventually(lambda: len(set(listening(database_url)) - {lost}) == 1)
+        woken.clear()
+        store.commit(claim, completed(1), ask(2))
+        assert woken.wait(10.0)
+
+
+@pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
+@pytest.mark.slow
+def test_where_nobody_can_listen_changes_are_polled_for(
+    store: SqlStore, waiting: SqlStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("services.optimizer.store.changes._CHANNEL", "no name of a channel")
+    claim = begun(store)
+    woken = threading.Event()
+    with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.02):
+        assert woken.wait(10.0)
+        woken.clear()
+        store.commit(claim, completed(0), ask(1))
+        assert woken.wait(10.0)
+
+
+@pytest.mark.slow
+def test_the_listener_is_back_after_a_crash_of_the_server() -> None:
+    with postgres_server(server_binaries()) as server:
+        url = f"{server.url}/postgres"
+        with closing(open_store(url)) as store, closing(open_store(url)) as waiting:
+            claim = begun(store)
+            woken = threading.Event()
+            with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.2):
+                settle(url, waiting, woken)
+                server.stop()
+                server.start()
+                store.commit(claim, completed(0), ask(1))
+                assert woken.wait(10.0)
+                eventually(lambda: len(listening(url)) == 1)
+
+
+def test_who_has_left_is_told_nothing(
+    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+) -> None:
+    claim = begun(store)
+    left, stays = threading.Event(), threading.Event()
+    with waiting.changes.watch(claim.job.id, stays.set, poll_seconds=poll_seconds):
+        with waiting.changes.watch(claim.job.id, left.set, poll_seconds=poll_seconds):
+            settle(database_url, waiting, stays)
+        left.clear()
+        store.commit(claim, completed(0), ask(1))
+        assert stays.wait(10.0)
+    assert not left.is_set()

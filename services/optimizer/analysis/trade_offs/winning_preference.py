@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from services.optimizer.analysis.ranking import fitness_by
 from services.optimizer.analysis.robustness.preference_winners import NAMED
@@ -168,6 +167,8 @@ def _widest_lead(lead: Floats) -> tuple[Floats, float]:
 
 def _program(lead: Floats) -> tuple[Floats, float]:
     """As `_widest_lead`, of few designs."""
+    from scipy.optimize import linprog  # noqa: PLC0415 - slow to import
+
     count, size = lead.shape
     # Variables: exponents, and the least lead, which is to be maximized.
     solved = linprog(

@@ -46,16 +46,19 @@ def tools_for_arm(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def build_program(source: str, executable: Path, aim: Target = ARM_TARGET) -> Path:
-    """Compile and link a program with the flags of libraries. source: lacks DOUBLES only."""
+    """Compile and link a program with the flags of libraries, and without any library.
+
+    source: lacks DOUBLES only.
+    """
     compiler = find_compiler(aim.architecture)
     assert compiler is not None
-    command = list(compiler.command)
-    if "-target" in command:  # zig links musl's library statically, not GNU's
-        command[-1] = command[-1].replace("-gnu", "-musl")
     code = executable.with_suffix(".c")
     code.write_text(f"#define DOUBLES {aim.lanes}\n{source}", encoding="utf-8")
     flags = [flag for flag in compiler.flags(aim) if flag not in ("-shared", "-fPIC")]
-    subprocess.run([*command, *flags, "-static", code, "-o", executable, "-lm"], check=True)
+    built = executable.with_suffix(".o")
+    compiled = [*flags, "-mno-outline-atomics", "-c", code, "-o", built]
+    for arguments in (compiled, ["-static", "-nostdlib", built, "-o", executable]):
+        subprocess.run([*compiler.command, *arguments], check=True)
     return executable
 
 

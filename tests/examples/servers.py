@@ -22,7 +22,32 @@ from services.optimizer.service import JobService
 from tests.examples.processes import COMMAND_LINE, line_with, output, start_python
 
 
-class Server:
+class Served:
+    """A server's jobs, by its client."""
+
+    client: httpx2.Client
+
+    def submit(self, spec: dict[str, Any]) -> str:
+        """Id of a new job."""
+        answer = self.client.post("/v1/jobs", json=spec)
+        assert answer.status_code == 202, answer.text
+        return str(answer.json()["id"])
+
+    def job(self, job_id: str) -> dict[str, Any]:
+        """A job as it is now."""
+        return dict(self.client.get(f"/v1/jobs/{job_id}").json())
+
+    def wait_for(self, job_id: str, state: str, *, seconds: float = 120.0) -> dict[str, Any]:
+        """A job once it is in a state; fails if it ends in another one."""
+        ends = time.monotonic() + seconds
+        while (job := self.job(job_id))["state"] != state:
+            assert job["state"] not in ("failed", "cancelled"), job["error"]
+            assert time.monotonic() < ends, f"the job is {job['state']} still"
+            time.sleep(0.1)
+        return job
+
+
+class Server(Served):
     """The API in a thread of this process, and a client of it.
 
     page_folder: of the built page; by default there is none, whether one was built here or not.
@@ -69,7 +94,7 @@ class Server:
         assert not self._thread.is_alive()
 
 
-class ServerProcess:
+class ServerProcess(Served):
     """`gaitswarm serve` as a process, with a runner unless told otherwise, and a client of it."""
 
     def __init__(self, database: Path, *options: str) -> None:
@@ -85,25 +110,6 @@ class ServerProcess:
         # A full pipe would stop the server.
         self._drain = threading.Thread(target=output(self.process.stderr).read)
         self._drain.start()
-
-    def submit(self, spec: dict[str, Any]) -> str:
-        """Id of a new job."""
-        answer = self.client.post("/v1/jobs", json=spec)
-        assert answer.status_code == 202, answer.text
-        return str(answer.json()["id"])
-
-    def job(self, job_id: str) -> dict[str, Any]:
-        """A job as it is now."""
-        return dict(self.client.get(f"/v1/jobs/{job_id}").json())
-
-    def wait_for(self, job_id: str, state: str, *, seconds: float = 120.0) -> dict[str, Any]:
-        """A job once it is in a state; fails if it ends in another one."""
-        ends = time.monotonic() + seconds
-        while (job := self.job(job_id))["state"] != state:
-            assert job["state"] not in ("failed", "cancelled"), job["error"]
-            assert time.monotonic() < ends, f"the job is {job['state']} still"
-            time.sleep(0.1)
-        return job
 
     def close(self) -> None:
         """Let it end."""

@@ -17,6 +17,8 @@ ARGUMENTS: Final = (
     "--no-first-run",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    # On an emulated graphics card, to put a page together is a third of what it takes.
+    "--disable-gpu-compositing",
 )
 
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
-from api.page import is_built
+from api.page import FOLDER, is_built
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.examples.walks import SHORT_WALK
 from tests.web.chromium import ARGUMENTS, find_chromium
 from tests.web.visit import Visit
@@ -73,12 +74,15 @@ def finished_job(server: ServerProcess) -> str:
 
 
 @pytest.fixture
-def start_server(tmp_path: Path) -> Iterator[Callable[..., ServerProcess]]:
-    """For a server of one test's own; to be asked for before `visit`, which ends first then."""
+def start_server(store: SqlStore, _chromium: str) -> Iterator[Callable[..., Server]]:
+    """For a server of one test's own, which has no jobs and runs none; settings: of `Server`.
+
+    To be asked for before `visit`, which ends first then.
+    """
     with ExitStack() as stack:
 
-        def start(*options: str) -> ServerProcess:
-            server = ServerProcess(tmp_path / "jobs.db", *options)
+        def start(**settings: Any) -> Server:
+            server = Server(JobService(store), page_folder=FOLDER, **settings)
             stack.callback(server.close)
             return server
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import expect
 
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 from tests.web.test_views import TOO_WIDE
 from tests.web.visit import Visit
@@ -96,9 +96,9 @@ def test_what_another_engine_makes_of_it_is_a_table_of_its_own(
 
 
 def test_a_certificate_that_waits_says_so(
-    start_server: Callable[..., ServerProcess], visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
-    idle = start_server("--no-runner")
+    idle = start_server()
     page = visit(idle.url).go(f"/jobs/{idle.submit(CERTIFICATE)}/certificate")
     expect(page.get_by_role("heading", name="No world yet")).to_be_visible()
 

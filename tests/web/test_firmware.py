@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.visit import Visit
 
@@ -53,9 +53,9 @@ def test_the_winners_memory_stands_beside_the_microcontrollers_and_it_is_downloa
 
 
 def test_a_job_without_a_winner_says_when_there_will_be_firmware(
-    start_server: Callable[..., ServerProcess], visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
-    server = start_server("--no-runner")
+    server = start_server()
     page = visit(server.url).go(f"/jobs/{server.submit(SMALL_JOB)}/firmware")
     expect(page.get_by_role("heading", name="No design to write yet")).to_be_visible()
     expect(page.get_by_role("link", name="Download")).to_have_count(0)

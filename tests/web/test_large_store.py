@@ -25,12 +25,14 @@ from sqlalchemy import (
     update,
 )
 
+from api.page import FOLDER
 from benchmarks.large_store import PARTICLES, fill
+from services.optimizer.service import JobService
 from services.optimizer.store.engine import connect, parse_url
 from services.optimizer.store.records import ID_ALPHABET
 from services.optimizer.store.tables import evaluations, iterations, jobs
 from services.runtime import open_store
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server
 from tests.web.job_page import wait_for_iteration
 from tests.web.visit import Visit
 
@@ -115,15 +117,16 @@ def copy_rows(
 
 
 @pytest.fixture(scope="module")
-def large_server(long_job: str, database: Path) -> Iterator[ServerProcess]:
-    server = ServerProcess(database, "--no-runner")
-    yield server
-    server.close()
+def large_server(long_job: str, database: Path, _chromium: str) -> Iterator[Server]:
+    with closing(open_store(str(database))) as store:
+        server = Server(JobService(store), page_folder=FOLDER)
+        yield server
+        server.close()
 
 
 @pytest.mark.timeout(600)
 def test_the_first_view_of_the_list_is_small(
-    large_server: ServerProcess, visit: Callable[..., Visit]
+    large_server: Server, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(large_server.url)
     page = visited.go("/")
@@ -138,7 +141,7 @@ def test_the_first_view_of_the_list_is_small(
 
 @pytest.mark.timeout(600)
 def test_the_first_view_of_a_long_job_is_small_and_then_complete(
-    large_server: ServerProcess, long_job: str, visit: Callable[..., Visit]
+    large_server: Server, long_job: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(large_server.url)
     page = visited.go(f"/jobs/{long_job}")

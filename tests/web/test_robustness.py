@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.visit import Visit
 
@@ -44,9 +44,9 @@ def test_the_index_of_the_winner_is_drawn_and_told_as_a_table(
 
 
 def test_a_job_without_a_winner_says_when_there_will_be_an_index(
-    start_server: Callable[..., ServerProcess], visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
-    server = start_server("--no-runner")
+    server = start_server()
     job_id = server.submit(SMALL_JOB)
     page = visit(server.url).go(f"/jobs/{job_id}/robustness")
     expect(page.get_by_role("heading", name="No winner yet")).to_be_visible()

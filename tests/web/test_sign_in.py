@@ -3,41 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
 
 from services.optimizer.access import Scope
-from services.runtime import open_store
-from tests.examples.servers import ServerProcess
+from services.optimizer.store.sql_store import SqlStore
+from tests.examples.servers import Server
 from tests.web.visit import Visit
 
 REFUSED = r"401 \(Unauthorized\)"
 
 
 @pytest.fixture
-def secret(tmp_path: Path) -> str:
+def secret(store: SqlStore) -> str:
     """Of a token in the database of `start_server`."""
-    store = open_store(str(tmp_path / "jobs.db"))
-    try:
-        return store.tokens.create("reader", Scope.READ)[1]
-    finally:
-        store.close()
+    return store.tokens.create("reader", Scope.READ)[1]
 
 
 @pytest.fixture
-def guarded(
-    secret: str,
-    start_server: Callable[..., ServerProcess],
-    monkeypatch: pytest.MonkeyPatch,
-) -> ServerProcess:
-    monkeypatch.setenv("GAITSWARM_API_ACCESS", "token")
-    return start_server("--no-runner")
+def guarded(start_server: Callable[..., Server]) -> Server:
+    return start_server(api_access="token")
 
 
 def test_the_page_asks_for_a_token_and_goes_on_with_it(
-    guarded: ServerProcess, secret: str, visit: Callable[..., Visit]
+    guarded: Server, secret: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(guarded.url, allowed=REFUSED).go("/jobs")
     expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
@@ -53,7 +43,7 @@ def test_the_page_asks_for_a_token_and_goes_on_with_it(
 
 
 def test_the_link_of_the_first_start_signs_in_and_leaves_no_trace(
-    guarded: ServerProcess, secret: str, visit: Callable[..., Visit]
+    guarded: Server, secret: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(guarded.url)
     page = visited.go(f"/#token={secret}")

@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 from services.optimizer.jobs.job import JobState
 from services.runtime import open_store
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import expect_state, job_element, shown_iteration, wait_for_iteration
 from tests.web.proxy import CuttableProxy
@@ -61,9 +61,9 @@ def test_a_broken_stream_is_said_to_be_stale_and_goes_on_without_a_gap(
 
 
 def test_a_job_that_fails_is_shown_with_its_reason(
-    start_server: Callable[..., ServerProcess], tmp_path: Path, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
-    server = start_server("--no-runner")
+    server = start_server()
     job_id = server.submit(SMALL_JOB)
     page = visit(server.url).go(f"/jobs/{job_id}")
     expect_state(page, "queued")

@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from contextlib import closing
 from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from api.page import FOLDER
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server
 from tests.tournament.examples import entrant, submitted
-from tests.web.test_views import (
-    AXE,
-    BACKGROUND,
-    CHARTS_WITHOUT_TABLE,
-    OUT_OF_REACH,
-    RUN_AXE,
-    TOO_WIDE,
-)
+from tests.web.test_views import PHONE, findings
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -40,10 +34,10 @@ RUNS = {
 @pytest.fixture(scope="module")
 def raced(tmp_path_factory: pytest.TempPathFactory, _chromium: str) -> Iterator[Raced]:
     """A server of a module's own."""
-    db = tmp_path_factory.mktemp("tournaments") / "jobs.db"
-    found = Raced(db)
-    yield found
-    found.server.close()
+    with closing(open_store(str(tmp_path_factory.mktemp("tournaments") / "jobs.db"))) as store:
+        found = Raced(JobService(store))
+        yield found
+        found.server.close()
 
 
 class Raced:
@@ -54,14 +48,11 @@ class Raced:
         waiting: Id of the job without a run.
     """
 
-    def __init__(self, db: Path) -> None:
-        store = open_store(str(db))
-        service = JobService(store)
+    def __init__(self, service: JobService) -> None:
         self.jobs = {m: submitted(service, entrant(m, m), v).id for m, v in RUNS.items()}
         elsewhere = entrant("pso", "pso", problems=[{"function": "D4C0R0I0"}])
         self.waiting = submitted(service, elsewhere).id
-        store.close()
-        self.server = ServerProcess(db, "--no-runner")
+        self.server = Server(service, page_folder=FOLDER)
         self.id = self.jobs["pso"]
 
 
@@ -142,7 +133,7 @@ def test_methods_in_colour_are_part_of_the_address(
 
 
 def test_what_is_not_there_yet_or_at_all_says_so(
-    raced: Raced, visit: Callable[..., Visit], start_server: Callable[..., ServerProcess]
+    raced: Raced, visit: Callable[..., Visit], start_server: Callable[..., Server]
 ) -> None:
     refused = "status of 4(04|09|22)"
     page = opened(visit(raced.server.url, allowed=refused), f"/tournaments/{raced.waiting}")
@@ -152,7 +143,7 @@ def test_what_is_not_there_yet_or_at_all_says_so(
     path = f"/tournaments/{raced.id}?compare={raced.waiting}"
     page = opened(visit(raced.server.url, allowed=refused), path)
     expect(page.get_by_role("alert")).to_contain_text("has ended yet")
-    page = opened(visit(start_server("--no-runner").url), "/tournaments")
+    page = opened(visit(start_server().url), "/tournaments")
     expect(page.get_by_role("heading", name="No tournaments yet")).to_be_visible()
     expect(page.get_by_text("gaitswarm tournament thesis")).to_be_visible()
 
@@ -161,18 +152,6 @@ def test_what_is_not_there_yet_or_at_all_says_so(
 def test_every_eye_hand_and_width_can_use_it(
     raced: Raced, visit: Callable[..., Visit], path: str
 ) -> None:
-    address = f"/tournaments{path.format(id=raced.id)}"
-    visited = visit(raced.server.url, color_scheme="light", bypass_csp=True)
-    page = opened(visited, address)
-    page.add_script_tag(path=AXE)
-    light = page.evaluate(BACKGROUND)
-    for check in (RUN_AXE, OUT_OF_REACH, CHARTS_WITHOUT_TABLE):
-        assert page.evaluate(check) == []
-    page.get_by_role("button", name="Show in dark colours").click()
-    page = opened(visited, address)
-    page.add_script_tag(path=AXE)
-    assert page.evaluate(BACKGROUND) != light
-    assert page.evaluate(RUN_AXE) == []
-    for width in (360, 768, 3840):
-        page.set_viewport_size({"width": width, "height": 1000})
-        assert page.evaluate(TOO_WIDE) == []
+    visited = visit(raced.server.url, color_scheme="light", viewport=PHONE, bypass_csp=True)
+    page = opened(visited, f"/tournaments{path.format(id=raced.id)}")
+    assert findings(page) == {}

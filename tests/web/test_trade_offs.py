@@ -11,7 +11,7 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.visit import Visit
 
@@ -163,8 +163,8 @@ def test_a_design_that_fails_is_told_why_it_has_no_preference(
 
 
 def test_a_job_that_waits_has_no_front_yet(
-    start_server: Callable[..., ServerProcess], visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
-    server = start_server("--no-runner")
+    server = start_server()
     page = visit(server.url).go(f"/jobs/{server.submit(SMALL_JOB)}/trade-offs")
     expect(page.get_by_role("heading", name="No front yet")).to_be_visible()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server
 from tests.web.conftest import SMALL_JOB
 from tests.web.visit import Visit
 
@@ -18,9 +18,9 @@ pytestmark = pytest.mark.slow
 
 
 def test_it_is_listed_and_its_page_says_why_it_shows_so_little(
-    start_server: Callable[..., ServerProcess], visit: Callable[..., Visit], tmp_path: Path
+    start_server: Callable[..., Server], visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
-    server = start_server("--no-runner")
+    server = start_server()
     job_id, sound = server.submit(SMALL_JOB), server.submit(SMALL_JOB)
     with closing(sqlite3.connect(tmp_path / "jobs.db")) as connection, connection:
         connection.execute(

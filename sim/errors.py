@@ -3,6 +3,7 @@
 SimulationError
 ├── SimulationInputError    a value that cannot be simulated; names the field (also a ValueError)
 │   ├── UnreachablePose     a foot target outside the leg's reach; names scenario, leg, miss in mm
+│   ├── BeyondJointLimit    a gait turns a joint too far; names scenario, leg, joint, excess in rad
 │   ├── MeasuredLogError    a log that cannot be read; names line, column and unit
 │   └── RobotFileError      a robot description that cannot be used; names file and field
 ├── ProcessEnded            work in a process of its own took too much, or ended it
@@ -44,6 +45,31 @@ class UnreachablePose(SimulationInputError):
     def __reduce__(self) -> tuple[type[UnreachablePose], tuple[str, str, float]]:
         """Pickle by the arguments, so that it comes back from another process as itself."""
         return type(self), (self.scenario, self.leg, self.miss)
+
+
+class BeyondJointLimit(SimulationInputError):
+    """A gait would turn a joint further than its URDF allows.
+
+    Args:
+        scenario: Name of the walk.
+        leg: Name of the leg.
+        joint: Name of the joint.
+        excess: Angle by which it leaves its limits [rad].
+    """
+
+    def __init__(self, scenario: str, leg: str, joint: str, excess: float) -> None:
+        self.scenario = scenario
+        self.leg = leg
+        self.joint = joint
+        self.excess = excess
+        super().__init__(
+            f"scenario {scenario!r}: joint {joint!r} of leg {leg!r} would turn {excess:.3f} rad"
+            " beyond its limit; reduce stride or height, or change hip_height or radius"
+        )
+
+    def __reduce__(self) -> tuple[type[BeyondJointLimit], tuple[str, str, str, float]]:
+        """Pickle by the arguments, so that it comes back from another process as itself."""
+        return type(self), (self.scenario, self.leg, self.joint, self.excess)
 
 
 class MeasuredLogError(SimulationInputError):

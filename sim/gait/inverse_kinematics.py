@@ -1,38 +1,41 @@
-"""Joint angles that put a foot where it is wanted (thesis appendix, eq. 4, misprints mended)."""
+"""Joint angles that put a foot where it is wanted.
+
+In closed form for the thesis's legs (appendix, eq. 4, misprints mended), by Gauss-Newton steps for
+any other leg of three joints.
+"""
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.robot.legs import ChainLeg
+
 Floats = NDArray[np.float64]
 
 
-class LinkLengths(Protocol):
-    """What the solution depends on of a leg."""
+_STEPS: Final = 60
+"""Gauss-Newton steps at most; a target within reach takes about six."""
 
-    @property
-    def coxa(self) -> float:
-        """[m]."""
+_FIRST_DAMPING, _MOST_DAMPING = 1e-3, 1e9
+"""In units of the squared Jacobian's trace, as all damping."""
 
-    @property
-    def femur(self) -> float:
-        """[m]."""
+_REACHED: Final = 1e-9
+"""Distance from a target at which it counts as reached [m]."""
 
-    @property
-    def tibia(self) -> float:
-        """[m]."""
+_EXACT: Final = 1e-14
+"""Distance from all targets [m], or change of all angles [rad], below which steps end."""
 
 
 def leg_angles(
-    leg: LinkLengths, forward: Floats, lateral: Floats, vertical: Floats
+    lengths: tuple[float, float, float], forward: Floats, lateral: Floats, vertical: Floats
 ) -> tuple[Floats, Floats]:
     """Knee-up solution for a tibia end relative to the coxa axis.
 
     Args:
-        leg: Lengths of the leg.
+        lengths: Of coxa, femur and tibia [m].
         forward: (T,) [m].
         lateral: Outward, (T,) [m].
         vertical: Upward, (T,) [m].
@@ -41,15 +44,66 @@ def leg_angles(
         Angles (T, 3) [rad] (coxa forward, femur up, tibia up), and the miss (T,) [m] by which the
         target lies outside the leg's reach, 0 inside; angles of a missed target point towards it.
     """
+    coxa, femur, tibia = lengths
     alpha = np.arctan2(forward, lateral)
-    outward = np.hypot(forward, lateral) - leg.coxa
+    outward = np.hypot(forward, lateral) - coxa
     distance = np.hypot(outward, vertical)
-    longest, shortest = leg.femur + leg.tibia, abs(leg.femur - leg.tibia)
+    longest, shortest = femur + tibia, abs(femur - tibia)
     miss = np.maximum(0.0, np.maximum(distance - longest, shortest - distance))
     # Cosine rule; the clip keeps a missed target's angles finite.
-    cos_knee = (distance**2 - leg.femur**2 - leg.tibia**2) / (2.0 * leg.femur * leg.tibia)
+    cos_knee = (distance**2 - femur**2 - tibia**2) / (2.0 * femur * tibia)
     theta2 = -np.arccos(np.clip(cos_knee, -1.0, 1.0))
     theta1 = np.arctan2(vertical, outward) - np.arctan2(
-        leg.tibia * np.sin(theta2), leg.femur + leg.tibia * np.cos(theta2)
+        tibia * np.sin(theta2), femur + tibia * np.cos(theta2)
     )
     return np.stack([alpha, theta1, theta2], axis=-1), miss
+
+
+def chain_angles(leg: ChainLeg, targets: Floats) -> tuple[Floats, Floats]:
+    """Angles of a leg of any mounting, on the branch of its stance.
+
+    Levenberg-Marquardt steps from the stance, first half of the way to the targets, so that a knee
+    does not turn over.
+
+    Args:
+        leg: The leg.
+        targets: Of its foot in the body's frame, (T, 3) [m].
+
+    Returns:
+        Angles (T, 3) [rad]; and the miss (T,) [m] by which the target lies outside the leg's reach,
+        0 inside; the angles of a missed target are the nearest that were found.
+    """
+    angles = np.tile(leg.stance, (len(targets), 1))
+    begin, _ = leg.feet(angles)
+    angles = _stepped(leg, angles, 0.5 * (begin + targets))
+    angles = _stepped(leg, angles, targets)
+    missed = np.linalg.norm(targets - leg.feet(angles)[0], axis=1)
+    return angles, np.where(missed > _REACHED, missed, 0.0)
+
+
+def _stepped(leg: ChainLeg, angles: Floats, targets: Floats) -> Floats:
+    at, jacobian = leg.feet(angles)
+    missed = targets - at
+    squares = np.einsum("ti,ti->t", missed, missed)
+    damping = np.full(len(targets), _FIRST_DAMPING)
+    for _ in range(_STEPS):
+        # The least damping keeps a stretched leg's step finite.
+        normal = np.einsum("tij,tik->tjk", jacobian, jacobian)
+        scale = np.einsum("tii->t", normal)
+        normal += ((damping + 1e-15) * scale)[:, None, None] * np.eye(3)
+        gradient = np.einsum("tij,ti->tj", jacobian, missed)
+        steps = np.linalg.solve(normal, gradient[:, :, None])[:, :, 0]
+        tried = angles + steps
+        at, slopes = leg.feet(tried)
+        left = targets - at
+        better = np.einsum("ti,ti->t", left, left)
+        good = better < squares
+        angles = np.where(good[:, None], tried, angles)
+        jacobian = np.where(good[:, None, None], slopes, jacobian)
+        missed = np.where(good[:, None], left, missed)
+        squares = np.where(good, better, squares)
+        damping = np.where(good, 0.1 * damping, np.minimum(10.0 * damping, _MOST_DAMPING))
+        damping = np.where(squares < _REACHED**2, 0.0, damping)
+        if squares.max() < _EXACT**2 or np.abs(steps).max() < _EXACT:
+            break
+    return angles

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import UnreachablePose
+from sim.errors import BeyondJointLimit, UnreachablePose
 from sim.gait.half_ellipse import half_ellipse
-from sim.gait.inverse_kinematics import leg_angles
+from sim.gait.inverse_kinematics import chain_angles, leg_angles
 from sim.gait.low_pass import FirWindow, low_pass
 from sim.gait.quadratic_spline import quadratic_spline
 from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG
+from sim.robot.legs import ChainLeg, LegKinematics
 from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,8 @@ _DECIMALS: Final = 12
 
 _CURVES: Final = {"half_ellipse": half_ellipse, "quadratic_spline": quadratic_spline}
 
+
+Limits = tuple[tuple[float, float], ...]
 
 _KEPT: Final = 64
 """Trajectories that are kept for whoever asks for the same; most have a tenth of a megabyte."""
@@ -48,11 +51,13 @@ class Trajectory:
         columns: (T, C) [rad]; row 0 is the pose at rest.
         joints: by joint its column, (J,).
         miss: largest distance by which a leg's target lies outside its reach, (L,) [m].
+        excess: largest angle by which a joint would leave its limits, (J,) [rad].
     """
 
     columns: Floats
     joints: NDArray[np.intp]
     miss: Floats
+    excess: Floats
 
     @property
     def angles(self) -> Floats:
@@ -66,8 +71,8 @@ class Trajectory:
 
     @property
     def reachable(self) -> bool:
-        """Whether every target can be reached."""
-        return not self.miss.any()
+        """Whether every target can be reached within the joints' limits."""
+        return not (self.miss.any() or self.excess.any())
 
     def codes(self, angle_counts: float) -> NDArray[np.int32]:
         """As the controller receives them.
@@ -84,18 +89,44 @@ class Trajectory:
 
 @dataclass(frozen=True, slots=True)
 class _Foot:
-    """What a leg's angles depend on besides the gait. Lengths in metres.
+    """What any leg's angles depend on besides the gait.
 
-    lateral: outward from the coxa's axis. ground: below it. phase: share of the cycle at the start.
+    phase: share of the cycle at the start. stride: [m]. limits: of the joints [rad].
     """
 
-    coxa: float
-    femur: float
-    tibia: float
-    lateral: float
-    ground: float
     phase: float
     stride: float
+    limits: Limits
+
+
+@dataclass(frozen=True, slots=True)
+class _KneeUpFoot(_Foot):
+    """Of a leg as the thesis's. lengths: of its links. lateral: outward from the coxa's axis.
+    ground: below it [m].
+    """
+
+    lengths: tuple[float, float, float]
+    lateral: float
+    ground: float
+
+    def angles(self, forward: Floats, lift: Floats) -> tuple[Floats, Floats]:
+        """Angles (T, 3) [rad], and the miss (T,) [m]."""
+        lateral = np.full_like(forward, self.lateral)
+        return leg_angles(self.lengths, forward, lateral, lift - self.ground)
+
+
+@dataclass(frozen=True, slots=True)
+class _ChainFoot(_Foot):
+    """Of any other leg. rest: where the foot is in the body's frame in mid-support, (3,) [m]."""
+
+    leg: ChainLeg
+    rest: tuple[float, float, float]
+
+    def angles(self, forward: Floats, lift: Floats) -> tuple[Floats, Floats]:
+        """Angles (T, 3) [rad], and the miss (T,) [m]."""
+        x, y, z = self.rest
+        targets = np.stack([x + forward, np.full_like(forward, y), z + lift], axis=1)
+        return chain_angles(self.leg, targets)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,42 +193,55 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
     return _kept(feet, gait) if gait.ticks <= _LONGEST_KEPT else _trajectory(feet, gait)
 
 
-def _feet(robot: Robot, scenario: Scenario) -> tuple[_Foot, ...]:
+def _feet(robot: Robot, scenario: Scenario) -> tuple[_KneeUpFoot | _ChainFoot, ...]:
     legs = zip(robot.legs, robot.description.legs, robot.planned_soles(), strict=True)
     return tuple(
-        _Foot(
-            coxa=leg.coxa,
-            femur=leg.femur,
-            tibia=leg.tibia,
-            lateral=scenario.radius - abs(leg.hip[1]),
-            ground=scenario.hip_height - sole,
-            phase=data.phase + scenario.start_phase,
-            stride=scenario.stride_of(leg.side),
-        )
-        for leg, data, sole in legs
+        _foot(leg, scenario, sole, data.phase + scenario.start_phase) for leg, data, sole in legs
     )
 
 
-def _trajectory(feet: tuple[_Foot, ...], gait: _Gait) -> Trajectory:
+def _foot(
+    leg: LegKinematics, scenario: Scenario, sole: float, phase: float
+) -> _KneeUpFoot | _ChainFoot:
+    stride, ground = scenario.stride_of(leg.side), scenario.hip_height - sole
+    limits = tuple((lower, upper) for lower, upper in leg.limits.tolist())
+    if isinstance(leg, ChainLeg):
+        x, _, _ = leg.foot(leg.stance.tolist())
+        rest = (x, leg.side * scenario.radius, leg.hip[2] - ground)
+        return _ChainFoot(phase=phase, stride=stride, limits=limits, leg=leg, rest=rest)
+    return _KneeUpFoot(
+        phase=phase,
+        stride=stride,
+        limits=limits,
+        lengths=leg.lengths,
+        lateral=scenario.radius - abs(leg.hip[1]),
+        ground=ground,
+    )
+
+
+def _trajectory(feet: tuple[_KneeUpFoot | _ChainFoot, ...], gait: _Gait) -> Trajectory:
     alike = {foot: number for number, foot in enumerate(dict.fromkeys(feet))}
     time = gait.time()
-    angles, misses = zip(*(_unfiltered(foot, gait, time) for foot in alike), strict=True)
+    planned = [_unfiltered(foot, gait, time) for foot in alike]
+    angles, misses, excesses = zip(*planned, strict=True)
     smoothed = low_pass(np.concatenate(angles, axis=1), gait.fir_ms, gait.fir_window)
     # numpy's arc functions differ in the last bit between processors.
     columns = np.round(smoothed, _DECIMALS)
     of_leg = np.array([alike[foot] for foot in feet])
     joints = np.add.outer(JOINTS_PER_LEG * of_leg, np.arange(JOINTS_PER_LEG)).ravel()
-    miss = np.array(misses)[of_leg]
-    for array in (columns, joints, miss):
+    miss, excess = np.array(misses)[of_leg], np.array(excesses)[of_leg].ravel()
+    for array in (columns, joints, miss, excess):
         array.flags.writeable = False
-    return Trajectory(columns, joints, miss)
+    return Trajectory(columns, joints, miss, excess)
 
 
 _kept: Final = lru_cache(maxsize=_KEPT)(_trajectory)
 
 
-def _unfiltered(foot: _Foot, gait: _Gait, time: Floats) -> tuple[Floats, float]:
-    """Angles (T, 3) [rad], and the largest miss [m]."""
+def _unfiltered(
+    foot: _KneeUpFoot | _ChainFoot, gait: _Gait, time: Floats
+) -> tuple[Floats, float, Floats]:
+    """Angles (T, 3) [rad], the largest miss [m], and by joint the largest excess (3,) [rad]."""
     forward, lift = _CURVES[gait.curve](
         np.mod(time / gait.cycle_time + foot.phase, 1.0),
         stride=foot.stride,
@@ -206,9 +250,10 @@ def _unfiltered(foot: _Foot, gait: _Gait, time: Floats) -> tuple[Floats, float]:
     )
     if gait.backward:
         forward = -forward
-    lateral = np.full_like(forward, foot.lateral)
-    angles, miss = leg_angles(foot, forward, lateral, lift - foot.ground)
-    return angles, float(miss.max())
+    angles, miss = foot.angles(forward, lift)
+    lower, upper = np.array(foot.limits).T
+    excess = np.maximum(lower - angles.min(axis=0), angles.max(axis=0) - upper)
+    return angles, float(miss.max()), np.maximum(0.0, excess)
 
 
 def require_reachable(robot: Robot, scenario: Scenario) -> None:
@@ -224,12 +269,20 @@ def require_reachable(robot: Robot, scenario: Scenario) -> None:
     Raises:
         UnreachablePose: A foot's target lies outside its leg's reach; names the leg that misses by
             most.
+        BeyondJointLimit: A joint would leave its limits; names the one that does by most.
     """
     gait = _Gait.of(scenario)
     gait = replace(gait, ticks=min(gait.ticks, _CHECKED_TICKS))
     time, feet = gait.time(), _feet(robot, scenario)
     # The filter is left out: it smooths angles, and a target is missed before.
-    miss_of = {foot: _unfiltered(foot, gait, time)[1] for foot in dict.fromkeys(feet)}
-    worst = max(range(len(feet)), key=lambda leg: miss_of[feet[leg]])
-    if miss_of[feet[worst]] > 0.0:
-        raise UnreachablePose(scenario.name, robot.legs[worst].name, miss_of[feet[worst]])
+    planned = {foot: _unfiltered(foot, gait, time)[1:] for foot in dict.fromkeys(feet)}
+    worst = max(range(len(feet)), key=lambda leg: planned[feet[leg]][0])
+    miss, _ = planned[feet[worst]]
+    if miss > 0.0:
+        raise UnreachablePose(scenario.name, robot.legs[worst].name, miss)
+    excess = np.concatenate([planned[foot][1] for foot in feet])
+    joint = int(excess.argmax())
+    if excess[joint] > 0.0:
+        leg = robot.legs[joint // JOINTS_PER_LEG].name
+        name = robot.joint_names[joint]
+        raise BeyondJointLimit(scenario.name, leg, name, float(excess[joint]))

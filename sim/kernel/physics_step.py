@@ -23,9 +23,10 @@ from sim.kernel.limb import After, Before, Environment, LimbState, after, before
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.kernel.spatial import Scalar, add
 from sim.robot import Robot
+from sim.robot.chain import Placement
 from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.inertia import BodyInertia
-from sim.robot.limbs import Limb, Placement, limb_of, limbs_of
+from sim.robot.limbs import Limb, limb_of, limbs_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,6 +6,7 @@ say what they mean, in which unit, and what is refused.
 
 from __future__ import annotations
 
+import operator
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -161,13 +162,37 @@ class Contact(_Data):
     )
 
 
+def _is_none(value: Any) -> bool:
+    return value is None
+
+
 class Leg(_Data):
-    """One leg: joints `<name>_coxa`, `_femur`, `_tibia` and frame `<name>_foot` of the URDF."""
+    """One leg: three joints of the URDF, from the body on, and the frame of its foot."""
+
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
 
     name: Annotated[PartName, Field(max_length=LONGEST_LEG_NAME)]
     phase: Number = Field(ge=0.0, lt=1.0, description="start of support, share of the cycle [1]")
     actuators: tuple[PartName, PartName, PartName] = Field(
         description="actuators of coxa, femur, tibia"
+    )
+    own_joints: tuple[PartName, PartName, PartName] | None = Field(
+        default=None,
+        alias="joints",
+        exclude_if=_is_none,
+        description="joints, from the body on; default `<name>_coxa`, `_femur` and `_tibia`",
+    )
+    own_foot: PartName | None = Field(
+        default=None,
+        alias="foot",
+        exclude_if=_is_none,
+        description="link or fixed joint at the leg's end; default `<name>_foot`",
+    )
+    stance: tuple[Number, Number, Number] | None = Field(
+        default=None,
+        exclude_if=_is_none,
+        description="angles at which the leg stands, from which its gait is planned [rad]; default"
+        " for legs as the thesis's, whose frames are parallel to the body's: knee up",
     )
     contact: Contact | None = Field(default=None, description="this foot's own contact")
 
@@ -179,12 +204,12 @@ class Leg(_Data):
     @property
     def joints(self) -> tuple[str, str, str]:
         """Names of the joints in the URDF."""
-        return (f"{self.name}_coxa", f"{self.name}_femur", f"{self.name}_tibia")
+        return self.own_joints or (f"{self.name}_coxa", f"{self.name}_femur", f"{self.name}_tibia")
 
     @property
     def foot(self) -> str:
-        """Name of the frame at the tibia's end."""
-        return f"{self.name}_foot"
+        """Name of the frame at the last link's end."""
+        return self.own_foot or f"{self.name}_foot"
 
 
 class RobotDescription(_Data):
@@ -215,7 +240,13 @@ class RobotDescription(_Data):
     pwm: Pwm
     sensors: Sensors
     contact: Contact
-    legs: tuple[Leg, ...] = Field(min_length=3, max_length=MOST_LEGS)
+    legs: tuple[Leg, ...] = Field(min_length=2, max_length=MOST_LEGS)
+    held_joints: dict[PartName, Number] = Field(
+        default={},
+        exclude_if=operator.not_,
+        description="movable joints that belong to no leg, each with the angle at which it is held"
+        " [rad]",
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
+from sim.robot.chain import Placement, chain_of, check_joints
 from sim.robot.description import JOINTS_PER_LEG
-from sim.robot.inertia import BodyInertia, parallel_axis
+from sim.robot.inertia import parallel_axis
 from sim.robot.robot import Robot
 
 _NOISE: Final = 1e-14
@@ -75,23 +75,6 @@ class Limb:
     mobility: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Placement:
-    """Where a joint or a foot is, by any reader of a URDF.
-
-    Attributes:
-        axis: of the joint, (3,).
-        rotation: in the frame before it, (3, 3).
-        offset: in the frame before it, (3,) [m].
-        inertia: of the link behind it.
-    """
-
-    axis: Floats
-    rotation: Floats
-    offset: Floats
-    inertia: BodyInertia
-
-
 @lru_cache(maxsize=64)
 def limbs_of(robot: Robot) -> tuple[Limb, ...]:
     """The legs of a robot, in its order.
@@ -106,38 +89,11 @@ def limbs_of(robot: Robot) -> tuple[Limb, ...]:
         RobotFileError: Its URDF's movable joints are not the legs' joints, one is not revolute, or
             a leg is not a chain from the body to its foot.
     """
-    urdf = robot.urdf
-    movable = {joint.name: joint for joint in urdf.joints if not joint.fixed}
-    if movable.keys() != set(robot.joint_names):
-        raise RobotFileError(
-            "robot.urdf: its movable joints are not the legs' joints of robot.toml:"
-            f" {', '.join(sorted(movable.keys() ^ set(robot.joint_names)))}"
-        )
-    for name in robot.joint_names:
-        if movable[name].kind != "revolute":
-            raise RobotFileError(f"robot.urdf: joint {name!r} is not revolute")
-    limbs = []
-    for number, leg in enumerate(robot.description.legs):
-        before, placements = next(iter(urdf.links)), []
-        for name in leg.joints:
-            joint = movable[name]
-            parent = urdf.place(joint.parent)
-            if parent.body != before:
-                raise RobotFileError(f"robot.urdf: joint {name!r} comes before its parent")
-            placements.append(
-                Placement(
-                    joint.axis,
-                    parent.rotation @ joint.origin.matrix(),
-                    parent.rotation @ joint.origin.xyz + parent.position,
-                    urdf.bodies[joint.child],
-                )
-            )
-            before = joint.child
-        foot = urdf.place(leg.foot)
-        if foot.body != before:
-            raise RobotFileError(f"robot.urdf: foot {leg.foot!r} is not on its leg's last link")
-        limbs.append(limb_of(robot, number, placements, foot.position))
-    return tuple(limbs)
+    chains = [chain_of(robot.urdf, leg) for leg in robot.description.legs]
+    check_joints(robot.urdf, robot.description.legs)
+    return tuple(
+        limb_of(robot, number, chain.placements, chain.foot) for number, chain in enumerate(chains)
+    )
 
 
 def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Floats) -> Limb:

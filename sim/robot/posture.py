@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 def feet_in_body(robot: Robot, joints: Floats) -> Floats:
-    """Where every tibia's end is in the body's frame.
+    """Where every foot is in the body's frame.
 
     Args:
         robot: The robot.
@@ -22,23 +20,12 @@ def feet_in_body(robot: Robot, joints: Floats) -> Floats:
     Returns:
         (L, 3) [m].
     """
-    feet = []
     angles = joints.reshape(-1, 3).tolist()
-    for leg, (alpha, theta1, theta2) in zip(robot.legs, angles, strict=True):
-        x, y, z = leg.hip
-        outward = leg.coxa + leg.femur * math.cos(theta1) + leg.tibia * math.cos(theta1 + theta2)
-        feet.append(
-            (
-                x + outward * math.sin(alpha),
-                y + leg.side * outward * math.cos(alpha),
-                z + leg.femur * math.sin(theta1) + leg.tibia * math.sin(theta1 + theta2),
-            )
-        )
-    return np.array(feet)
+    return np.array([leg.foot(of) for leg, of in zip(robot.legs, angles, strict=True)])
 
 
 def feet_below_body(robot: Robot, joints: Floats) -> Floats:
-    """Height of every tibia's end in the body's frame.
+    """Height of every foot in the body's frame.
 
     Args:
         robot: The robot.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,33 +13,14 @@ from pydantic import ValidationError
 
 from sim.errors import RobotFileError
 from sim.robot.bounds import check_toml
-from sim.robot.description import JOINTS_PER_LEG, Contact, RobotDescription
+from sim.robot.chain import chain_of, check_joints
+from sim.robot.description import JOINTS_PER_LEG, Contact, Leg, RobotDescription
 from sim.robot.inertia import BodyInertia
+from sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
 from sim.robot.toml_errors import first_problem
-from sim.robot.urdf import Joint, Urdf, parse_urdf
+from sim.robot.urdf import Urdf, parse_urdf
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class LegGeometry:
-    """What inverse kinematics needs of a leg.
-
-    Attributes:
-        name: of the leg.
-        hip: coxa axis in the body frame, (3,) [m].
-        side: +1 left, -1 right.
-        coxa: length of the link [m].
-        femur: length of the link [m].
-        tibia: length of the link [m].
-    """
-
-    name: str
-    hip: tuple[float, float, float]
-    side: float
-    coxa: float
-    femur: float
-    tibia: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +73,7 @@ class Robot:
 
     description: RobotDescription
     urdf: Urdf
-    legs: tuple[LegGeometry, ...]
+    legs: tuple[LegKinematics, ...]
     ships: bool = False
 
     @property
@@ -237,31 +217,51 @@ def assembled(description: RobotDescription, urdf: str) -> Robot:
     Raises:
         RobotFileError: The URDF cannot be used, or has not the description's legs.
     """
-    tree = parse_urdf(urdf)
-    for joint in tree.joints:
-        if not joint.fixed and joint.origin.rpy.any():
-            turn = " ".join(f"{angle:g}" for angle in joint.origin.rpy)
-            raise RobotFileError(
-                f"robot.urdf: joint {joint.name!r}: rpy {turn!r} turns its frame, which the"
-                " inverse kinematics does not know; let every frame be parallel to the body's"
-            )
-    # A foot may be named by its fixed joint or by its link.
-    named = {joint.child: joint for joint in tree.joints} | {j.name: j for j in tree.joints}
-    legs = tuple(_geometry(leg.name, named) for leg in description.legs)
+    tree = parse_urdf(urdf, description.held_joints)
+    legs = tuple(_kinematics(leg, tree) for leg in description.legs)
+    check_joints(tree, description.legs)
     return Robot(description, tree, legs)
 
 
-def _geometry(leg: str, joints: Mapping[str, Joint]) -> LegGeometry:
-    names = {part: f"{leg}_{part}" for part in ("coxa", "femur", "tibia", "foot")}
-    for name in names.values():
-        if name not in joints:
-            raise RobotFileError(f"robot.urdf: leg {leg!r} has no joint or frame {name!r}")
-    x, y, z = joints[names["coxa"]].origin.xyz.tolist()
+def _kinematics(leg: Leg, urdf: Urdf) -> LegKinematics:
+    chain = chain_of(urdf, leg)
+    places = chain.placements
+    if leg.stance is not None:
+        stance = np.array(leg.stance)
+        _check_stance(leg, stance, chain.limits)
+        return ChainLeg(
+            leg.name,
+            np.array([place.rotation for place in places]),
+            np.array([place.offset for place in places]),
+            np.array([place.axis for place in places]),
+            chain.foot,
+            stance,
+            chain.limits,
+        )
+    for name, place in zip(leg.joints, places, strict=True):
+        if (place.rotation != np.eye(3)).any():
+            raise RobotFileError(
+                f"robot.urdf: joint {name!r}: its frame is turned against the body's; give leg"
+                f" {leg.name!r} of robot.toml a stance, the angles at which it stands"
+            )
+    x, y, z = places[0].offset.tolist()
     if y == 0.0:
-        raise RobotFileError(f"robot.urdf: {names['coxa']}: a hip must lie left or right of y = 0")
-    coxa, femur, tibia = (
-        math.hypot(*joints[names[end]].origin.xyz.tolist()) for end in ("femur", "tibia", "foot")
-    )
+        raise RobotFileError(
+            f"robot.urdf: {leg.joints[0]}: a hip must lie left or right of y = 0; else give leg"
+            f" {leg.name!r} of robot.toml a stance, the angles at which it stands"
+        )
+    ends = (places[1].offset, places[2].offset, chain.foot)
+    coxa, femur, tibia = (math.hypot(*end.tolist()) for end in ends)
     if not (femur and tibia):
-        raise RobotFileError(f"robot.urdf: leg {leg!r}: femur and tibia need a length")
-    return LegGeometry(leg, (x, y, z), math.copysign(1.0, y), coxa, femur, tibia)
+        raise RobotFileError(f"robot.urdf: leg {leg.name!r}: femur and tibia need a length")
+    side = math.copysign(1.0, y)
+    return KneeUpLeg(leg.name, (x, y, z), side, (coxa, femur, tibia), chain.limits)
+
+
+def _check_stance(leg: Leg, stance: Floats, limits: Floats) -> None:
+    for name, angle, (lower, upper) in zip(leg.joints, stance, limits, strict=True):
+        if not lower <= angle <= upper:
+            raise RobotFileError(
+                f"robot.toml: leg {leg.name!r}: its stance has joint {name!r} at {angle:g} rad, but"
+                f" robot.urdf limits it to {lower:g} to {upper:g} rad"
+            )

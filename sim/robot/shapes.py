@@ -9,8 +9,10 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.robot.chain import chain_of
 from sim.robot.description import Leg
-from sim.robot.robot import LegGeometry, Robot
+from sim.robot.legs import LegKinematics
+from sim.robot.robot import Robot
 from sim.robot.urdf import SolidKind
 
 Floats = NDArray[np.float64]
@@ -100,21 +102,21 @@ def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
 
 def _derived(robot: Robot) -> dict[str, Shape]:
     """By link, what the kinematic tree suggests: the body, and the parts of every leg."""
-    joints = robot.urdf.joints
     # A foot may be named by its fixed joint or by its link.
-    named = {joint.child: joint for joint in joints} | {joint.name: joint for joint in joints}
+    carried = {joint.name: joint.child for joint in robot.urdf.joints}
     shapes = {next(iter(robot.urdf.links)): _trunk(robot)}
     for geometry, leg in zip(robot.legs, robot.description.legs, strict=True):
-        ends = [named[name] for name in (*leg.joints, leg.foot)]
+        chain = chain_of(robot.urdf, leg)
+        ends = [*(place.offset for place in chain.placements[1:]), chain.foot]
         radii = _radii(geometry)
-        for role, here, there in zip(_PARTS, ends, ends[1:], strict=False):
-            shapes[here.child] = _capsule(there.origin.xyz, radii[role], role)
-        shapes[ends[-1].child] = _sole(robot, leg, radii["tibia"])
+        for role, name, end in zip(_PARTS, leg.joints, ends, strict=True):
+            shapes[carried[name]] = _capsule(end, radii[role], role)
+        shapes[carried.get(leg.foot, leg.foot)] = _sole(robot, leg, radii["tibia"])
     return shapes
 
 
-def _radii(leg: LegGeometry) -> dict[Role, float]:
-    length = leg.coxa + leg.femur + leg.tibia
+def _radii(leg: LegKinematics) -> dict[Role, float]:
+    length = sum(leg.lengths)
     return {role: share * length for role, share in _THICKNESS.items()}
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal, cast
 from xml.etree import ElementTree as ET
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 SolidKind = Literal["box", "sphere", "cylinder", "capsule"]
+
+_NONE_HELD: Final[Mapping[str, float]] = MappingProxyType({})
 
 _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
     "box": ("size",),
@@ -68,6 +72,7 @@ class Joint:
         child: link that it carries.
         origin: of the child's frame in the parent's, at rest.
         axis: that it turns about in the child's frame, of unit length, (3,).
+        limits: least and largest position [rad]; infinite where there are none.
     """
 
     name: str
@@ -76,6 +81,7 @@ class Joint:
     child: str
     origin: Origin
     axis: Floats
+    limits: tuple[float, float]
 
     @property
     def fixed(self) -> bool:
@@ -156,7 +162,7 @@ class Urdf:
     """A URDF that has been read.
 
     Attributes:
-        text: of the file.
+        text: of the file; with held joints fixed and continuous ones revolute.
         links: by name, parents before their children, the robot's body first.
         joints: in the file's order.
         bodies: inertia of every rigid body in the frame of its first link, by this link's name, the
@@ -200,24 +206,27 @@ class Urdf:
         return sum(body.mass for body in self.bodies.values())
 
 
-def parse_urdf(text: str) -> Urdf:
+def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
     """Read a URDF.
 
     Args:
         text: Text of the file, by anybody.
+        held: Joints that are held and so are fixed, by name at which angle [rad].
 
     Returns:
         What it says.
 
     Raises:
         RobotFileError: It breaks a bound of `sim.robot.bounds`, is no XML, a number cannot be
-            read, or its links are not one tree.
+            read, its links are not one tree, or a held joint is not there or does not turn.
     """
     check_urdf(text)
     try:
         root = ET.fromstring(text)  # noqa: S314 - it has no entities of its own
     except ET.ParseError as error:
         raise RobotFileError(f"robot.urdf: {error}") from error
+    if _standardised(root, held):
+        text = ET.tostring(root, encoding="unicode")
     joints = tuple(_joint(element) for element in root.findall("joint"))
     links: dict[str, Link] = {}
     for element in root.findall("link"):
@@ -228,6 +237,54 @@ def parse_urdf(text: str) -> Urdf:
     in_order = {name: links[name] for name in _from_the_body(links, joints)}
     bodies, places = _rigid_bodies(in_order, joints)
     return Urdf(text, in_order, joints, bodies, places)
+
+
+def _standardised(root: ET.Element, held: Mapping[str, float]) -> bool:
+    """Fix joints that are held, let continuous ones be revolute; whether that changed anything."""
+    changed = False
+    missing = set(held)
+    for element in root.findall("joint"):
+        name, kind = element.get("name", ""), element.get("type", "")
+        if name in held:
+            missing.discard(name)
+            _hold(element, kind, held[name])
+        elif kind == "continuous":
+            # Pinocchio has two positions for a joint without ends.
+            element.set("type", "revolute")
+            for limit in element.findall("limit"):
+                element.remove(limit)
+            ends = {"lower": f"{-LARGEST:g}", "upper": f"{LARGEST:g}"}
+            ET.SubElement(element, "limit", ends | {"effort": "0", "velocity": "0"})
+        else:
+            continue
+        changed = True
+    if missing:
+        raise RobotFileError(f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}")
+    return changed
+
+
+def _hold(element: ET.Element, kind: str, angle: float) -> None:
+    """Let a joint be a fixed one, its frame turned by the angle."""
+    joint = _joint(element)
+    if kind not in ("revolute", "continuous", "fixed") and angle:
+        raise RobotFileError(
+            f"robot.toml: held_joints: joint {joint.name!r} is {kind} and does not turn; hold it"
+            " at 0"
+        )
+    if angle and kind != "fixed":
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+        turned = Rotation.from_matrix(joint.origin.matrix())
+        turned = turned * Rotation.from_rotvec(angle * joint.axis)
+        xyz, rpy = joint.origin.xyz.tolist(), turned.as_euler("xyz").tolist()
+        for origin in element.findall("origin"):
+            element.remove(origin)
+        numbers = {"xyz": xyz, "rpy": rpy}
+        ET.SubElement(element, "origin", {k: " ".join(map(repr, v)) for k, v in numbers.items()})
+    element.set("type", "fixed")
+    for part in ("axis", "limit", "mimic", "dynamics"):
+        for child in element.findall(part):
+            element.remove(child)
 
 
 def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterator[str]:
@@ -299,7 +356,22 @@ def _joint(element: ET.Element) -> Joint:
     kind = element.get("type", "")
     if length == 0.0 and kind != "fixed":
         raise RobotFileError(f"robot.urdf: {whose}: its axis has no direction")
-    return Joint(name, kind, parent, child, _origin(element, whose), axis / (length or 1.0))
+    origin = _origin(element, whose)
+    return Joint(
+        name, kind, parent, child, origin, axis / (length or 1.0), _limits(element, kind, whose)
+    )
+
+
+def _limits(joint: ET.Element, kind: str, whose: str) -> tuple[float, float]:
+    limit = joint.find("limit")
+    if kind == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
+        return -math.inf, math.inf
+    lower, upper = (float(_numbers(limit, end, whose, "0")[0]) for end in ("lower", "upper"))
+    if lower > upper:
+        raise RobotFileError(
+            f"robot.urdf: {whose}: its lower limit {lower:g} lies above the upper one {upper:g}"
+        )
+    return lower, upper
 
 
 def _inertia(link: ET.Element, whose: str) -> BodyInertia:

@@ -137,7 +137,7 @@ def test_a_leg_without_its_joints_is_named(
 ) -> None:
     folder = edited(tmp_path, "robot.toml", "left_rear", "tail")
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
-    assert "leg 'tail' has no joint or frame 'tail_coxa'" in capsys.readouterr().err
+    assert "leg 'tail' has no joint 'tail_coxa'" in capsys.readouterr().err
 
 
 def test_a_leg_joint_with_a_turned_frame_is_named(
@@ -146,4 +146,4 @@ def test_a_leg_joint_with_a_turned_frame_is_named(
     turned = '<origin rpy="0 0 0.5" xyz='
     folder = edited(tmp_path, "robot.urdf", "<origin xyz=", turned)
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
-    assert "rpy '0 0 0.5' turns its frame" in capsys.readouterr().err
+    assert "its frame is turned against the body's; give leg" in capsys.readouterr().err

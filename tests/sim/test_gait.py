@@ -50,7 +50,7 @@ def test_inverse_kinematics_is_undone_by_pinocchios_forward_kinematics(
     robot = load_robot("szabadka2")
     geometry = robot.legs[leg]
     angles, miss = leg_angles(
-        geometry, np.array([forward]), np.array([lateral]), np.array([vertical])
+        geometry.lengths, np.array([forward]), np.array([lateral]), np.array([vertical])
     )
     assert miss[0] == 0.0
     assert angles[0, 2] < 0.0, "knee up: the tibia bends down from the femur"
@@ -66,8 +66,8 @@ def test_inverse_kinematics_is_undone_by_pinocchios_forward_kinematics(
 
 
 def test_a_target_out_of_reach_is_missed_by_its_distance(robot: Robot) -> None:
-    leg = robot.legs[0]
-    _, miss = leg_angles(leg, np.zeros(2), np.full(2, leg.coxa), np.array([-0.25, -0.03]))
+    lengths = robot.legs[0].lengths
+    _, miss = leg_angles(lengths, np.zeros(2), np.full(2, lengths[0]), np.array([-0.25, -0.03]))
     np.testing.assert_allclose(miss, [0.05, 0.01])
 
 
@@ -231,7 +231,7 @@ def angles_of_one_leg(robot: Robot, scenario: Scenario, leg: int) -> np.ndarray:
     )
     lateral = np.full_like(forward, scenario.radius - abs(geometry.hip[1]))
     vertical = lift - (scenario.hip_height - robot.planned_soles()[leg])
-    return np.round(leg_angles(geometry, forward, lateral, vertical)[0], 12)
+    return np.round(leg_angles(geometry.lengths, forward, lateral, vertical)[0], 12)
 
 
 def test_scenarios_and_robots_whose_legs_move_alike_share_a_trajectory(robot: Robot) -> None:

@@ -71,7 +71,7 @@ def test_a_foot_is_where_its_tibia_ends(robot: Robot, log: WalkLog) -> None:
     names = [link.name for link in shown.links]
     for k, leg in enumerate(robot.legs):
         tibia = shown.link_pose[:, names.index(f"{leg.name}_tibia_link")]
-        end = tibia[:, :3] + rotated(tibia[:, 3:], np.array([0.0, leg.side * leg.tibia, 0.0]))
+        end = tibia[:, :3] + rotated(tibia[:, 3:], np.array([0.0, leg.side * leg.lengths[2], 0.0]))
         np.testing.assert_allclose(shown.foot_position[:, k], end, atol=1e-12)
         foot = shown.link_pose[:, names.index(f"{leg.name}_foot"), :3]
         np.testing.assert_allclose(shown.foot_position[:, k], foot, atol=1e-15)

@@ -1,0 +1,123 @@
+"""A leg's joints in a URDF: a chain of three that turn, from the body to a foot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RobotFileError
+from sim.robot.description import Leg
+from sim.robot.inertia import BodyInertia
+from sim.robot.urdf import Urdf
+
+Floats = NDArray[np.float64]
+
+_NAMED: Final = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where a joint is, by any reader of a URDF.
+
+    Attributes:
+        axis: of the joint, (3,).
+        rotation: in the frame before it, (3, 3).
+        offset: in the frame before it, (3,) [m].
+        inertia: of the link behind it.
+    """
+
+    axis: Floats
+    rotation: Floats
+    offset: Floats
+    inertia: BodyInertia
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """A leg's joints and its foot.
+
+    Attributes:
+        placements: of the joints, from the body on.
+        foot: in the last link's frame, (3,) [m].
+        limits: least and largest angle of each joint, (3, 2) [rad].
+    """
+
+    placements: tuple[Placement, ...]
+    foot: Floats
+    limits: Floats
+
+
+def chain_of(urdf: Urdf, leg: Leg) -> Chain:
+    """Find a leg in a URDF.
+
+    Args:
+        urdf: Of the robot.
+        leg: Its description.
+
+    Returns:
+        The leg's joints.
+
+    Raises:
+        RobotFileError: A joint or the foot is not there, a joint is not revolute, or they are not a
+            chain from the body to the foot.
+    """
+    named = {joint.name: joint for joint in urdf.joints}
+    before, placements, limits = next(iter(urdf.links)), [], []
+    for name in leg.joints:
+        joint = named.get(name)
+        if joint is None:
+            raise RobotFileError(f"robot.urdf: leg {leg.name!r} has no joint {name!r}")
+        if joint.kind != "revolute":
+            raise RobotFileError(
+                f"robot.urdf: joint {name!r} of leg {leg.name!r} is not revolute but"
+                f" {joint.kind}; a leg has three joints that turn"
+            )
+        parent = urdf.place(joint.parent)
+        if parent.body != before:
+            raise RobotFileError(
+                f"robot.urdf: leg {leg.name!r}: joint {name!r} comes before its parent, or another"
+                " movable joint lies between them; list three joints, from the body to the foot"
+            )
+        placements.append(
+            Placement(
+                joint.axis,
+                parent.rotation @ joint.origin.matrix(),
+                parent.rotation @ joint.origin.xyz + parent.position,
+                urdf.bodies[joint.child],
+            )
+        )
+        limits.append(joint.limits)
+        before = joint.child
+    foot = urdf.place(leg.foot)
+    if foot.body != before:
+        raise RobotFileError(
+            f"robot.urdf: foot {leg.foot!r} is not on the last link of leg {leg.name!r}"
+        )
+    return Chain(tuple(placements), foot.position, np.array(limits))
+
+
+def check_joints(urdf: Urdf, legs: tuple[Leg, ...]) -> None:
+    """Check that every movable joint belongs to one leg.
+
+    Args:
+        urdf: Of the robot, its held joints fixed.
+        legs: The robot's.
+
+    Raises:
+        RobotFileError: A joint belongs to none or to two; says what to do with it.
+    """
+    owned = [name for leg in legs for name in leg.joints]
+    twice = sorted({name for name in owned if owned.count(name) > 1})
+    if twice:
+        raise RobotFileError(f"robot.toml: joint {twice[0]!r} belongs to more than one leg")
+    others = [joint.name for joint in urdf.joints if not joint.fixed and joint.name not in owned]
+    if others:
+        more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+        raise RobotFileError(
+            "robot.urdf: these movable joints belong to no leg:"
+            f" {', '.join(map(repr, others[:_NAMED]))}{more}; name them under [held_joints] of"
+            " robot.toml, each with the angle [rad] at which it is held"
+        )

@@ -19,6 +19,7 @@ from api.middleware import (
     RequestIdMiddleware,
     SecurityHeadersMiddleware,
 )
+from api.monitoring import MetricsMiddleware, add_metrics
 from api.origin import HostMiddleware, SameOriginMiddleware, names_of_server
 from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
@@ -38,6 +39,9 @@ from api.routes import (
     tournaments,
 )
 from gaitswarm.settings import Settings
+from services.monitoring.collectors import QueueCollector
+from services.monitoring.exposition import MetricsAccess
+from services.monitoring.metrics import Metrics
 from services.optimizer.service import JobService
 
 # Event streams must not wait for a full block. Numbers in binary hardly become shorter, and
@@ -56,6 +60,7 @@ def create_app(
     settings: Settings,
     page_folder: Path = FOLDER,
     runs_jobs: Callable[[], bool] | None = None,
+    metrics: Metrics | None = None,
 ) -> FastAPI:
     """The application around a service: routes, problems, limits, documentation, page.
 
@@ -66,10 +71,14 @@ def create_app(
         settings: limits and intervals.
         page_folder: of the built page; there need be none.
         runs_jobs: whether the runner beside it still claims jobs; None if other processes run them.
+        metrics: of the process, which the application adds its own and the database's to; None:
+            there are no others.
 
     Returns:
         The application, for `ApiServer` or any other ASGI server with lifespans.
     """
+    metrics = metrics or Metrics()
+    metrics.registry.register(QueueCollector(lambda: service.store))
     # The documentation's scripts come with the package: /docs works without the internet.
     app = FastAPIOffline(
         docs_url=None,
@@ -81,7 +90,7 @@ def create_app(
         description=DESCRIPTION,
         openapi_tags=TAGS,
         separate_input_output_schemas=False,
-        lifespan=lifespan(service, settings, runs_jobs),
+        lifespan=lifespan(service, settings, runs_jobs, metrics),
     )
     for module in (
         jobs,
@@ -100,6 +109,8 @@ def create_app(
     ):
         app.include_router(module.router)
     health.add_short_paths(app)
+    access = MetricsAccess(lambda: service.store.tokens, required=settings.tokens_required)
+    add_metrics(app, metrics, access)
     add_documentation(app)
     add_page(app, page_folder)
     add_problem_handlers(app)
@@ -114,6 +125,7 @@ def create_app(
     app.add_middleware(SameOriginMiddleware, allowed=allowed)
     app.add_middleware(HostMiddleware, names=names_of_server(settings.api_host, allowed))
     app.add_middleware(RequestIdMiddleware)
+    app.add_middleware(MetricsMiddleware, metrics=metrics)
     # The outermost: an answer to a bug has the headers too.
     app.add_middleware(SecurityHeadersMiddleware)
     return app

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from api.topics import Topics
 from gaitswarm.settings import Settings
+from services.monitoring.metrics import Metrics
 from services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
@@ -63,7 +64,7 @@ class State(TypedDict):
 
     validations: threads that validate bodies. stopping: set by the server when it begins to stop;
     event streams end then. topics: jobs that these streams follow. runs_jobs: whether the runner
-    beside it still claims jobs; None if there is none.
+    beside it still claims jobs; None if there is none. metrics: of this process.
     """
 
     service: JobService
@@ -73,10 +74,14 @@ class State(TypedDict):
     stopping: asyncio.Event
     topics: Topics
     runs_jobs: Callable[[], bool] | None
+    metrics: Metrics
 
 
 def lifespan(
-    service: JobService, settings: Settings, runs_jobs: Callable[[], bool] | None = None
+    service: JobService,
+    settings: Settings,
+    runs_jobs: Callable[[], bool] | None,
+    metrics: Metrics,
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
     """The lifespan of an application around a service.
 
@@ -84,6 +89,7 @@ def lifespan(
         service: answers the requests; its store stays its owner's to close.
         settings: of the application.
         runs_jobs: whether the runner beside it still claims jobs; None if there is none.
+        metrics: of this process.
 
     Returns:
         The context manager that FastAPI enters in the server's event loop.
@@ -102,6 +108,7 @@ def lifespan(
             stopping=stopping,
             topics=topics,
             runs_jobs=runs_jobs,
+            metrics=metrics,
         )
         waking.cancel()
 
@@ -153,11 +160,21 @@ async def topics(request: Request) -> Topics:
     return cast(Topics, request.state.topics)
 
 
+async def metrics(request: Request) -> Metrics:
+    """What this process tells monitoring systems.
+
+    Args:
+        request: under way.
+    """
+    return cast(Metrics, request.state.metrics)
+
+
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, Depends(settings)]
 Slots = Annotated[SimulationSlots, Depends(slots)]
 Stopping = Annotated[asyncio.Event, Depends(stopping)]
 FollowedJobs = Annotated[Topics, Depends(topics)]
+ServerMetrics = Annotated[Metrics, Depends(metrics)]
 
 LARGEST_INDEX: Final = 2**31 - 1
 """Of an iteration, as the database's integers have it."""

@@ -77,6 +77,14 @@ class Settings(BaseSettings):
         description="A job with which so many runner processes in a row went down fails.",
     )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
+    metrics_port: int | None = Field(
+        default=None,
+        ge=0,
+        le=65535,
+        description="Port on which a runner serves its metrics; 0 takes a free one, none: it does"
+        " not.",
+    )
+    metrics_host: str = Field(default="127.0.0.1", description="Address of that port.")
     api_host: str = Field(default="127.0.0.1", description="Address to listen on.")
     api_port: int = Field(
         default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one."
@@ -129,6 +137,11 @@ class Settings(BaseSettings):
     def tokens_required(self) -> bool:
         """Whether the server answers only those who send a token."""
         return self.api_access == "token" or not _is_loopback(self.api_host)
+
+    @property
+    def metrics_need_token(self) -> bool:
+        """Whether a runner's metrics are only for those who send a token."""
+        return self.api_access == "token" or not _is_loopback(self.metrics_host)
 
     @property
     def database(self) -> str:

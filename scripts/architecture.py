@@ -24,6 +24,7 @@ ROWS: Final = (
     ("cli", "api"),
     ("gaitswarm",),
     ("services.runtime",),
+    ("services.monitoring",),
     ("services.worker", "services.optimizer.service"),
     ("services.optimizer.run", "services.optimizer.analysis"),
     ("services.optimizer.store",),

@@ -9,18 +9,22 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
 from services.optimizer.service import JobService
+from services.optimizer.store.base import Store
 from services.optimizer.store.sql_store import open_store
 from services.worker import EvaluatorKind
 from services.worker.hybrid import HybridEvaluator
 from services.worker.in_process import InProcessEvaluator
 from services.worker.ray_evaluator import RayEvaluator
+
+if TYPE_CHECKING:
+    from services.monitoring.metrics import Metrics
 
 
 def open_evaluator(
@@ -29,7 +33,7 @@ def open_evaluator(
     address: str | None = None,
     cpus: int | None = None,
     should_stop: Callable[[], bool] = lambda: False,
-) -> Evaluator:
+) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
     """Open workers for walks.
 
     Args:
@@ -83,6 +87,7 @@ def open_runtime(
     quarantine_after: int = QUARANTINE_AFTER,
     longest_job: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
+    metrics: Metrics | None = None,
 ) -> Iterator[Runtime]:
     """Open a database and run its queued jobs until the block is left; then close all.
 
@@ -98,6 +103,7 @@ def open_runtime(
         quarantine_after: A job with which so many runner processes in a row went down fails.
         longest_job: Simulated time of all walks of all designs that a new job may have [s].
         should_stop: As for `open_evaluator`.
+        metrics: Are told what store, runner and workers do; None: nobody asks.
 
     Yields:
         What was opened.
@@ -108,14 +114,22 @@ def open_runtime(
         EvaluationStopped: `should_stop` said so.
     """
     with ExitStack() as stack:
-        store = open_store(database)
+        store: Store = open_store(database)
         stack.callback(store.close)
+        if metrics is not None:
+            from services.monitoring.measured_store import measured  # noqa: PLC0415
+
+            store = measured(store, metrics)
         service = JobService(store, longest_job=longest_job)
         if evaluator is None:
             yield Runtime(service, None, None)
             return
         workers = open_evaluator(evaluator, address=ray_address, cpus=cpus, should_stop=should_stop)
         stack.callback(workers.close)
+        if metrics is not None:
+            from services.monitoring.collectors import WorkersCollector  # noqa: PLC0415
+
+            metrics.registry.register(WorkersCollector(lambda: workers.loads))
         runner = Runner(
             store,
             workers,

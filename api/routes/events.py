@@ -15,6 +15,7 @@ from api.dependencies import (
     AfterIteration,
     ExistingJob,
     FollowedJobs,
+    ServerMetrics,
     ServerSettings,
     Service,
     Stopping,
@@ -60,6 +61,7 @@ async def stream_events(
     settings: ServerSettings,
     topics: FollowedJobs,
     stopping: Stopping,
+    metrics: ServerMetrics,
     last_event_id: Annotated[
         int | None,
         Header(
@@ -89,7 +91,10 @@ async def stream_events(
     """
     start = after if last_event_id is None else last_event_id
     poll_seconds = settings.api_event_poll_seconds
-    with topics.follow(service, job.id, poll_seconds=poll_seconds) as topic:
+    with (
+        topics.follow(service, job.id, poll_seconds=poll_seconds) as topic,
+        metrics.open_stream() as stream,
+    ):
         events = _events(
             topic,
             after=start,
@@ -99,6 +104,8 @@ async def stream_events(
             pause_seconds=poll_seconds,
         )
         async for event in events:
+            if isinstance(event.data, IterationView):
+                stream.sent(event.data.committed_at)
             yield event
 
 

@@ -68,7 +68,14 @@ class Unauthorized(Forbidden):
 
 
 class LeaseLost(GaitswarmError):
-    """The job belongs to another runner now, or was cancelled."""
+    """The job belongs to another runner now, or was cancelled.
+
+    taken_over: another runner has claimed the job since.
+    """
+
+    def __init__(self, message: str, *, taken_over: bool = False) -> None:
+        self.taken_over = taken_over
+        super().__init__(message)
 
 
 class KilledWorker(GaitswarmError):

@@ -101,6 +101,21 @@ class Work:
         return Task.of(request.cases, request.designs, self.chunk.parts, request.provenance)
 
 
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What workers have to do.
+
+    Attributes:
+        slots: Tasks that can run at the same time.
+        used: Slots that have a task.
+        waiting: Tasks that wait for a slot.
+    """
+
+    slots: int = 0
+    used: int = 0
+    waiting: int = 0
+
+
 @dataclass(slots=True, eq=False)
 class Dispatcher:
     """Hands the chunks of all requests to whoever takes them, and puts results where they belong.
@@ -262,6 +277,16 @@ class Dispatcher:
             self._settled(work)
             if work.batch.awaits(work.chunk):
                 self._end(work.batch, error)
+
+    @property
+    def load(self) -> Load:
+        """What there is to do now; nothing, without slots, once it is closed."""
+        with self._changed:
+            if self.closed:
+                return Load()
+            # Some are at hand beside those that run, so that a slot need not wait for its next.
+            used = min(len(self._out), self.slots)
+            return Load(self.slots, used, len(self._queue) + len(self._out) - used)
 
     @property
     def closed(self) -> bool:

@@ -10,6 +10,7 @@ from typing import Final
 
 from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
 from services.optimizer.run.evaluator import EvaluationRequest
+from services.worker.dispatch import Load
 from services.worker.in_process import InProcessEvaluator
 from services.worker.preparation import KernelBuilder
 from services.worker.ray_evaluator import RayEvaluator
@@ -58,6 +59,12 @@ class HybridEvaluator:
     def slots(self) -> int:
         """Chunks that run at the same time, in threads as on Ray."""
         return self._threads.slots
+
+    @property
+    def loads(self) -> dict[str, Load]:
+        """What the threads have to do, and Ray if it was started."""
+        ray = self._ray
+        return self._threads.loads | (ray.loads if ray is not None else {})
 
     @property
     def on_ray(self) -> bool:

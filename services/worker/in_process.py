@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 
 from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.dispatch import Dispatcher, Work
+from services.worker.dispatch import Dispatcher, Load, Work
 from services.worker.preparation import KernelBuilder
 from services.worker.tasks import TaskTotals
 from sim import simulate
@@ -52,6 +52,11 @@ class InProcessEvaluator:
     def totals(self) -> TaskTotals:
         """Of all tasks so far."""
         return self._dispatcher.totals
+
+    @property
+    def loads(self) -> dict[str, Load]:
+        """What the threads have to do."""
+        return {"threads": self._dispatcher.load}
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from services.worker.dispatch import Dispatcher, Work
+from services.worker.dispatch import Dispatcher, Load, Work
 from services.worker.preparation import KernelBuilder, awaited
 from services.worker.ray_session import RaySession, open_ray
 from services.worker.tasks import Failure, TaskTotals, run_in_worker, warm_up
@@ -70,6 +70,13 @@ class RayEvaluator:
     def totals(self) -> TaskTotals:
         """Of all tasks since the cluster was opened; waits until it is."""
         return self._link.opened.result().totals
+
+    @property
+    def loads(self) -> dict[str, Load]:
+        """What the cluster has to do; no slots while it is not open."""
+        opened = self._link.opened
+        is_open = opened.done() and opened.exception() is None
+        return {"ray": opened.result().load if is_open else Load()}
 
     @property
     def lost(self) -> bool:

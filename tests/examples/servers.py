@@ -18,6 +18,7 @@ from api import dependencies
 from api.app import create_app
 from api.server import ApiServer
 from gaitswarm.settings import Settings
+from services.monitoring.metrics import Metrics
 from services.optimizer.service import JobService
 from tests.examples.processes import COMMAND_LINE, line_with, output, start_python
 
@@ -59,12 +60,17 @@ class Server(Served):
         *,
         page_folder: Path = Path("none"),
         runs_jobs: Callable[[], bool] | None = None,
+        metrics: Metrics | None = None,
         **settings: Any,
     ) -> None:
         assert set(settings) <= set(Settings.model_fields)
         values = Settings(**{"api_event_poll_seconds": 0.02, **settings})
         self.app = create_app(
-            cast(JobService, service), settings=values, page_folder=page_folder, runs_jobs=runs_jobs
+            cast(JobService, service),
+            settings=values,
+            page_folder=page_folder,
+            runs_jobs=runs_jobs,
+            metrics=metrics,
         )
         self._server = ApiServer(
             self.app,

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from gaitswarm.settings import Settings
+    from services.monitoring.metrics import Metrics
+    from services.optimizer.access import Tokens
     from services.runtime import Runtime
 
 
@@ -56,14 +58,18 @@ def serve(
         from api.server import ApiServer
         from cli.output import log_to_stderr, note
         from gaitswarm.settings import read_settings
+        from services.monitoring.metrics import Metrics
         from services.optimizer.errors import EvaluatorUnavailable
 
         settings = read_settings(**asdict(options), api_host=host, api_port=port)
         log_to_stderr(settings.log_level)
-        with _runtime(settings, runs_jobs=not no_runner) as opened:
+        metrics = Metrics()
+        with _runtime(settings, metrics, runs_jobs=not no_runner) as opened:
             beside = opened.runner
             runs_jobs = None if beside is None else lambda: beside.running
-            app = create_app(opened.service, settings=settings, runs_jobs=runs_jobs)
+            app = create_app(
+                opened.service, settings=settings, runs_jobs=runs_jobs, metrics=metrics
+            )
             try:
                 server = ApiServer(
                     app,
@@ -105,14 +111,22 @@ def runner(options: RunnerOptions) -> None:
     log_to_stderr(settings.log_level)
     log = logging.getLogger(__name__)
     stop = threading.Event()
+    metrics = None
+    if settings.metrics_port is not None:
+        from services.monitoring.metrics import Metrics
+
+        metrics = Metrics()
     # A stop while a cluster is connected ends the command before it is ready.
     with (
         suppress(EvaluationStopped),
         stop_on_signals(stop),
-        _runtime(settings, should_stop=stop.is_set) as opened,
+        _runtime(settings, metrics, should_stop=stop.is_set) as opened,
+        _served(metrics, settings, lambda: opened.service.store.tokens) as url,
     ):
         slots = opened.evaluator.slots if opened.evaluator else 0
         log.info("ready: %d slots, %d jobs at once", slots, settings.concurrent_jobs)
+        if url is not None:
+            log.info("metrics: %s", url)
         stop.wait()
         log.info("stopping: jobs under way go back to the queue")
 
@@ -144,6 +158,7 @@ def _without_collection() -> Iterator[None]:
 
 def _runtime(
     settings: Settings,
+    metrics: Metrics | None,
     *,
     runs_jobs: bool = True,
     should_stop: Callable[[], bool] = lambda: False,
@@ -162,4 +177,21 @@ def _runtime(
         cache=settings.cache,
         longest_job=settings.api_max_job_seconds,
         should_stop=should_stop,
+        metrics=metrics,
     )
+
+
+@contextmanager
+def _served(
+    metrics: Metrics | None, settings: Settings, tokens: Callable[[], Tokens]
+) -> Iterator[str | None]:
+    """A runner's metrics, on the port of the settings; their URL, None without a port."""
+    if metrics is None or settings.metrics_port is None:
+        yield None
+        return
+    from services.monitoring.exposition import MetricsAccess, metrics_server
+
+    access = MetricsAccess(tokens, required=settings.metrics_need_token)
+    host, port = settings.metrics_host, settings.metrics_port
+    with metrics_server(metrics, access, host=host, port=port) as url:
+        yield url

@@ -271,6 +271,7 @@ class Claim:
             its budget was spent.
         recordings: those that the job's spec names, by id.
         answered: the last committed one, where there is no other to go on with.
+        taken_from: name of the runner whose lease had run out; None for a job that was queued.
     """
 
     job: Job
@@ -279,3 +280,4 @@ class Claim:
     ask: Ask | None
     recordings: Recordings = field(default_factory=dict)
     answered: Answered | None = None
+    taken_from: str | None = None

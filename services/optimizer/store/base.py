@@ -11,7 +11,7 @@ from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.reading import Changes, CommittedHistory, Page
+from services.optimizer.store.reading import Changes, CommittedHistory, Page, Queue
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
@@ -122,6 +122,13 @@ class Store(CommittedHistory, Protocol):
 
         Raises:
             InvalidRequest: `after` is no cursor of this order, or `limit` is less than 1.
+        """
+
+    def queue(self) -> Queue:
+        """Count the jobs, for those who watch over the service.
+
+        Returns:
+            The counts, all of one moment on SQLite.
         """
 
     def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:

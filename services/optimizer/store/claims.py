@@ -144,7 +144,8 @@ def take_job(
         "crashes": crashes or None,
     }
     job = to_job(update_job(connection, row, changes))
-    return Claim(job, runner, token, work.ask, work.recordings, work.answered)
+    taken_from = row["lease_owner"]
+    return Claim(job, runner, token, work.ask, work.recordings, work.answered, taken_from)
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +206,10 @@ def held(connection: Connection, claim: Claim) -> Row:
         return row
     owner = row["lease_owner"]
     now = f"held by {owner}" if owner is not None else f"{row['state']} and held by nobody"
-    raise LeaseLost(f"{claim.runner} has lost job {claim.job.id}: it is {now}")
+    raise LeaseLost(
+        f"{claim.runner} has lost job {claim.job.id}: it is {now}",
+        taken_over=row["lease_token"] != claim.token,
+    )
 
 
 def require_budget_of(claim: Claim, row: Row) -> None:

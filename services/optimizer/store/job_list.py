@@ -189,7 +189,7 @@ def sort_jobs(
     """
     query = _entries(connection).where(*among)
     if kind is not None:
-        query = query.where(_field(connection, "kind") == kind)
+        query = query.where(spec_field(connection, "kind") == kind)
     wanted = search.casefold()
     found = [
         entry
@@ -206,11 +206,19 @@ def sort_jobs(
 
 def _entries(connection: Connection) -> Select[tuple[str, datetime, str, float | None]]:
     """A row of what `_Entry` holds for every job."""
-    return select(jobs.c.id, jobs.c.created_at, _field(connection, "name"), jobs.c.best_fitness)
+    return select(jobs.c.id, jobs.c.created_at, spec_field(connection, "name"), jobs.c.best_fitness)
 
 
-def _field(connection: Connection, name: str) -> ColumnElement[str]:
-    """A text of a job's spec; "" where the spec has none of this name, or is no JSON."""
+def spec_field(connection: Connection, name: str) -> ColumnElement[str]:
+    """Select a text of a job's spec.
+
+    Args:
+        connection: Tells the dialect.
+        name: Of a field of the spec.
+
+    Returns:
+        The text; "" where the spec has none of this name, or is no JSON.
+    """
     document = cast(jobs.c.spec, Text)
     if connection.dialect.name == "sqlite":
         # It keeps any text, and fails at a path into one that is not JSON.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
+from services.optimizer.jobs.job import JobState
 
 T = TypeVar("T")
 
@@ -48,6 +49,22 @@ class Changes(Protocol):
         Returns:
             The block in which the function is called.
         """
+
+
+@dataclass(frozen=True, slots=True)
+class Queue:
+    """How many jobs there are, and how long they wait.
+
+    Attributes:
+        jobs: Number of jobs by state, of all states.
+        under_way: Number of jobs that have not ended, by state and kind.
+        longest_wait: Since when the job that waits longest for a runner is queued [s]; 0 if none
+            waits.
+    """
+
+    jobs: Mapping[JobState, int]
+    under_way: Mapping[tuple[JobState, str], int]
+    longest_wait: float
 
 
 class CommittedHistory(Protocol):

@@ -59,7 +59,8 @@ from services.optimizer.store.job_list import (
 )
 from services.optimizer.store.job_rows import request_digest, storable, to_job
 from services.optimizer.store.migrate import create
-from services.optimizer.store.reading import Page
+from services.optimizer.store.queue import count_jobs
+from services.optimizer.store.reading import Page, Queue
 from services.optimizer.store.recordings import (
     insert_recording,
     load_recordings,
@@ -218,6 +219,11 @@ class SqlStore(SqlHistory):
         found = tuple(to_job(row) for row in rows[:limit])
         more = len(rows) > limit
         return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
+
+    def queue(self) -> Queue:
+        """Count the jobs."""
+        with self._database.transaction(write=False) as connection:
+            return count_jobs(connection, self._clock(connection))
 
     def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
         """Apply a command of a user, or refuse it."""

@@ -1,0 +1,113 @@
+"""Metrics that are looked up when somebody asks: the queue in the database, the workers' load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Protocol
+
+from prometheus_client.metrics_core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.store.base import Store
+
+
+class QueueCollector(Collector):
+    """Jobs of a database, counted anew whenever metrics are asked for.
+
+    While the database is away, the counts are missing and `gaitswarm_database_up` is 0.
+
+    Args:
+        store: Gives the store; called for every answer.
+    """
+
+    def __init__(self, store: Callable[[], Store]) -> None:
+        self._store = store
+
+    def describe(self) -> list[Metric]:
+        """Nothing: to register a collector needs no database.
+
+        Returns:
+            No metric.
+        """
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """Count the jobs.
+
+        Yields:
+            The metrics.
+        """
+        up = GaugeMetricFamily("gaitswarm_database_up", "Whether the database answers: 1 or 0")
+        try:
+            queue = self._store().queue()
+        except StoreUnavailable:
+            up.add_metric([], 0)
+            yield up
+            return
+        up.add_metric([], 1)
+        yield up
+        by_state = GaugeMetricFamily("gaitswarm_jobs", "Jobs in the database", labels=["state"])
+        for state, count in queue.jobs.items():
+            by_state.add_metric([state], count)
+        yield by_state
+        by_kind = GaugeMetricFamily(
+            "gaitswarm_queue_jobs", "Jobs that have not ended", labels=["state", "kind"]
+        )
+        for (state, kind), count in queue.under_way.items():
+            by_kind.add_metric([state, kind], count)
+        yield by_kind
+        wait = GaugeMetricFamily(
+            "gaitswarm_queue_longest_wait_seconds",
+            "Since when the job that waits longest for a runner is queued",
+        )
+        wait.add_metric([], queue.longest_wait)
+        yield wait
+
+
+class WorkerLoad(Protocol):
+    """What the workers of one kind have to do."""
+
+    @property
+    def slots(self) -> int:
+        """Tasks that can run at the same time."""
+
+    @property
+    def used(self) -> int:
+        """Slots that have a task."""
+
+    @property
+    def waiting(self) -> int:
+        """Tasks that wait for a slot."""
+
+
+class WorkersCollector(Collector):
+    """Slots and queues of the workers, as they are when metrics are asked for.
+
+    Args:
+        loads: Gives the load by kind of workers: `threads`, `ray`.
+    """
+
+    def __init__(self, loads: Callable[[], Mapping[str, WorkerLoad]]) -> None:
+        self._loads = loads
+
+    def collect(self) -> Iterator[Metric]:
+        """Look at the workers.
+
+        Yields:
+            The metrics.
+        """
+        slots = GaugeMetricFamily(
+            "gaitswarm_worker_slots", "Tasks that can run at the same time", labels=["workers"]
+        )
+        used = GaugeMetricFamily(
+            "gaitswarm_worker_slots_used", "Slots that have a task", labels=["workers"]
+        )
+        waiting = GaugeMetricFamily(
+            "gaitswarm_worker_tasks_waiting", "Tasks that wait for a slot", labels=["workers"]
+        )
+        for name, load in self._loads().items():
+            slots.add_metric([name], load.slots)
+            used.add_metric([name], load.used)
+            waiting.add_metric([name], load.waiting)
+        yield from (slots, used, waiting)

@@ -1,0 +1,157 @@
+"""Where metrics are served: who may read them, and the port of a process without an API."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from socket import AF_INET6
+from socketserver import ThreadingMixIn
+from threading import Thread
+from typing import Any, Final
+from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
+
+from services.monitoring.metrics import Metrics
+from services.optimizer.access import Tokens, secret_digest
+from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
+
+_REMEMBERED_SECONDS: Final = 5.0
+_MOST_REMEMBERED: Final = 64
+
+REFUSAL: Final = (
+    "metrics need a token here: let Prometheus send one of scope `read` as `Authorization: Bearer"
+    " TOKEN`; `gaitswarm token create NAME --scope read` makes one"
+)
+
+
+class MetricsAccess:
+    """Whether whoever asks may read metrics. Thread-safe.
+
+    While the database is away, a token that was valid when it was last looked up still is: metrics
+    are needed most then.
+
+    Args:
+        tokens: Gives the memory of tokens; called only for a request with a token.
+        required: Whether requests without a token are refused.
+        clock: Monotonic time [s].
+    """
+
+    def __init__(
+        self,
+        tokens: Callable[[], Tokens],
+        *,
+        required: bool,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._tokens = tokens
+        self._required = required
+        self._clock = clock
+        self._looked_up: dict[str, float] = {}
+
+    def allows(self, authorization: str) -> bool:
+        """Look a request's token up. Every token may read.
+
+        Args:
+            authorization: The header of the request, "" where it has none.
+
+        Returns:
+            False for a token that is unknown or was revoked, and for none where one is required.
+
+        Raises:
+            StoreUnavailable: The token cannot be looked up, and was not known before.
+        """
+        scheme, _, secret = authorization.partition(" ")
+        if scheme.lower() != "bearer":
+            return not self._required
+        digest, now = secret_digest(secret.strip()), self._clock()
+        seen = self._looked_up.get(digest)
+        if seen is not None and now - seen < _REMEMBERED_SECONDS:
+            return True
+        try:
+            valid = self._tokens().find(secret.strip()) is not None
+        except StoreUnavailable:
+            if seen is None:
+                raise
+            return True
+        self._looked_up.pop(digest, None)
+        if valid:
+            if len(self._looked_up) >= _MOST_REMEMBERED:
+                self._looked_up.clear()
+            self._looked_up[digest] = now
+        return valid
+
+
+@contextmanager
+def metrics_server(
+    metrics: Metrics, access: MetricsAccess, *, host: str, port: int
+) -> Iterator[str]:
+    """Serve metrics on a port of their own inside the block.
+
+    Args:
+        metrics: What is served, on the path /metrics.
+        access: Who may read them.
+        host: Address to listen on.
+        port: 0 takes a free one.
+
+    Yields:
+        URL of the metrics.
+
+    Raises:
+        EvaluatorUnavailable: The address cannot be bound.
+    """
+
+    def answer(environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
+        def plain(status: HTTPStatus, text: str, *headers: tuple[str, str]) -> Iterable[bytes]:
+            media_type = ("Content-Type", "text/plain; charset=utf-8")
+            start(f"{status.value} {status.phrase}", [media_type, *headers])
+            return [text.encode()]
+
+        if environ.get("PATH_INFO") != "/metrics" or environ["REQUEST_METHOD"] != "GET":
+            return plain(HTTPStatus.NOT_FOUND, "there is only GET /metrics here\n")
+        try:
+            allowed = access.allows(environ.get("HTTP_AUTHORIZATION", ""))
+        except StoreUnavailable as error:
+            return plain(HTTPStatus.SERVICE_UNAVAILABLE, f"{error}\n")
+        if not allowed:
+            return plain(HTTPStatus.UNAUTHORIZED, f"{REFUSAL}\n", ("WWW-Authenticate", "Bearer"))
+        text, media_type = metrics.exposition(environ.get("HTTP_ACCEPT", ""))
+        start("200 OK", [("Content-Type", media_type)])
+        return [text]
+
+    try:
+        server = make_server(
+            host, port, answer, _ServerOnIpv6 if ":" in host else _Server, handler_class=_Silent
+        )
+    except OSError as error:
+        raise EvaluatorUnavailable(
+            f"cannot serve metrics: {error.strerror}; choose another GAITSWARM_METRICS_PORT"
+        ) from error
+    thread = Thread(target=server.serve_forever, name="metrics", daemon=True)
+    thread.start()
+    try:
+        name = f"[{host}]" if ":" in host else host
+        yield f"http://{name}:{server.server_port}/metrics"
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+class _Server(ThreadingMixIn, WSGIServer):
+    """Answers each request in a thread, so that a slow reader keeps nobody waiting."""
+
+    daemon_threads = True
+
+
+class _ServerOnIpv6(_Server):
+    address_family = AF_INET6
+
+
+class _Silent(WSGIRequestHandler):
+    """Without a line of the log for every scrape; slow clients are let go."""
+
+    timeout = 10.0
+
+    def log_message(self, *_message: object) -> None:
+        pass

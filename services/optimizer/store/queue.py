@@ -1,0 +1,50 @@
+"""Jobs counted by state and kind, without reading those that have ended."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Final
+
+from sqlalchemy import Connection, func, select
+
+from services.optimizer.jobs.job import JobState
+from services.optimizer.store.job_list import spec_field
+from services.optimizer.store.reading import Queue
+from services.optimizer.store.tables import jobs
+
+_KINDS: Final = ("tuning", "certificate", "identification", "calibration", "tournament")
+
+_UNDER_WAY: Final = tuple(state for state in JobState if not state.terminal)
+
+
+def count_jobs(connection: Connection, now: datetime) -> Queue:
+    """Count the jobs.
+
+    Args:
+        connection: An open transaction.
+        now: The time until which jobs have waited.
+
+    Returns:
+        The counts. A job whose kind cannot be read counts as `unknown`.
+    """
+    by_state = dict.fromkeys(JobState, 0)
+    # Of the index alone: there may be very many jobs that have ended.
+    for state, count in connection.execute(
+        select(jobs.c.state, func.count()).group_by(jobs.c.state)
+    ):
+        by_state[JobState(state)] = count
+    kind = spec_field(connection, "kind").label("kind")
+    query = (
+        select(jobs.c.state, kind, func.count())
+        .where(jobs.c.state.in_(_UNDER_WAY))
+        .group_by(jobs.c.state, kind)
+    )
+    under_way: dict[tuple[JobState, str], int] = {}
+    for state, found, count in connection.execute(query):
+        key = (JobState(state), found if found in _KINDS else "unknown")
+        under_way[key] = under_way.get(key, 0) + count
+    since = connection.execute(
+        select(func.min(jobs.c.updated_at)).where(jobs.c.state == JobState.QUEUED)
+    ).scalar_one()
+    wait = 0.0 if since is None else max(0.0, (now - since).total_seconds())
+    return Queue(by_state, under_way, wait)

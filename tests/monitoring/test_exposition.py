@@ -1,0 +1,153 @@
+"""Where metrics are served, and to whom: the API's route, and the port of a runner alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from gaitswarm.settings import Settings
+from services.monitoring.exposition import MetricsAccess, metrics_server
+from services.monitoring.metrics import Metrics
+from services.optimizer.access import Scope, Token
+from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
+from tests.examples.processes import COMMAND_LINE, line_with, start_python
+from tests.examples.servers import Server
+from tests.monitoring.scraped import parsed, scraped
+
+
+def test_metrics_are_for_every_token_where_tokens_are_asked_for(store: SqlStore) -> None:
+    secret = store.tokens.create("prometheus", Scope.READ)[1]
+    server = Server(JobService(store), api_access="token")
+    try:
+        refused = server.client.get("/metrics")
+        assert refused.status_code == 401
+        assert refused.headers["WWW-Authenticate"] == "Bearer"
+        assert "--scope read" in refused.json()["detail"]
+        wrong = {"Authorization": "Bearer gaitswarm_nobody"}
+        assert server.client.get("/metrics", headers=wrong).status_code == 401
+        right = {"Authorization": f"Bearer {secret}"}
+        assert scraped(server.client, headers=right).value("gaitswarm_database_up") == 1
+    finally:
+        server.close()
+
+
+def test_without_tokens_metrics_are_for_everybody_on_the_machine(store: SqlStore) -> None:
+    server = Server(JobService(store))
+    try:
+        answer = server.client.get("/metrics")
+        assert answer.headers["Content-Type"].startswith("text/plain; version=")
+        asked = {"Accept": "application/openmetrics-text; version=1.0.0"}
+        openmetrics = server.client.get("/metrics", headers=asked)
+        assert openmetrics.headers["Content-Type"].startswith("application/openmetrics-text")
+        assert openmetrics.text.endswith("# EOF\n")
+    finally:
+        server.close()
+
+
+class _Tokens:
+    """Tokens in a database that may be away."""
+
+    def __init__(self) -> None:
+        self.away = False
+        self.known = {"right"}
+        self.looked_up = 0
+
+    def find(self, secret: str) -> Token | None:
+        self.looked_up += 1
+        if self.away:
+            raise StoreUnavailable("the database is away")
+        return Token("p", Scope.READ, None) if secret in self.known else None  # type: ignore[arg-type]
+
+
+def test_a_known_token_reads_metrics_while_the_database_is_away() -> None:
+    now, tokens = [0.0], _Tokens()
+    access = MetricsAccess(lambda: tokens, required=True, clock=lambda: now[0])  # type: ignore[arg-type]
+    assert access.allows("Bearer right")
+    assert access.allows("bearer right") and tokens.looked_up == 1
+    now[0], tokens.away = 60.0, True
+    assert access.allows("Bearer right")
+    with pytest.raises(StoreUnavailable):
+        access.allows("Bearer other")
+    assert not access.allows("")
+    tokens.away, tokens.known = False, set()
+    assert not access.allows("Bearer right")
+
+
+@pytest.mark.parametrize(
+    ("settings", "needed"),
+    [
+        ({}, False),
+        ({"metrics_host": "0.0.0.0"}, True),  # noqa: S104
+        ({"api_access": "token"}, True),
+    ],
+)
+def test_a_runners_port_asks_for_a_token_beyond_the_machine(
+    settings: dict[str, str], *, needed: bool
+) -> None:
+    assert Settings(**settings).metrics_need_token is needed  # type: ignore[arg-type]
+
+
+def served(check: Callable[[str], None], *, required: bool = False) -> None:
+    access = MetricsAccess(_Tokens, required=required)  # type: ignore[arg-type]
+    with metrics_server(Metrics(), access, host="127.0.0.1", port=0) as url:
+        check(url)
+
+
+def test_a_port_of_its_own_serves_metrics_and_nothing_else() -> None:
+    def check(url: str) -> None:
+        assert url.endswith("/metrics")
+        assert parsed(httpx2.get(url).text).value("gaitswarm_lease_losses_total") == 0
+        assert httpx2.get(url.removesuffix("metrics")).status_code == 404
+        assert httpx2.post(url).status_code == 404
+
+    served(check)
+
+
+def test_a_port_of_its_own_refuses_whoever_has_no_token_and_stops() -> None:
+    ended = []
+
+    def check(url: str) -> None:
+        assert httpx2.get(url).status_code == 401
+        known = httpx2.get(url, headers={"Authorization": "Bearer right"})
+        assert known.status_code == 200
+        ended.append(url)
+
+    served(check, required=True)
+    with pytest.raises(httpx2.ConnectError):
+        httpx2.get(ended[0])
+
+
+def test_a_port_that_is_taken_is_named() -> None:
+    def check(url: str) -> None:
+        access = MetricsAccess(_Tokens, required=False)  # type: ignore[arg-type]
+        port = int(url.split(":")[2].split("/", maxsplit=1)[0])
+        with (
+            pytest.raises(EvaluatorUnavailable, match="GAITSWARM_METRICS_PORT"),
+            metrics_server(Metrics(), access, host="127.0.0.1", port=port),
+        ):
+            pass
+
+    served(check)
+
+
+@pytest.mark.slow
+def test_a_runner_serves_its_own_metrics_but_not_the_databases(database: Path) -> None:
+    options = ("runner", "--db", str(database), "--evaluator", "in-process", "--cpus", "2")
+    process = start_python(
+        *COMMAND_LINE, *options, environment={"GAITSWARM_METRICS_PORT": "0"}, stdout=None
+    )
+    try:
+        url = line_with(process.stderr, r"metrics: (http://\S+)")[1]
+        scrape = parsed(httpx2.get(url).text)
+        assert scrape.value("gaitswarm_worker_slots", workers="threads") == 2
+        assert scrape.labels("gaitswarm_database_operation_duration_seconds_count")
+        assert not scrape.labels("gaitswarm_jobs") and not scrape.labels("gaitswarm_queue_jobs")
+    finally:
+        process.terminate()
+        process.communicate(timeout=60.0)
+    assert process.returncode == 0

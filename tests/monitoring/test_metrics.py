@@ -1,0 +1,223 @@
+"""Metrics: named as Prometheus wants them, without labels that grow, and true of a real job."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from services.monitoring.measured_store import measured
+from services.monitoring.metrics import Metrics
+from services.optimizer.errors import LeaseLost, StoreUnavailable
+from services.optimizer.jobs.job import Command, JobState
+from services.optimizer.jobs.provenance import JobProvenance
+from services.optimizer.run.runner import Surroundings, run_claim
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore, open_store
+from sim.outcome import Status
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.processes import eventually
+from tests.examples.servers import Server
+from tests.monitoring.scraped import Scrape, of, scraped, serving
+from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
+from tests.store.examples import Clock
+
+WALKS = 6
+"""Of SMALL_SPEC: three designs, two iterations, one scenario of a second."""
+
+LABELS = {
+    *("state", "kind", "status", "cause", "operation", "method", "route", "workers", "version"),
+    "le",
+}
+"""Each has as many values as the code has words for it, whatever users do."""
+
+UNITS = ("_seconds", "_bytes", "_total", "_info")
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Scrape]]:
+    """A job that was submitted over HTTP and has ended: its id, and the metrics after it."""
+    with serving(tmp_path_factory.mktemp("metrics") / "jobs.db") as server:
+        job_id = server.client.post("/v1/jobs", json=SMALL_SPEC).json()["id"]
+        server.client.get(f"/v1/jobs/{job_id}/events", timeout=120.0)
+        server.client.get(f"/v1/nowhere/{job_id}")
+        yield job_id, scraped(server.client)
+
+
+def test_names_say_what_is_counted_and_in_which_unit(walked: tuple[str, Scrape]) -> None:
+    own = [f for f in walked[1].families if not f.name.startswith("process_")]
+    assert len(own) > 15
+    for family in own:
+        assert re.fullmatch(r"gaitswarm(_[a-z]+)+", family.name), family.name
+        assert family.documentation, family.name
+        assert family.type != "unknown", family.name
+        if family.type == "counter":
+            assert {s.name for s in family.samples} <= {f"{family.name}_total"}
+        else:
+            assert not family.name.endswith(("_total", "_count")), family.name
+        if family.type == "histogram":
+            assert family.name.endswith("_seconds")
+        assert not re.search(r"_(ms|milliseconds|minutes|kb|mb)(_|$)", family.name)
+
+
+def test_no_label_grows_with_jobs_paths_or_people(walked: tuple[str, Scrape]) -> None:
+    job_id, scrape = walked
+    for family in scrape.families:
+        for sample in family.samples:
+            assert set(sample.labels) <= LABELS, sample
+            assert job_id not in str(sample.labels)
+    routes = {labels["route"] for labels in scrape.labels("gaitswarm_http_requests_total")}
+    assert {"/v1/jobs", "/v1/jobs/{job_id}/events", "none"} <= routes
+
+
+def test_counters_are_those_of_a_job_that_walked(walked: tuple[str, Scrape]) -> None:
+    scrape = walked[1]
+    assert scrape.value("gaitswarm_iterations_committed_total", kind="tuning") == 2
+    assert scrape.value("gaitswarm_jobs_ended_total", kind="tuning", state="succeeded") == 1
+    walks = {
+        labels["status"]: scrape.value("gaitswarm_walks_total", **labels)
+        for labels in scrape.labels("gaitswarm_walks_total")
+    }
+    assert set(walks) == {status.label for status in Status}
+    assert sum(walks.values()) == WALKS
+    assert scrape.value("gaitswarm_simulated_seconds_total") == pytest.approx(WALKS * 1.0)
+    assert scrape.value("gaitswarm_iteration_evaluation_seconds_count") == 2
+    commits = "gaitswarm_database_operation_duration_seconds"
+    assert scrape.value(f"{commits}_count", operation="commit") == 2
+    assert scrape.value(f"{commits}_sum", operation="commit") > 0
+    assert scrape.value("gaitswarm_worker_slots", workers="threads") == 1
+    assert scrape.value("gaitswarm_worker_slots_used", workers="threads") == 0
+    assert scrape.value("gaitswarm_worker_tasks_waiting", workers="threads") == 0
+    asked = {"method": "POST", "route": "/v1/jobs"}
+    assert scrape.value("gaitswarm_http_requests_total", status="202", **asked) == 1
+    assert scrape.value("gaitswarm_http_request_duration_seconds_count", **asked) == 1
+
+
+def test_the_stream_of_a_job_that_walked_says_how_late_its_events_were(
+    walked: tuple[str, Scrape],
+) -> None:
+    scrape = walked[1]
+    assert scrape.value("gaitswarm_event_stream_lag_seconds_count") == 2
+    assert scrape.value("gaitswarm_event_stream_lag_seconds_sum") < 2 * 10.0
+
+
+def test_streams_count_as_long_as_somebody_listens(service: JobService, store: SqlStore) -> None:
+    job, _ = store.create_job(SPEC)
+    metrics = Metrics()
+    server = Server(service, metrics=metrics)
+    try:
+        with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
+            next(answer.iter_lines())
+            assert of(metrics).value("gaitswarm_event_streams") == 1
+        eventually(lambda: of(metrics).value("gaitswarm_event_streams") == 0)
+    finally:
+        server.close()
+
+
+@pytest.fixture
+def service(store: SqlStore) -> JobService:
+    return JobService(store)
+
+
+def test_the_queue_is_counted_by_state_and_kind_when_it_is_asked_for(
+    service: JobService, store: SqlStore
+) -> None:
+    paused = store.create_job(SPEC)[0]
+    store.create_job(SPEC)
+    cancelled = store.create_job(SPEC)[0]
+    store.command(paused.id, Command.PAUSE)
+    store.command(cancelled.id, Command.CANCEL)
+    server = Server(service)
+    try:
+        scrape = scraped(server.client)
+    finally:
+        server.close()
+    found = {
+        (labels["state"], labels["kind"]): scrape.value("gaitswarm_queue_jobs", **labels)
+        for labels in scrape.labels("gaitswarm_queue_jobs")
+    }
+    assert found == {("queued", "tuning"): 1, ("paused", "tuning"): 1}
+    assert scrape.value("gaitswarm_jobs", state="cancelled") == 1
+    assert scrape.value("gaitswarm_jobs", state="failed") == 0
+    assert {labels["state"] for labels in scrape.labels("gaitswarm_jobs")} == set(JobState)
+    assert scrape.value("gaitswarm_database_up") == 1
+
+
+def test_the_longest_wait_is_that_of_the_job_queued_first(database: Path) -> None:
+    clock = Clock()
+    store = open_store(str(database), clock=clock)
+    assert store.queue().longest_wait == 0.0
+    store.create_job(SPEC)
+    clock.advance(40.0)
+    store.create_job(SPEC)
+    clock.advance(2.0)
+    assert store.queue().longest_wait == 42.0
+    store.close()
+
+
+def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -> None:
+    clock, loser, winner = Clock(), Metrics(), Metrics()
+    with_clock = open_store(str(database), clock=clock)
+    slow, quick = measured(with_clock, loser), measured(with_clock, winner)
+    slow.create_job(SPEC)
+    late = slow.claim("late", lease_seconds=30.0)
+    assert late is not None
+    clock.advance(31.0)
+    taken = quick.claim("other", lease_seconds=30.0)
+    assert taken is not None and taken.taken_from == "late"
+    for _ in range(3):
+        with pytest.raises(LeaseLost):
+            slow.renew(late, lease_seconds=30.0)
+    with pytest.raises(LeaseLost):
+        slow.release(late, JobState.QUEUED)
+    assert of(loser).value("gaitswarm_lease_losses_total") == 1
+    assert of(winner).value("gaitswarm_lease_takeovers_total") == 1
+    assert of(winner).value("gaitswarm_lease_losses_total") == 0
+    # Whoever cancels a job takes it from nobody.
+    quick.command(taken.job.id, Command.CANCEL)
+    with pytest.raises(LeaseLost):
+        quick.renew(taken, lease_seconds=30.0)
+    assert of(winner).value("gaitswarm_lease_losses_total") == 0
+    assert of(winner).value("gaitswarm_jobs_ended_total", state="cancelled", kind="tuning") == 1
+    with_clock.close()
+
+
+@pytest.mark.parametrize(
+    ("cause", "error", "provenance"),
+    [
+        ("simulation", ZeroDivisionError("of the test"), HERE),
+        ("internal", None, None),
+        ("provenance", None, HERE.model_copy(update={"optimizer_digest": "another"})),
+    ],
+)
+def test_failed_jobs_are_counted_by_cause(
+    store: SqlStore, cause: str, error: Exception | None, provenance: JobProvenance | None
+) -> None:
+    def computed(_spec: object) -> JobProvenance:
+        if provenance is None:
+            raise ZeroDivisionError("of the test")
+        return provenance
+
+    metrics = Metrics()
+    counted = measured(store, metrics)
+    counted.create_job(SPEC, provenance=HERE)
+    claim = counted.claim("runner", lease_seconds=30.0)
+    assert claim is not None
+    evaluator = FormulaEvaluator([error])
+    failed = run_claim(claim, Surroundings(counted, evaluator, provenance=computed))
+    assert failed.state is JobState.FAILED
+    assert of(metrics).value("gaitswarm_job_failures_total", cause=cause) == 1
+    assert of(metrics).value("gaitswarm_jobs_ended_total", state="failed", kind="tuning") == 1
+
+
+def test_operations_that_find_no_database_are_counted(database: Path) -> None:
+    class Away:
+        def job(self, job_id: str) -> None:
+            raise StoreUnavailable("the database is away")
+
+    metrics = Metrics()
+    with pytest.raises(StoreUnavailable):
+        measured(Away(), metrics).job("x")  # type: ignore[arg-type]
+    assert of(metrics).value("gaitswarm_database_errors_total", operation="job") == 1

@@ -18,6 +18,7 @@ from gaitswarm.views import PREFIX
 from services.optimizer.access import Scope as TokenScope
 from services.optimizer.access import Token, Tokens
 from services.optimizer.errors import Forbidden, StoreUnavailable
+from services.optimizer.jobs.audit import LOCAL
 
 COOKIE: Final = "gaitswarm-token"
 """Of browsers, which cannot send a header with a link or an event stream."""
@@ -142,6 +143,36 @@ async def may_submit(token: Asking) -> str | None:
             f"the token {token.name!r} may only read; this needs one of scope `submit` or `admin`"
         )
     return token.name
+
+
+async def actor(token: Asking) -> str:
+    """Whom the audit log names for what the request changes.
+
+    Args:
+        token: of the request.
+
+    Returns:
+        The token's name; `LOCAL` without one.
+    """
+    return LOCAL if token is None else token.name
+
+
+Actor = Annotated[str, Depends(actor)]
+
+
+async def may_administer(token: Asking) -> None:
+    """Refuse whoever may not see what others do.
+
+    Args:
+        token: of the request.
+
+    Raises:
+        Forbidden: the token is of another scope than `admin`.
+    """
+    if token is not None and not token.scope.allows(TokenScope.ADMIN):
+        raise Forbidden(
+            f"the token {token.name!r} is of scope `{token.scope}`; this needs one of scope `admin`"
+        )
 
 
 Owner = Annotated[str | None, Depends(may_submit)]

@@ -25,6 +25,7 @@ from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
 from api.routes import (
     analysis,
+    audit,
     calibration,
     catalogue,
     certificate,
@@ -104,6 +105,7 @@ def create_app(
         tournaments,
         simulations,
         catalogue,
+        audit,
         session,
         health,
     ):

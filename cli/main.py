@@ -27,6 +27,7 @@ from cli.commands.designs import (
     simulate,
 )
 from cli.commands.jobs import (
+    audit,
     evidence,
     export,
     fork,
@@ -90,6 +91,7 @@ for _module in (
     history,
     token,
     db,
+    audit,
     simulate,
     compare,
     study,

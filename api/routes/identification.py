@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Response, status
 
-from api.access import may_submit
+from api.access import Actor, may_submit
 from api.bodies import validated
 from api.dependencies import ExistingJob, JobIdText, Service
 from api.documentation import problems
@@ -28,13 +28,15 @@ router = APIRouter(prefix=PREFIX)
     dependencies=[Depends(may_submit)],
     responses=problems(400, 403, 413, 422),
 )
-def add_recording(walk: RecordingBody, service: Service, response: Response) -> RecordingView:
+def add_recording(
+    walk: RecordingBody, service: Service, response: Response, actor: Actor
+) -> RecordingView:
     """Motor currents of a measured walk, for jobs of kind `identification`.
 
     The id is the content's hash: the same walk again is the same recording. `gaitswarm record`
     makes one of a measured log.
     """
-    recording_id = service.record(walk)
+    recording_id = service.record(walk, actor=actor)
     response.headers["Location"] = f"{PREFIX}/recordings/{recording_id}"
     return RecordingView.from_walk(recording_id, walk)
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
-from api.access import Owner, may_command
+from api.access import Actor, Owner, may_command
 from api.bodies import validated
 from api.dependencies import JobId, JobIdText, Service, Slots
 from api.documentation import problems
@@ -192,12 +192,12 @@ def get_job(job_id: JobId, service: Service) -> JobView:
     status_code=status.HTTP_202_ACCEPTED,
     responses=problems(403, 404, 409, 422),
 )
-def pause_job(job_id: JobId, service: Service) -> JobView:
+def pause_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     """A running job ends and commits the iteration under way first (`pausing`), then is `paused`.
 
     409 if it is paused already, or has ended.
     """
-    return _in_full(service, service.command(job_id, Command.PAUSE))
+    return _in_full(service, service.command(job_id, Command.PAUSE, actor=actor))
 
 
 @router.post(
@@ -209,7 +209,10 @@ def pause_job(job_id: JobId, service: Service) -> JobView:
     responses=problems(400, 403, 404, 409, 413, 422),
 )
 def resume_job(
-    job_id: JobId, service: Service, resumption: Annotated[ResumeRequest | None, Body()] = None
+    job_id: JobId,
+    service: Service,
+    actor: Actor,
+    resumption: Annotated[ResumeRequest | None, Body()] = None,
 ) -> JobView:
     """Queue a paused or failed job again; it goes on bit for bit as if it had never stopped.
 
@@ -219,7 +222,8 @@ def resume_job(
     or has ended.
     """
     accept = resumption is not None and resumption.accept_changes
-    return _in_full(service, service.command(job_id, Command.RESUME, accept_changes=accept))
+    job = service.command(job_id, Command.RESUME, accept_changes=accept, actor=actor)
+    return _in_full(service, job)
 
 
 @router.post(
@@ -230,7 +234,9 @@ def resume_job(
     status_code=status.HTTP_202_ACCEPTED,
     responses=problems(400, 403, 404, 409, 413, 422),
 )
-def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> JobView:
+def extend_job(
+    extension: ExtensionRequest, job_id: JobId, service: Service, actor: Actor
+) -> JobView:
     """A job that has succeeded is queued again and goes on from its last iteration; any other goes
     on as it would, up to the new budget.
 
@@ -239,7 +245,7 @@ def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> 
     iterations that is extended to 50 is another than one of 50 from its beginning, but the same
     every time. 409 if the job was cancelled.
     """
-    return _in_full(service, service.extend(job_id, extension.iterations))
+    return _in_full(service, service.extend(job_id, extension.iterations, actor=actor))
 
 
 @router.post(
@@ -249,12 +255,12 @@ def extend_job(extension: ExtensionRequest, job_id: JobId, service: Service) -> 
     summary="Cancel a job",
     responses=problems(403, 404, 409, 422),
 )
-def cancel_job(job_id: JobId, service: Service) -> JobView:
+def cancel_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     """End a job for good. What it has committed stays; the iteration under way is dropped.
 
     409 if it has ended.
     """
-    return _in_full(service, service.command(job_id, Command.CANCEL))
+    return _in_full(service, service.command(job_id, Command.CANCEL, actor=actor))
 
 
 def _in_full(service: JobService, job: Job) -> JobView:

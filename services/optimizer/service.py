@@ -14,6 +14,7 @@ from services.optimizer.analysis.history import read_history
 from services.optimizer.analysis.questions import Questions
 from services.optimizer.analysis.start import started
 from services.optimizer.errors import InvalidRequest, ProvenanceChanged
+from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, duration, estimate
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.iteration import Evaluation, Iteration
@@ -161,16 +162,17 @@ class JobService(Questions):
             provenance=self.provenance(spec),
         )
 
-    def record(self, walk: RecordedWalk) -> str:
+    def record(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
         """Keep a recorded walk, to which jobs can fit.
 
         Args:
             walk: as it was recorded.
+            actor: name of the token that the request came with, if any; for the audit log.
 
         Returns:
             Its id, the same for the same walk.
         """
-        return self.store.add_recording(walk)
+        return self.store.add_recording(walk, actor=actor)
 
     def recording(self, recording_id: str) -> RecordedWalk:
         """Read a recorded walk.
@@ -255,7 +257,14 @@ class JobService(Questions):
             limit=limit,
         )
 
-    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
+    def command(
+        self,
+        job_id: str,
+        command: Command,
+        *,
+        accept_changes: bool = False,
+        actor: str = LOCAL,
+    ) -> Job:
         """Pause, resume or cancel a job.
 
         Args:
@@ -263,6 +272,7 @@ class JobService(Questions):
             command: what to do with it.
             accept_changes: for a job that is resumed, whether whoever takes it up may go on
                 although what its numbers depend on has changed.
+            actor: name of the token that the request came with, if any; for the audit log.
 
         Returns:
             The job as it is then.
@@ -271,7 +281,7 @@ class JobService(Questions):
             NotFound: no job of that id.
             Conflict: not possible in its state; says what is.
         """
-        return self.store.command(job_id, command, accept_changes=accept_changes)
+        return self.store.command(job_id, command, accept_changes=accept_changes, actor=actor)
 
     def check_unchanged(self, job: Job) -> None:
         """Check that a job's next numbers, computed here, depend on what those that it has do.
@@ -286,12 +296,13 @@ class JobService(Questions):
         if refused is not None:
             raise ProvenanceChanged(f"job {job.id} cannot go on: {refused}")
 
-    def extend(self, job_id: str, iterations: int) -> Job:
+    def extend(self, job_id: str, iterations: int, *, actor: str = LOCAL) -> Job:
         """Give a job another budget.
 
         Args:
             job_id: id of the job.
             iterations: of the budget, in all.
+            actor: name of the token that the request came with, if any; for the audit log.
 
         Returns:
             The job as it is then; queued if it had succeeded.
@@ -304,7 +315,7 @@ class JobService(Questions):
         job = self.job(job_id)
         if job.readable:
             self._check_length(job.spec.with_budget(iterations))
-        return self.store.extend(job_id, iterations)
+        return self.store.extend(job_id, iterations, actor=actor)
 
     def _check(self, spec: Spec) -> None:
         """Raises InvalidRequest."""

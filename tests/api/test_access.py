@@ -149,6 +149,34 @@ def test_every_operation_that_changes_something_asks_who_may(serve: Serve) -> No
         )
 
 
+def test_the_audit_log_names_tokens_and_is_for_administrators(
+    guarded: httpx2.Client, bearer: Bearer, spec: JobSpec
+) -> None:
+    submit, admin = bearer(Scope.SUBMIT), bearer(Scope.ADMIN)
+    body = spec.model_dump(mode="json")
+    job_id = guarded.post("/v1/jobs", json=body, headers=submit).json()["id"]
+    guarded.post(f"/v1/jobs/{job_id}/pause", headers=submit)
+    guarded.post(f"/v1/jobs/{job_id}/resume", headers=admin)
+    guarded.post(f"/v1/jobs/{job_id}/extend", json={"iterations": 9}, headers=submit)
+    guarded.post(f"/v1/jobs/{job_id}/cancel", headers=admin)
+    for scope, headers in ((Scope.READ, bearer(Scope.READ)), (Scope.SUBMIT, submit)):
+        refused = guarded.get("/v1/audit", headers=headers)
+        assert refused.status_code == 403, scope
+        assert "admin" in refused.json()["detail"]
+    page = guarded.get(f"/v1/audit?job_id={job_id}", headers=admin).json()
+    found = [(entry["actor"], entry["action"]) for entry in page["items"][::-1]]
+    assert found == [
+        *(("submit", "submit"), ("submit", "pause"), ("admin", "resume")),
+        *(("submit", "extend"), ("admin", "cancel")),
+    ]
+    assert page["items"][1]["details"] == {"iterations": 9}
+    first = guarded.get("/v1/audit?limit=1", headers=admin).json()
+    rest = guarded.get(f"/v1/audit?after={first['next']}&limit=200", headers=admin).json()
+    assert len(rest["items"]) == 7 and rest["next"] is None
+    wrong = guarded.get("/v1/audit?after=x", headers=admin)
+    assert wrong.status_code == 422 and wrong.json()["errors"][0]["field"] == "after"
+
+
 def test_a_revoked_token_is_refused_within_seconds(
     guarded: httpx2.Client, bearer: Bearer, store: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:

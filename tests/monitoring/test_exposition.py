@@ -66,7 +66,7 @@ class _Tokens:
 
 def test_a_known_token_reads_metrics_while_the_database_is_away() -> None:
     now, tokens = [0.0], _Tokens()
-    access = MetricsAccess(lambda: tokens, required=True, clock=lambda: now[0])  # type: ignore[arg-type]
+    access = MetricsAccess(lambda: tokens, required=True, clock=lambda: now[0])  # type: ignore[arg-type, return-value]
     assert access.allows("Bearer right")
     assert access.allows("bearer right") and tokens.looked_up == 1
     now[0], tokens.away = 60.0, True

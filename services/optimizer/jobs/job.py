@@ -271,7 +271,7 @@ class Claim:
             its budget was spent.
         recordings: those that the job's spec names, by id.
         answered: the last committed one, where there is no other to go on with.
-        taken_from: name of the runner whose lease had run out; None for a job that was queued.
+        taken_from: name of another runner whose lease had run out; None for a job that was queued.
     """
 
     job: Job

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from services.optimizer.access import Tokens
+from services.optimizer.jobs.audit import LOCAL, AuditEntry
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, Job, JobOrder, JobState
@@ -131,7 +132,14 @@ class Store(CommittedHistory, Protocol):
             The counts, all of one moment on SQLite.
         """
 
-    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
+    def command(
+        self,
+        job_id: str,
+        command: Command,
+        *,
+        accept_changes: bool = False,
+        actor: str = LOCAL,
+    ) -> Job:
         """Apply a command of a user; see `commanded` for what is possible.
 
         Cancelling clears the lease, so a runner's next write is refused.
@@ -141,6 +149,7 @@ class Store(CommittedHistory, Protocol):
             command: What to do with it.
             accept_changes: Of a job that is queued again, whether it may go on although what its
                 numbers depend on has changed; until it is claimed.
+            actor: Whom the audit log is to name.
 
         Returns:
             The job as it is then.
@@ -150,7 +159,7 @@ class Store(CommittedHistory, Protocol):
             Unreadable: It would be queued, but cannot be read.
         """
 
-    def extend(self, job_id: str, iterations: int) -> Job:
+    def extend(self, job_id: str, iterations: int, *, actor: str = LOCAL) -> Job:
         """Give a job another budget; see `extended` for what it may be.
 
         What is committed stays, as does the iteration under way; what is asked after it is asked
@@ -159,6 +168,7 @@ class Store(CommittedHistory, Protocol):
         Args:
             job_id: Of the job.
             iterations: The budget, in all.
+            actor: Whom the audit log is to name.
 
         Returns:
             The job as it is then.
@@ -170,11 +180,12 @@ class Store(CommittedHistory, Protocol):
             Unreadable: The job's spec cannot be read.
         """
 
-    def add_recording(self, walk: RecordedWalk) -> str:
+    def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
         """Keep a recorded walk.
 
         Args:
             walk: As it was recorded.
+            actor: Whom the audit log is to name, if the walk is new.
 
         Returns:
             Its id, which depends on its content alone.
@@ -298,6 +309,25 @@ class Store(CommittedHistory, Protocol):
 
         Raises:
             LeaseLost: The claim is no longer the job's.
+        """
+
+    def audit(
+        self, *, job_id: str | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[AuditEntry]:
+        """Read a page of the audit log, the newest entries first.
+
+        Every change of users is noted in the transaction that makes it; runners' are not.
+
+        Args:
+            job_id: Only what was done to this job, which may be gone.
+            after: `next` of the page before.
+            limit: Most entries on the page.
+
+        Returns:
+            The page.
+
+        Raises:
+            InvalidRequest: `after` is no cursor of the audit log, or `limit` is less than 1.
         """
 
     def ping(self) -> None:

@@ -144,7 +144,8 @@ def take_job(
         "crashes": crashes or None,
     }
     job = to_job(update_job(connection, row, changes))
-    taken_from = row["lease_owner"]
+    owner = row["lease_owner"]
+    taken_from = None if owner == runner else owner
     return Claim(job, runner, token, work.ask, work.recordings, work.answered, taken_from)
 
 

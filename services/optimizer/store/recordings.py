@@ -31,7 +31,7 @@ def recording_id(walk: RecordedWalk) -> str:
     return hashlib.sha256(walk.model_dump_json().encode()).hexdigest()[:32]
 
 
-def insert_recording(connection: Connection, walk: RecordedWalk, now: datetime) -> str:
+def insert_recording(connection: Connection, walk: RecordedWalk, now: datetime) -> tuple[str, bool]:
     """Store a walk unless it is there.
 
     Args:
@@ -40,14 +40,14 @@ def insert_recording(connection: Connection, walk: RecordedWalk, now: datetime) 
         now: The time at which it is stored.
 
     Returns:
-        Its id.
+        Its id, and whether it is new.
     """
     name = recording_id(walk)
     known = connection.execute(select(recordings.c.id).where(recordings.c.id == name)).first()
     if known is None:
         document = walk.model_dump(mode="json")
         connection.execute(insert(recordings).values(id=name, document=document, created_at=now))
-    return name
+    return name, known is None
 
 
 def load_recordings(connection: Connection, ids: Sequence[str]) -> Recordings:

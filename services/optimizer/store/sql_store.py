@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any, Final
 
-from sqlalchemy import select, tuple_
+from sqlalchemy import Connection, select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import InvalidRequest, Unreadable
+from services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
 from services.optimizer.jobs.documents import check_budget
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
@@ -26,6 +27,7 @@ from services.optimizer.jobs.job import (
 )
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.audit import audit_page, note_change
 from services.optimizer.store.changes import SqlChanges
 from services.optimizer.store.claims import (
     claimable,
@@ -151,7 +153,10 @@ class SqlStore(SqlHistory):
             with self._database.transaction(write=True) as connection:
                 earlier = repeated_job(connection, asked)
                 if earlier is None:
-                    return insert_job(connection, asked, self._clock(connection)), True
+                    now = self._clock(connection)
+                    job = insert_job(connection, asked, now)
+                    _note_submission(connection, now, job)
+                    return job, True
         except IntegrityError:
             # Another process has inserted the same key between our look and our insertion.
             with self._database.transaction(write=False) as connection:
@@ -173,6 +178,7 @@ class SqlStore(SqlHistory):
             now = self._clock(connection)
             asked = Submission(spec.resolved(), provenance=first_record(provenance))
             job = insert_job(connection, asked, now)
+            _note_submission(connection, now, job)
             return take_job(connection, job_row(connection, job.id), runner, lease_seconds, now)
 
     def job(self, job_id: str) -> Job:
@@ -225,7 +231,14 @@ class SqlStore(SqlHistory):
         with self._database.transaction(write=False) as connection:
             return count_jobs(connection, self._clock(connection))
 
-    def command(self, job_id: str, command: Command, *, accept_changes: bool = False) -> Job:
+    def command(
+        self,
+        job_id: str,
+        command: Command,
+        *,
+        accept_changes: bool = False,
+        actor: str = LOCAL,
+    ) -> Job:
         """Apply a command of a user, or refuse it."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
@@ -237,13 +250,16 @@ class SqlStore(SqlHistory):
             if state is JobState.QUEUED:
                 require_readable(row)
             changes = entering(state, now)
+            details = {}
             if command is Command.RESUME:
                 queued = state is JobState.QUEUED
                 changes |= {"error": None, "accepts_changes": queued and accept_changes}
                 changes |= {"crashes": None}
+                details = {"accept_changes": True} if accept_changes else {}
+            note_change(connection, now, actor, AuditAction(command), job_id, **details)
             return to_job(update_job(connection, row, changes))
 
-    def extend(self, job_id: str, iterations: int) -> Job:
+    def extend(self, job_id: str, iterations: int, *, actor: str = LOCAL) -> Job:
         """Change the budget of a job, and queue it again if it had ended."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
@@ -253,16 +269,23 @@ class SqlStore(SqlHistory):
             after = extended(state, job.spent, iterations)
             check_budget(job.spec, iterations)
             # Whoever runs the job notices when it commits; until then nothing changes for it.
-            changes = entering(after, self._clock(connection)) if after is not state else {}
+            now = self._clock(connection)
+            changes = entering(after, now) if after is not state else {}
+            note_change(connection, now, actor, AuditAction.EXTEND, job_id, iterations=iterations)
             return to_job(update_job(connection, row, changes | {"budget": iterations}))
 
     # recorded walks
 
-    def add_recording(self, walk: RecordedWalk) -> str:
+    def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
         """Keep a recorded walk, once."""
         try:
             with self._database.transaction(write=True) as connection:
-                return insert_recording(connection, walk, self._clock(connection))
+                now = self._clock(connection)
+                name, new = insert_recording(connection, walk, now)
+                if new:
+                    action = AuditAction.ADD_RECORDING
+                    note_change(connection, now, actor, action, recording=name)
+                return name
         except IntegrityError:
             # Another process has stored the same walk between our look and our insertion.
             return recording_id(walk)
@@ -357,6 +380,14 @@ class SqlStore(SqlHistory):
             changes = entering(after, self._clock(connection)) | {"error": text}
             update_job(connection, row, changes)
 
+    def audit(
+        self, *, job_id: str | None = None, after: str | None = None, limit: int = 50
+    ) -> Page[AuditEntry]:
+        """Read a page of the audit log."""
+        limit = checked_limit(limit)
+        with self._database.transaction(write=False) as connection:
+            return audit_page(connection, job_id, after, limit)
+
     def ping(self) -> None:
         """Ask the database for its schema revision."""
         check_revision(self._database)
@@ -369,6 +400,15 @@ class SqlStore(SqlHistory):
         """Close the pooled connections."""
         self.changes.close()
         self._database.close()
+
+
+def _note_submission(connection: Connection, now: datetime, job: Job) -> None:
+    actor = job.owner or LOCAL
+    if job.lineage is None:
+        note_change(connection, now, actor, AuditAction.SUBMIT, job.id)
+        return
+    parent, at = job.lineage.parent, job.lineage.from_iteration
+    note_change(connection, now, actor, AuditAction.FORK, job.id, parent=parent, from_iteration=at)
 
 
 def _check_key(key: str | None) -> None:

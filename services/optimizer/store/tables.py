@@ -266,3 +266,20 @@ tokens: Final = Table(
     PrimaryKeyConstraint("name"),
     UniqueConstraint("digest"),
 )
+
+audit: Final = Table(
+    "audit",
+    metadata,
+    Column("id", BigInteger().with_variant(Integer, "sqlite"), autoincrement=True),
+    Column("at", UtcDateTime, nullable=False),
+    # Name of a token, or "local".
+    Column("actor", Text, nullable=False),
+    Column("action", Text, nullable=False),
+    # No foreign key: what was done to a job is known longer than the job.
+    Column("job_id", Text),
+    Column("details", JSON, nullable=False),
+    PrimaryKeyConstraint("id"),
+    Index(None, "job_id", "id"),
+    # A number is never given twice, whatever is removed.
+    sqlite_autoincrement=True,
+)

@@ -10,6 +10,8 @@ from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.access import Scope, Token, new_secret, secret_digest
 from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.jobs.audit import LOCAL, AuditAction
+from services.optimizer.store.audit import note_change
 from services.optimizer.store.engine import Clock, Database
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import tokens
@@ -46,6 +48,11 @@ class SqlTokens:
         """
         if not _NAME.fullmatch(name):
             raise InvalidRequest("must be 1 to 64 letters, digits, '_', '.' and '-'", field="name")
+        if name == LOCAL:
+            raise InvalidRequest(
+                f"{LOCAL!r} is how the audit log calls whoever asks without one; choose another",
+                field="name",
+            )
         try:
             with self._database.transaction(write=True) as connection:
                 return self._insert(connection, name, scope)
@@ -96,7 +103,9 @@ class SqlTokens:
         with self._database.transaction(write=True) as connection:
             valid = (tokens.c.name == name, tokens.c.revoked_at.is_(None))
             now = self._clock(connection)
-            connection.execute(update(tokens).where(*valid).values(revoked_at=now))
+            done = connection.execute(update(tokens).where(*valid).values(revoked_at=now))
+            if done.rowcount:
+                note_change(connection, now, LOCAL, AuditAction.REVOKE_TOKEN, name=name)
             query = select(tokens).where(tokens.c.name == name)
             row = connection.execute(query).mappings().first()
         if row is None:
@@ -126,6 +135,7 @@ class SqlTokens:
                 name=name, scope=scope, digest=secret_digest(secret), created_at=now
             )
         )
+        note_change(connection, now, LOCAL, AuditAction.CREATE_TOKEN, name=name, scope=scope)
         return Token(name, scope, now), secret
 
 

@@ -15,6 +15,8 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from api.problems import internal_error, problem
+from services.optimizer.errors import GaitswarmError
+from services.optimizer.log_context import log_context
 
 _log = logging.getLogger("gaitswarm.api")
 
@@ -51,15 +53,26 @@ class RequestIdMiddleware:
                 MutableHeaders(scope=message)[REQUEST_ID] = request_id
             await send(message)
 
-        try:
-            await self.app(scope, receive, send_named)
-        except Exception:
-            _log.exception("%s %s (request %s)", scope["method"], scope["path"], request_id)
-            if started:
+        with log_context(request=request_id):
+            try:
+                await self.app(scope, receive, send_named)
+            except Exception as error:
+                what = f"{scope['method']} {scope['path']} (request {request_id})"
                 # Too late for a problem: breaking the connection is the only honest answer.
-                raise
-            response = internal_error(scope["path"], request_id)
-            await response(scope, receive, send_named)
+                if started and (expected := _expected(error)) is not None:
+                    _log.error("%s: broken off: %s", what, expected)
+                    return
+                _log.exception(what)
+                if started:
+                    raise
+                response = internal_error(scope["path"], request_id)
+                await response(scope, receive, send_named)
+
+
+def _expected(error: Exception) -> GaitswarmError | None:
+    """What was raised on purpose; Starlette wraps what it can no longer answer."""
+    found = error if isinstance(error, GaitswarmError) else error.__cause__
+    return found if isinstance(found, GaitswarmError) else None
 
 
 class BodyLimitMiddleware:

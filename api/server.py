@@ -42,6 +42,8 @@ class ApiServer:
         config = uvicorn.Config(
             app,
             lifespan="on",
+            # Its messages go where those of the process go, in the same format.
+            log_config=None,
             log_level=log_level,
             timeout_graceful_shutdown=shutdown_seconds,
             server_header=False,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import sys
 import warnings
@@ -79,15 +78,6 @@ def warnings_as_notes() -> None:
         note(f"warning: {message}")
 
     warnings.showwarning = show
-
-
-def log_to_stderr(level: str) -> None:
-    """Show what a long-running process logs, from a level such as "INFO" on."""
-    logging.basicConfig(
-        stream=sys.stderr, level=level, format="%(asctime)s %(levelname)s %(message)s"
-    )
-    # Every start would tell of migrations that are already done.
-    logging.getLogger("alembic").setLevel(logging.WARNING)
 
 
 class Stdout:

@@ -77,6 +77,9 @@ class Settings(BaseSettings):
         description="A job with which so many runner processes in a row went down fails.",
     )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
+    log_format: Literal["console", "json"] = Field(
+        default="console", description="Lines for people, or an object of JSON for each message."
+    )
     metrics_port: int | None = Field(
         default=None,
         ge=0,

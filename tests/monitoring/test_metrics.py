@@ -13,7 +13,7 @@ from services.monitoring.metrics import Metrics
 from services.optimizer.errors import LeaseLost, StoreUnavailable
 from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.run.runner import Surroundings, run_claim
+from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore, open_store
 from sim.outcome import Status

@@ -51,18 +51,21 @@ def serve(
 
     with ExitStack() as starting:
         starting.enter_context(_without_collection())
+        import logging
         from dataclasses import asdict
 
         from api.app import create_app
         from api.page import is_built
         from api.server import ApiServer
-        from cli.output import log_to_stderr, note
+        from cli.logs import log_to_stderr
+        from cli.output import note
         from gaitswarm.settings import read_settings
         from services.monitoring.metrics import Metrics
         from services.optimizer.errors import EvaluatorUnavailable
 
         settings = read_settings(**asdict(options), api_host=host, api_port=port)
-        log_to_stderr(settings.log_level)
+        log_to_stderr(settings.log_level, settings.log_format)
+        tell = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
         metrics = Metrics()
         with _runtime(settings, metrics, runs_jobs=not no_runner) as opened:
             beside = opened.runner
@@ -83,10 +86,10 @@ def serve(
                 ) from error
             doing = "runs no jobs" if beside is None else "runs queued jobs"
             if not is_built():
-                note("there is no page, only the API: in a checkout, `make page` builds the page")
-            note(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
+                tell("there is no page, only the API: in a checkout, `make page` builds the page")
+            tell(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
             if settings.tokens_required:
-                _tell_of_tokens(opened.service.store.tokens.create_first(), server.url)
+                _tell_of_tokens(tell, opened.service.store.tokens.create_first(), server.url)
             starting.close()
             server.run()
 
@@ -102,13 +105,13 @@ def runner(options: RunnerOptions) -> None:
     from contextlib import suppress
     from dataclasses import asdict
 
-    from cli.output import log_to_stderr
+    from cli.logs import log_to_stderr
     from gaitswarm.settings import read_settings
     from services.optimizer.run.evaluator import EvaluationStopped
     from services.runtime import stop_on_signals
 
     settings = read_settings(**asdict(options))
-    log_to_stderr(settings.log_level)
+    log_to_stderr(settings.log_level, settings.log_format)
     log = logging.getLogger(__name__)
     stop = threading.Event()
     metrics = None
@@ -131,13 +134,11 @@ def runner(options: RunnerOptions) -> None:
         log.info("stopping: jobs under way go back to the queue")
 
 
-def _tell_of_tokens(secret: str | None, url: str) -> None:
-    from cli.output import note
-
+def _tell_of_tokens(tell: Callable[[str], None], secret: str | None, url: str) -> None:
     if secret is None:
-        note("requests need a token: `gaitswarm token create NAME` makes one")
+        tell("requests need a token: `gaitswarm token create NAME` makes one")
         return
-    note(
+    tell(
         "requests need a token; this one, `first`, may do everything, and is shown only now:\n"
         f"  {secret}\n"
         f"  the page with it: {url}/#token={secret}\n"

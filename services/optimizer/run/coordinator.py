@@ -322,6 +322,7 @@ def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> 
         designs=spec.design_space().simulated(designs),
         provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
         # As many as there are if the next ones are as large as this one.
+        iteration=ask.iteration,
         iterations_left=max(0, -(-(spec.budget - state.evaluations - asked) // asked)),
     )
     return Evaluate(request, walk_keys(spec, request.provenance, request.designs))

@@ -24,6 +24,7 @@ class EvaluationRequest:
         designs: (n, v) float64.
         provenance: That of the process that asks; the outcomes are to have it.
         iterations_left: Iterations of the job that follow this one, as far as is known.
+        iteration: Index of the iteration, from 0.
     """
 
     job_id: str
@@ -31,6 +32,7 @@ class EvaluationRequest:
     designs: NDArray[np.float64]
     provenance: Provenance
     iterations_left: int = 0
+    iteration: int = 0
 
 
 class Evaluator(Protocol):

@@ -194,3 +194,23 @@ class Release:
 
 
 Action = Record | Begin | Evaluate | Commit | Wait | Release
+
+
+def iteration_of(action: Action) -> int | None:
+    """Which iteration an action is about.
+
+    Args:
+        action: What is to be done.
+
+    Returns:
+        Its index; None for what is about the job as a whole.
+    """
+    match action:
+        case Begin(ask=ask):
+            return ask.iteration
+        case Evaluate(request=request):
+            return request.iteration
+        case Commit(done=done):
+            return done.iteration
+        case _:
+            return None

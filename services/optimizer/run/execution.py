@@ -27,6 +27,7 @@ from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Job, JobState
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.log_context import log_context
 from services.optimizer.run.coordinator import Coordination, Phase, handle
 from services.optimizer.run.economy import evaluate_unknown
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
@@ -49,6 +50,7 @@ from services.optimizer.run.events import (
     StopRequested,
     Wait,
     Waited,
+    iteration_of,
 )
 from services.optimizer.run.heartbeat import Heartbeat
 from services.optimizer.run.outage import Backoff, Outage, is_infrastructure
@@ -123,7 +125,7 @@ def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None =
     """
     run = _Run.of(claim, around, stop or threading.Event())
     try:
-        with run.heartbeat:
+        with log_context(job=claim.job.id), run.heartbeat:
             state, actions = run.begin()
             while actions:
                 state, actions = run.decide(state, run.execute(actions))
@@ -207,7 +209,8 @@ class _Run:
         answer: Event | None = None
         try:
             for action in actions:
-                answer = self._do(action)
+                with log_context(iteration=iteration_of(action)):
+                    answer = self._do(action)
         except BudgetChanged:
             job = self._stored(lambda: self.around.store.job(self.claim.job.id))
             self.claim = replace(self.claim, job=job)

@@ -10,6 +10,7 @@ from typing import Final, Self
 
 from services.optimizer.errors import LeaseLost
 from services.optimizer.jobs.job import Claim, JobState
+from services.optimizer.log_context import log_context
 from services.optimizer.run.outage import Outage, is_infrastructure
 from services.optimizer.store.base import Store
 
@@ -53,7 +54,7 @@ class Heartbeat:
         self._lost = threading.Event()
         self._state = claim.job.state
         self._thread = threading.Thread(
-            target=self._beat, name=f"heartbeat-{claim.job.id}", daemon=True
+            target=self._beat_of_job, name=f"heartbeat-{claim.job.id}", daemon=True
         )
 
     @property
@@ -78,6 +79,10 @@ class Heartbeat:
     ) -> None:
         self._ended.set()
         self._thread.join()
+
+    def _beat_of_job(self) -> None:
+        with log_context(job=self._claim.job.id):
+            self._beat()
 
     def _beat(self) -> None:
         failed = False

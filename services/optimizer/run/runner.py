@@ -13,6 +13,7 @@ from typing import Final
 from services.optimizer.errors import GaitswarmError
 from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, JobState
 from services.optimizer.jobs.provenance import optimizer_digest
+from services.optimizer.log_context import log_context
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.run.outage import Backoff, Outage, is_infrastructure
@@ -141,6 +142,10 @@ class Runner:
         self._stop.wait(_PAUSES.pause(self._outage.failures))
 
     def _run(self, claim: Claim) -> None:
+        with log_context(job=claim.job.id):
+            self._run_job(claim)
+
+    def _run_job(self, claim: Claim) -> None:
         # The job stays as last committed; whoever claims it next goes on from there.
         try:
             job = run_claim(claim, self._around, self._stop)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,10 +16,9 @@ from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore, open_store
 from sim.outcome import Status
-from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually
 from tests.examples.servers import Server
-from tests.monitoring.scraped import Scrape, of, scraped, serving
+from tests.monitoring.scraped import Scrape, of, scraped
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
 from tests.store.examples import Clock
 
@@ -34,16 +32,6 @@ LABELS = {
 """Each has as many values as the code has words for it, whatever users do."""
 
 UNITS = ("_seconds", "_bytes", "_total", "_info")
-
-
-@pytest.fixture(scope="module")
-def walked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Scrape]]:
-    """A job that was submitted over HTTP and has ended: its id, and the metrics after it."""
-    with serving(tmp_path_factory.mktemp("metrics") / "jobs.db") as server:
-        job_id = server.client.post("/v1/jobs", json=SMALL_SPEC).json()["id"]
-        server.client.get(f"/v1/jobs/{job_id}/events", timeout=120.0)
-        server.client.get(f"/v1/nowhere/{job_id}")
-        yield job_id, scraped(server.client)
 
 
 def test_names_say_what_is_counted_and_in_which_unit(walked: tuple[str, Scrape]) -> None:

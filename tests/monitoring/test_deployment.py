@@ -1,0 +1,133 @@
+"""What Grafana and Prometheus are given asks for metrics and labels that there are."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.examples.paths import ROOT
+from tests.monitoring.scraped import Scrape
+
+DASHBOARD: dict[str, Any] = json.loads(
+    (ROOT / "deploy" / "grafana" / "gaitswarm.json").read_text(encoding="utf-8")
+)
+PROMETHEUS = ROOT / "deploy" / "prometheus"
+RULES: list[dict[str, Any]] = [
+    rule
+    for group in yaml.safe_load((PROMETHEUS / "alerts.yml").read_text(encoding="utf-8"))["groups"]
+    for rule in group["rules"]
+]
+OPERATIONS = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+
+TARGET_LABELS = {"job", "instance", "le"}
+"""Prometheus adds the first two to all that it reads; the third is of every histogram."""
+
+
+def shown() -> Iterator[str]:
+    for panel in DASHBOARD["panels"]:
+        for target in panel.get("targets", ()):
+            yield target["expr"]
+
+
+QUERIES = [*shown(), *(rule["expr"] for rule in RULES)]
+
+
+def metrics_of(query: str) -> set[str]:
+    """Names that a query selects; `up` is Prometheus's own."""
+    return set(re.findall(r"\b(?:gaitswarm|process)_[a-z_]+", query))
+
+
+def labels_of(query: str) -> set[str]:
+    """Labels that it matches or groups by."""
+    grouped = re.findall(r"\bby \(([^)]*)\)", query)
+    matched = re.findall(r"[{,]\s*([a-z_]+)\s*(?:=~|!~|!=|=)", query)
+    return {name.strip() for names in grouped for name in names.split(",")} | set(matched)
+
+
+def documented() -> dict[str, set[str]]:
+    """Labels of every metric of the table in docs/operations.md, by name."""
+    found: dict[str, set[str]] = {}
+    rows = re.findall(r"^\| (`gaitswarm_[^|]*)\|([^|]*)\|", OPERATIONS, re.MULTILINE)
+    for names, labels in rows:
+        first, *others = re.findall(r"`([a-z_]+)`", names)
+        for name in (first, *(f"{first.removesuffix('_slots')}{other}" for other in others)):
+            found[name] = set(re.findall(r"`([a-z]+)`", labels))
+    return found
+
+
+def exposed(scrape: Scrape) -> dict[str, str]:
+    """Type of every metric by each name that a query may give it."""
+    found: dict[str, str] = {}
+    for family in scrape.families:
+        suffixes = {"counter": ("_total",), "histogram": ("_bucket", "_count", "_sum")}
+        for suffix in suffixes.get(family.type, ("",)):
+            found[family.name + suffix] = family.type
+    return found
+
+
+@pytest.mark.parametrize("query", QUERIES)
+def test_every_query_asks_for_metrics_that_there_are(
+    walked: tuple[str, Scrape], query: str
+) -> None:
+    known = exposed(walked[1])
+    asked = metrics_of(query)
+    assert asked or query.startswith("up{")
+    assert asked - set(known) == set()
+    assert query.count("(") == query.count(")")
+    rated = set(re.findall(r"(?:rate|increase)\(([a-z_]+)", query))
+    assert {known[name] for name in rated} <= {"counter", "histogram"}
+    assert {name for name in asked if known[name] == "counter"} <= rated
+
+
+@pytest.mark.parametrize("query", QUERIES)
+def test_every_query_asks_for_labels_that_its_metrics_have(query: str) -> None:
+    known = documented()
+    asked = {re.sub("_(bucket|count|sum)$", "", name) for name in metrics_of(query)}
+    labels = [known[name] for name in asked if name.startswith("gaitswarm_")]
+    assert labels_of(query) <= TARGET_LABELS.union(*labels)
+
+
+def test_every_metric_is_documented_with_its_labels(walked: tuple[str, Scrape]) -> None:
+    known = documented()
+    own = {
+        family.name + ("_total" if family.type == "counter" else ""): family
+        for family in walked[1].families
+        if family.name.startswith("gaitswarm_")
+    }
+    assert set(own) == set(known)
+    for name, family in own.items():
+        for sample in family.samples:
+            assert set(sample.labels) - {"le"} == known[name], name
+
+
+def test_panels_are_told_apart_and_say_what_they_show() -> None:
+    panels = DASHBOARD["panels"]
+    assert len({panel["id"] for panel in panels}) == len(panels) > 20
+    places = {(p["gridPos"]["x"], p["gridPos"]["y"]) for p in panels}
+    assert len(places) == len(panels)
+    assert all(p["gridPos"]["x"] + p["gridPos"]["w"] <= 24 for p in panels)
+    assert all(p["description"] for p in panels if p["type"] != "row")
+    variables = {variable["name"] for variable in DASHBOARD["templating"]["list"]}
+    used = set(re.findall(r"\$\{?(\w+)", json.dumps(panels))) - {"__rate_interval"}
+    assert used == variables
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule["alert"])
+def test_an_alert_says_how_bad_it_is_and_what_to_do(rule: dict[str, Any]) -> None:
+    assert rule["labels"]["severity"] in ("warning", "critical")
+    assert set(rule["annotations"]) == {"summary", "description"}
+    assert f"`{rule['alert']}`" in OPERATIONS
+
+
+def test_prometheus_reads_the_alerts_and_sends_a_token() -> None:
+    config = yaml.safe_load((PROMETHEUS / "prometheus.yml").read_text(encoding="utf-8"))
+    assert all((PROMETHEUS / name).is_file() for name in config["rule_files"])
+    (scrape,) = config["scrape_configs"]
+    assert scrape["job_name"] == "gaitswarm"
+    assert scrape.get("metrics_path", "/metrics") == "/metrics"
+    assert "credentials_file" in scrape["authorization"]

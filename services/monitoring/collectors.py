@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from typing import Protocol
 
 from prometheus_client.metrics_core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from services.monitoring.metrics import FAILURE_CAUSES, failure_cause
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.store.base import Store
 
@@ -57,6 +59,13 @@ class QueueCollector(Collector):
         for (state, kind), count in queue.under_way.items():
             by_kind.add_metric([state, kind], count)
         yield by_kind
+        failed = GaugeMetricFamily(
+            "gaitswarm_failed_jobs", "Jobs in the database that have failed", labels=["cause"]
+        )
+        causes = Counter(map(failure_cause, queue.errors))
+        for cause in FAILURE_CAUSES:
+            failed.add_metric([cause], causes[cause])
+        yield failed
         wait = GaugeMetricFamily(
             "gaitswarm_queue_longest_wait_seconds",
             "Since when the job that waits longest for a runner is queued",

@@ -10,7 +10,7 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from services.monitoring.metrics import Metrics
+from services.monitoring.metrics import Metrics, failure_cause
 from services.optimizer.errors import LeaseLost, StoreUnavailable
 from services.optimizer.jobs.estimate import duration
 from services.optimizer.jobs.iteration import CompletedIteration
@@ -20,26 +20,6 @@ from sim.outcome import Status
 
 _LOSSES_KEPT: Final = 256
 """Leases whose loss is remembered, so that it is counted once."""
-
-_CAUSES: Final = (
-    ("the simulation failed", "simulation"),
-    ("internal error", "internal"),
-    ("what its numbers depend on", "provenance"),
-    ("does not compute what this job's numbers depend on", "provenance"),
-)
-"""What an error says, and the cause that it is counted under."""
-
-
-def failure_cause(error: str | None) -> str:
-    """Find what a job's failure is counted under.
-
-    Args:
-        error: With which it failed, for people.
-
-    Returns:
-        One of a few words; `other` for what is none of the known causes.
-    """
-    return next((cause for words, cause in _CAUSES if words in (error or "")), "other")
 
 
 def measured(store: Store, metrics: Metrics) -> Store:

@@ -19,7 +19,19 @@ from prometheus_client.registry import Collector
 
 from sim.outcome import Status
 
-FAILURE_CAUSES: Final = ("simulation", "internal", "provenance", "other")
+_OTHER: Final = "other"
+
+_CAUSES: Final = (
+    ("quarantined", "quarantine"),
+    ("died, one after the other, of the same task", "killed_worker"),
+    ("the simulation failed", "simulation"),
+    ("internal error", "internal"),
+    ("what its numbers depend on", "provenance"),
+    ("what this job's numbers depend on", "provenance"),
+)
+"""What an error says, and the cause that it is counted under."""
+
+FAILURE_CAUSES: Final = (*dict.fromkeys(cause for _, cause in _CAUSES), _OTHER)
 """What failed jobs are counted under."""
 
 _DATABASE_BUCKETS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 15.0)
@@ -185,6 +197,18 @@ class OpenStream:
         """
         if committed_at >= self._opened:
             self._lag.observe(max(0.0, (datetime.now(UTC) - committed_at).total_seconds()))
+
+
+def failure_cause(error: str | None) -> str:
+    """Find what a job's failure is counted under.
+
+    Args:
+        error: With which it failed, for people.
+
+    Returns:
+        One of `FAILURE_CAUSES`; `other` for what is none of the known causes.
+    """
+    return next((cause for words, cause in _CAUSES if words in (error or "")), _OTHER)
 
 
 class _Exposed(Collector):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from services.monitoring.collectors import QueueCollector
 from services.monitoring.measured_store import measured
 from services.monitoring.metrics import Metrics
 from services.optimizer.errors import LeaseLost, StoreUnavailable
@@ -15,12 +16,15 @@ from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore, open_store
+from services.worker.cutting import Chunk, Part
+from services.worker.failures import killed_workers
 from sim.outcome import Status
 from tests.examples.processes import eventually
 from tests.examples.servers import Server
 from tests.monitoring.scraped import Scrape, of, scraped
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
 from tests.store.examples import Clock
+from tests.worker.requests import request
 
 WALKS = 6
 """Of SMALL_SPEC: three designs, two iterations, one scenario of a second."""
@@ -177,6 +181,7 @@ def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -
     [
         ("simulation", ZeroDivisionError("of the test"), HERE),
         ("internal", None, None),
+        ("killed_worker", killed_workers(request(2), Chunk((Part(0, 0, 1),), 1.0), 3), HERE),
         ("provenance", None, HERE.model_copy(update={"optimizer_digest": "another"})),
     ],
 )
@@ -198,6 +203,21 @@ def test_failed_jobs_are_counted_by_cause(
     assert failed.state is JobState.FAILED
     assert of(metrics).value("gaitswarm_job_failures_total", cause=cause) == 1
     assert of(metrics).value("gaitswarm_jobs_ended_total", state="failed", kind="tuning") == 1
+    metrics.registry.register(QueueCollector(lambda: counted))
+    assert of(metrics).value("gaitswarm_failed_jobs", cause=cause) == 1
+
+
+def test_quarantined_jobs_are_counted_among_the_failed_ones(database: Path) -> None:
+    clock = Clock()
+    store = open_store(str(database), clock=clock)
+    store.create_job(SPEC)
+    assert store.claim("one", lease_seconds=30.0) is not None
+    clock.advance(31.0)
+    assert store.claim("two", lease_seconds=30.0, quarantine_after=1) is None
+    metrics = Metrics()
+    metrics.registry.register(QueueCollector(lambda: store))
+    assert of(metrics).value("gaitswarm_failed_jobs", cause="quarantine") == 1
+    store.close()
 
 
 def test_operations_that_find_no_database_are_counted(database: Path) -> None:

@@ -14,6 +14,9 @@ from services.optimizer.store.tables import jobs
 
 _KINDS: Final = ("tuning", "certificate", "identification", "calibration", "tournament")
 
+_BEGINNING: Final = 300
+"""Characters of an error, which may quote much."""
+
 _UNDER_WAY: Final = tuple(state for state in JobState if not state.terminal)
 
 
@@ -47,4 +50,6 @@ def count_jobs(connection: Connection, now: datetime) -> Queue:
         select(func.min(jobs.c.updated_at)).where(jobs.c.state == JobState.QUEUED)
     ).scalar_one()
     wait = 0.0 if since is None else max(0.0, (now - since).total_seconds())
-    return Queue(by_state, under_way, wait)
+    beginning = func.substr(func.coalesce(jobs.c.error, ""), 1, _BEGINNING)
+    errors = connection.execute(select(beginning).where(jobs.c.state == JobState.FAILED))
+    return Queue(by_state, under_way, wait, tuple(errors.scalars()))

@@ -60,11 +60,13 @@ class Queue:
         under_way: Number of jobs that have not ended, by state and kind.
         longest_wait: Since when the job that waits longest for a runner is queued [s]; 0 if none
             waits.
+        errors: Beginnings of what the failed jobs failed with.
     """
 
     jobs: Mapping[JobState, int]
     under_way: Mapping[tuple[JobState, str], int]
     longest_wait: float
+    errors: tuple[str, ...] = ()
 
 
 class CommittedHistory(Protocol):

@@ -120,10 +120,7 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
       )}
       <Figure label="Evaluation rate" value={quantity(job.evaluations_per_second, '1/s', 3)} />
       <Figure label="Walk rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
-      <Figure
-        label="Time left"
-        value={timeLeft(job)}
-      />
+      <Figure label="Time left" value={timeLeft(job)} />
       <Figure label="Computing time" value={formatDuration(job.compute_seconds)} />
       <Figure label="Submitted" value={`${formatAge(job.created_at, now)} ago`} />
     </dl>

@@ -22,9 +22,18 @@ IN_PROCESS = ("--evaluator", "in-process")
 OPTIMIZE = (*COMMAND_LINE, "optimize")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
+def db(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One for all tests: each looks at jobs of its own, and leaves none that runs."""
+    return tmp_path_factory.mktemp("beside-a-server") / "jobs.db"
+
+
+@pytest.fixture(scope="module")
 def server(db: Path) -> Iterator[str]:
-    process = start_python(*COMMAND_LINE, "serve", "--port", "0", *IN_PROCESS, "--db", db)
+    process = start_python(
+        *COMMAND_LINE, "serve", "--port", "0", *IN_PROCESS, "--db", db,
+        environment={"GAITSWARM_CACHE": "0"},
+    )  # fmt: skip
     yield line_with(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
@@ -68,6 +77,7 @@ def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
     assert "goes on in another process" in err
     assert f"gaitswarm watch {job_id} --db {db}" in err
     assert _job(gaitswarm, job_id, db)["state"] == "running"
+    assert gaitswarm("cancel", job_id, "--server", server).code == 0
 
 
 def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(

@@ -162,7 +162,7 @@ def test_a_job_resumed_on_ray_equals_one_run_in_threads(
     store: Store, url: str, alone: Walked
 ) -> None:
     job_id = queue(store)
-    killed = start(url, job_id, "ray")
+    killed = start(url, job_id)
     output(killed.stdout).readline()
     kill_group(killed)
     resumed = start(url, job_id, "ray")

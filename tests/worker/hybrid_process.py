@@ -57,7 +57,8 @@ def lose() -> str:
         assert bits(evaluator.evaluate(WANTED, never)) == expected
         return not evaluator.on_ray
 
-    eventually(lost)
+    with patch("services.worker.ray_evaluator.PULSE_SECONDS", 0.3):
+        eventually(lost)
     eventually(lambda: evaluator.on_ray)
     assert bits(evaluator.evaluate(WANTED, never)) == expected
     evaluator.close()

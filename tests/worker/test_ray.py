@@ -133,6 +133,8 @@ def test_a_second_ray_in_the_same_process_is_refused(ray_evaluator: RayEvaluator
 @contextmanager
 def driver(ending: str, home: Path) -> Iterator[subprocess.Popen[str]]:
     environment = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(home)}
+    # Kernels are those of this home, not compiled anew.
+    environment.setdefault("XDG_CACHE_HOME", str(Path.home() / ".cache"))
     for name in [name for name in environment if name.startswith("RAY_")]:
         del environment[name]
     with subprocess.Popen(

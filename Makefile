@@ -7,13 +7,16 @@ DB ?=
 ARGS ?=
 COMPILE := $(UV) pip compile --universal --generate-hashes --no-header --no-annotate --quiet
 
+# Tests run on every processor; each worker takes a gigabyte of memory.
+WORKERS := --numprocesses auto --maxprocesses 8 --dist worksteal
+
 # An empty DB means the default database of the user.
 ifneq ($(DB),)
 DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page wheel bench test unit lint format architecture pictures lock clean setup setup-dev page-if-possible
+.PHONY: help demo serve page wheel bench test unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -40,17 +43,21 @@ bench: setup ## Measure the simulator on one core of this machine.
 test: setup-dev ## Run all tests; those of the page need node with npm, and Chromium.
 	@scripts/npm.sh --if-possible test
 	@scripts/page.sh --if-possible
-	@$(BIN)/python -m pytest -n 2 --dist worksteal $(ARGS)
+	@$(BIN)/python -m pytest $(WORKERS) $(ARGS)
 
 unit: setup-dev ## Run the fast tests only.
-	@$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow" $(ARGS)
+	@$(BIN)/python -m pytest $(WORKERS) -m "not slow" $(ARGS)
 
-lint: setup-dev ## Check style, types, imports between packages and declared dependencies.
+lint: lint-code lint-page ## Check style, types, imports between packages and declared dependencies.
+
+lint-code: setup-dev
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 	@$(BIN)/deptry .
+
+lint-page: setup-dev
 	@scripts/npm.sh --if-possible run check
 	@scripts/npm.sh --if-possible run lint
 

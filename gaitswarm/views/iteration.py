@@ -37,6 +37,12 @@ class IterationView(View):
         description="Time that its evaluation took [s].", examples=[1.23]
     )
     committed_at: datetime = Field(description="When it was committed, UTC.")
+    digest: str | None = Field(
+        default=None,
+        description="SHA-256 of it, the spec and all iterations before it; null where it was stored"
+        " before histories were chained.",
+        examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
+    )
 
     @classmethod
     def from_iteration(cls, iteration: Iteration) -> IterationView:
@@ -80,4 +86,5 @@ def _at_a_glance(iteration: Iteration) -> dict[str, object]:
         "failed": iteration.failed,
         "evaluate_seconds": iteration.evaluate_seconds,
         "committed_at": iteration.committed_at,
+        "digest": iteration.digest,
     }

@@ -178,8 +178,8 @@ class JobSummaryView(View):
         description="Where to go on: `self`, `iterations`, `events`; where the spec can be read,"
         " `best`, `distribution`, `particles`, `export`; for a job that tunes a drive `ranking`"
         " (POST) and, once it has a best design, `scenarios`, `preferences` (POST), `firmware`;"
-        " `evidence` once an iteration is committed; `parent` of a fork; those of `pause`,"
-        " `resume`, `cancel`, `extend`, `fork` (POST) that its state allows.",
+        " `evidence` and `verify` (POST) once an iteration is committed; `parent` of a fork; those"
+        " of `pause`, `resume`, `cancel`, `extend`, `fork` (POST) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -233,6 +233,14 @@ class JobView(JobSummaryView):
         " accepted, the last of an iteration counting; empty for a job that was stored before this"
         " was recorded."
     )
+    head: str | None = Field(
+        default=None,
+        description="Digest of the last committed iteration, which is chained to all before it and"
+        " the spec: noted down, it shows later that none of it was changed"
+        " (POST /v1/jobs/{job_id}/verify). Null before the first, and for jobs that were stored"
+        " before histories were chained.",
+        examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
+    )
 
     @property
     def spec(self) -> AnySpec:
@@ -265,6 +273,7 @@ class JobView(JobSummaryView):
                 "objectives": objectives,
                 "spec": spec,
                 "provenance": job.provenance,
+                "head": job.progress.head,
             }
         )
 

@@ -123,10 +123,12 @@ class JobService(Questions):
         check_begun(job, request.from_iteration)
         columns = self.columns(job)
         rows = slice(int(np.searchsorted(columns.iteration, request.from_iteration)))
+        (last,) = self.store.links(job_id, request.from_iteration - 1, request.from_iteration)
         parent = Parent(
             job,
             columns.rows(rows),
             lambda: self.asked(job, request.from_iteration),
+            last.link.digest,
         )
         spec, fork = forked(parent, request, self.provenance)
         self._check(spec)

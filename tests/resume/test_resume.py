@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from services.optimizer.analysis.verification import check_history
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.evaluator import Evaluator
@@ -65,12 +66,18 @@ def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
     return job_id
 
 
-Walked = tuple[list[Any], tuple[bytes, float] | None]
-"""All iterations of a job, and what its best design was evaluated anew to."""
+Walked = tuple[list[Any], tuple[bytes, float] | None, list[str | None]]
+"""All iterations of a job, what its best design was evaluated anew to, and chained digests."""
 
 
 def walked(store: Store, job_id: str) -> Walked:
-    return history(store, job_id), best_in_double(store, job_id)
+    check = check_history(store, store.job(job_id))
+    assert (check.problem, check.chained_from) == ("", 0)
+    return history(store, job_id), best_in_double(store, job_id), digests(store, job_id)
+
+
+def digests(store: Store, job_id: str) -> list[str | None]:
+    return [iteration.digest for iteration in store.iterations(job_id).items]
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +163,7 @@ def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
     assert run_embedded(store, evaluator, whole).state is JobState.SUCCEEDED
     assert store.job(killed).progress.iterations == SPEC.iterations + 3
     assert history(store, killed) == history(store, whole)
+    assert digests(store, killed) == digests(store, whole)
 
 
 def test_a_job_resumed_on_ray_equals_one_run_in_threads(
@@ -219,3 +227,4 @@ def test_a_job_of_which_a_part_is_known_has_the_bits_of_one_that_walks_all(
     assert saved == len(start)
     assert run_embedded(store, evaluator, walked).progress.evaluations_saved == 0
     assert history(store, known) == history(store, walked)
+    assert digests(store, known) == digests(store, walked)

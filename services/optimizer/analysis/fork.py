@@ -52,11 +52,13 @@ class Parent:
         job: As it was read.
         columns: Evaluations of these iterations.
         asked: Reads the (n, d) positions of each of them.
+        digest: Of the last of them; None if it is not chained.
     """
 
     job: Job
     columns: EvaluationColumns
     asked: Callable[[], tuple[Floats, ...]]
+    digest: str | None = None
 
     def by_iteration(self, column: Floats) -> tuple[Floats, ...]:
         """Cut a column.
@@ -142,8 +144,12 @@ def forked(
     spec = forked_spec(before, request)
     changed = changed_fields(before, spec)
     lineage = Lineage(
-        parent=parent.job.id, from_iteration=request.from_iteration, carried="search"
-    ).model_copy(update={"changed": changed})
+        parent=parent.job.id,
+        from_iteration=request.from_iteration,
+        carried="search",
+        changed=changed,
+        digest=parent.digest,
+    )
     fitness = parent.columns.fitness
     if "preference" in changed and _HOLD.issuperset(changed):
         fitness = spec.judge(parent.columns.objectives, parent.columns.failed).fitness

@@ -71,6 +71,17 @@ class EvaluationColumns:
             self.fitness[chosen],
         )
 
+    def of_iteration(self, iteration: int) -> EvaluationColumns:
+        """Choose one iteration.
+
+        Args:
+            iteration: its index.
+
+        Returns:
+            Its rows, as views.
+        """
+        return self.rows(slice(*np.searchsorted(self.iteration, [iteration, iteration + 1])))
+
     def after(self, iteration: int | None) -> EvaluationColumns:
         """Leave out the first iterations.
 

@@ -111,6 +111,11 @@ class Lineage(BaseModel):
         description="Budgets, in iterations, under which what it took over was asked for.",
         examples=[[25]],
     )
+    digest: str | None = Field(
+        default=None,
+        description="Of the parent's last iteration before that one, which is chained to all before"
+        " it; null if the parent's history is not chained.",
+    )
 
     @property
     def own_from(self) -> int:

@@ -70,6 +70,8 @@ class Iteration:
         failed: designs that failed in at least one case.
         evaluate_seconds: time that its evaluation took [s].
         committed_at: when it was committed, UTC.
+        digest: of it and all before it, see `jobs.chain`; None where it was stored before there
+            were any.
     """
 
     index: int
@@ -82,6 +84,7 @@ class Iteration:
     failed: int
     evaluate_seconds: float
     committed_at: datetime
+    digest: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,6 +135,7 @@ class Progress:
         evaluations_saved: of the designs, those whose outcome was known without a walk.
         recent_seconds: that a design took in the last iterations, as `recent_pace` weighs them [s];
             None if that was not noted.
+        head: digest of the last iteration; None where there is none.
     """
 
     iterations: int = 0
@@ -145,6 +146,7 @@ class Progress:
     compute_seconds: float = 0.0
     evaluations_saved: int = 0
     recent_seconds: float | None = None
+    head: str | None = None
 
     @property
     def evaluations_walked(self) -> int:

@@ -8,7 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Final
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from services.optimizer.jobs.spec import Spec
 from sim.provenance import LIBRARIES, Provenance, provenance_of, source_digest, version_changes
@@ -79,6 +79,8 @@ class ProvenanceRecord(BaseModel):
 
 ProvenanceRecords = tuple[ProvenanceRecord, ...]
 """Of one job, only ever appended to; empty for one that was stored before there were any."""
+
+RECORDS: Final = TypeAdapter(ProvenanceRecords)
 
 
 def job_provenance(spec: Spec) -> JobProvenance:

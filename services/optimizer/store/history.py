@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 from sqlalchemy import Select, Table, select
 
 from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.jobs.chain import ChainDocuments
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
+from services.optimizer.store.chain import select_links, select_reevaluations
 from services.optimizer.store.columns import select_columns, select_known
 from services.optimizer.store.engine import Database
-from services.optimizer.store.reading import Page
+from services.optimizer.store.job_rows import chain_documents
+from services.optimizer.store.reading import Page, StoredLink
 from services.optimizer.store.records import job_row
 from services.optimizer.store.rows import LISTED, Row, to_evaluation, to_iteration, to_reevaluation
 from services.optimizer.store.tables import evaluations, iterations, reevaluations
@@ -98,18 +101,27 @@ class SqlHistory:
             rows = connection.execute(query).scalars().all()
         return tuple(np.array(positions, dtype=np.float64) for positions in rows)
 
+    def chain_documents(self, job_id: str) -> ChainDocuments:
+        """Read what a job's chain depends on."""
+        with self._database.transaction(write=False) as connection:
+            return chain_documents(job_row(connection, job_id))
+
+    def links(self, job_id: str, first: int, last: int) -> tuple[StoredLink, ...]:
+        """Read a range of iterations beside their evaluations."""
+        with self._database.transaction(write=False) as connection:
+            return select_links(connection, job_id, _bounded(first), _bounded(last))
+
     def reevaluations(self, job_id: str) -> tuple[tuple[int, Reevaluation], ...]:
         """Read the designs that were evaluated anew."""
-        table = reevaluations.c
-        query = (
-            select(reevaluations)
-            .where(table.job_id == job_id)
-            .order_by(table.iteration, table.particle)
-        )
+        return self.reevaluations_between(job_id, 0, _LARGEST_INDEX)
+
+    def reevaluations_between(
+        self, job_id: str, first: int, last: int
+    ) -> tuple[tuple[int, Reevaluation], ...]:
+        """Read the designs of a range of iterations that were evaluated anew."""
         with self._database.transaction(write=False) as connection:
             job_row(connection, job_id)
-            rows = connection.execute(query).mappings().all()
-        return tuple((row["iteration"], to_reevaluation(row)) for row in rows)
+            return select_reevaluations(connection, job_id, _bounded(first), _bounded(last))
 
     def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
         """Find what designs came to in any job."""

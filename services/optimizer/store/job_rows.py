@@ -7,18 +7,17 @@ import json
 from dataclasses import replace
 from typing import Any, Final
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from services.optimizer.errors import Unreadable
+from services.optimizer.jobs.chain import ChainDocuments
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
-from services.optimizer.jobs.provenance import ProvenanceRecord, ProvenanceRecords
+from services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import UnparsedText
-
-_RECORDS: Final = TypeAdapter(tuple[ProvenanceRecord, ...])
 
 _KEPT: Final = (
     "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"
@@ -65,6 +64,7 @@ def to_job(row: Row) -> Job:
             best_particle=row["best_particle"],
             compute_seconds=row["compute_seconds"],
             recent_seconds=row["recent_seconds"],
+            head=row["head"],
         ),
         provenance=provenance,
         accepts_changes=bool(row["accepts_changes"]),
@@ -150,7 +150,7 @@ def provenance_records(row: Row) -> ProvenanceRecords:
     """
     recorded = row["provenance"]
     try:
-        return _RECORDS.validate_python(() if recorded is None else recorded)
+        return RECORDS.validate_python(() if recorded is None else recorded)
     except ValidationError as error:
         problems = first_problems(error)
         raise kept(f"its provenance cannot be read by this gaitswarm ({problems})") from error
@@ -176,6 +176,18 @@ def lineage_document(lineage: Lineage | None) -> dict[str, Any] | None:
         The document, None for none.
     """
     return None if lineage is None else lineage.model_dump(mode="json")
+
+
+def chain_documents(row: Row) -> ChainDocuments:
+    """What a job's chain depends on beside its iterations.
+
+    Args:
+        row: The job's row.
+
+    Returns:
+        The documents as they are stored, whether they can be read or not.
+    """
+    return ChainDocuments(row["spec"], row["lineage"], row["provenance"])
 
 
 def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:

@@ -5,16 +5,37 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.jobs.chain import ChainDocuments, Link
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
 from services.optimizer.jobs.job import JobState
 
 T = TypeVar("T")
+
+SUMMARY: Final = ("best", "mean", "median", "worst", "best_so_far", "failed")
+"""Columns of an iteration that follow from its fitness."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredLink:
+    """A stored iteration beside its evaluations.
+
+    Attributes:
+        link: What is chained of it.
+        committed: Whether it is; an iteration that is not has been asked.
+        state: The optimizer's state; empty once it is cleared.
+        summary: Values of the columns `SUMMARY`.
+    """
+
+    link: Link
+    committed: bool
+    state: Any
+    summary: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +182,45 @@ class CommittedHistory(Protocol):
 
         Returns:
             (n, d) of each iteration, in order.
+        """
+
+    def chain_documents(self, job_id: str) -> ChainDocuments:
+        """Read what a job's chain depends on beside its iterations.
+
+        Args:
+            job_id: Of the job.
+
+        Returns:
+            The documents as they are stored, whether they can be read or not.
+        """
+
+    def links(self, job_id: str, first: int, last: int) -> tuple[StoredLink, ...]:
+        """Read a range of iterations beside their evaluations, the one under way with them.
+
+        Args:
+            job_id: Of the job.
+            first: Least index of an iteration.
+            last: Index after the greatest.
+
+        Returns:
+            Those that there are, in order.
+
+        Raises:
+            ValueError: One is damaged.
+        """
+
+    def reevaluations_between(
+        self, job_id: str, first: int, last: int
+    ) -> tuple[tuple[int, Reevaluation], ...]:
+        """As `reevaluations`, of a range of committed iterations.
+
+        Args:
+            job_id: Of the job.
+            first: Least index of an iteration.
+            last: Index after the greatest.
+
+        Returns:
+            Index of the iteration, and what its best design came to, in order.
         """
 
     def reevaluations(self, job_id: str) -> tuple[tuple[int, Reevaluation], ...]:

@@ -15,6 +15,7 @@ from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.provenance import JobProvenance, with_record
 from services.optimizer.jobs.time_left import recent_pace
+from services.optimizer.store.chain import chained_columns
 from services.optimizer.store.changes import announce
 from services.optimizer.store.columns import select_columns
 from services.optimizer.store.job_rows import provenance_document, provenance_records, to_job
@@ -100,8 +101,11 @@ def provenance_columns(job: Row, provenance: JobProvenance) -> dict[str, Any]:
     Returns:
         Values by name of their columns.
     """
-    records = with_record(provenance_records(job), job["iterations"], provenance)
-    return {"provenance": provenance_document(records), "accepts_changes": False}
+    before = provenance_records(job)
+    added = with_record(before, job["iterations"], provenance)[len(before) :]
+    # Earlier ones stay as they were written, as digests are of that.
+    document = [*(job["provenance"] or ()), *provenance_document(added)]
+    return {"provenance": document, "accepts_changes": False}
 
 
 def outstanding_ask(connection: Connection, job: Row) -> Ask | None:
@@ -166,7 +170,7 @@ def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now
 
 def complete_iteration(
     connection: Connection, job: Row, done: CompletedIteration, now: datetime
-) -> None:
+) -> str:
     """Fill in the iteration that was asked, and add its evaluations and reevaluation.
 
     The optimizer's state of the iteration before is cleared: a job goes on from the outstanding ask
@@ -178,9 +182,13 @@ def complete_iteration(
         done: What the iteration came to.
         now: The time of the commit.
 
+    Returns:
+        Digest of the iteration, chained to the one before.
+
     Raises:
         Conflict: The iteration was not asked, or is committed already.
     """
+    chained = chained_columns(connection, job, done)
     filled = connection.execute(
         update(iterations)
         .where(
@@ -191,6 +199,7 @@ def complete_iteration(
         .values(
             committed_at=now,
             evaluate_seconds=done.evaluate_seconds,
+            **chained,
             **fitness_summary(
                 done.fitness, None if done.best is None else done.best[1], job["best_fitness"]
             ),
@@ -210,6 +219,8 @@ def complete_iteration(
     if done.reevaluation is not None:
         row = reevaluation_row(job["id"], done.iteration, done.reevaluation)
         connection.execute(insert(reevaluations).values(row))
+    digest: str = chained["digest"]
+    return digest
 
 
 def entering(state: JobState, now: datetime) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import func, select
 
+from services.optimizer.jobs.chain import ask_digest
 from services.optimizer.jobs.iteration import (
     Ask,
     CompletedIteration,
@@ -41,7 +42,7 @@ _DESIGNS: Final = (
 """How many designs an iteration has; particles are counted from 0, and the index has the last."""
 
 LISTED: Final = (
-    *(c for c in iterations.c if c.name not in ("positions", "optimizer_state")),
+    *(c for c in iterations.c if c.name not in ("positions", "optimizer_state", "ask_digest")),
     _DESIGNS,
 )
 """Columns of an iteration as it is listed: an ask is a hundred times as long as all others."""
@@ -67,6 +68,7 @@ def to_iteration(row: Row) -> Iteration:
         failed=row["failed"],
         evaluate_seconds=row["evaluate_seconds"],
         committed_at=row["committed_at"],
+        digest=row["digest"],
     )
 
 
@@ -239,6 +241,7 @@ def ask_columns(ask: Ask) -> dict[str, Any]:
         "iteration": ask.iteration,
         "positions": ask.positions.tolist(),
         "optimizer_state": ask.state,
+        "ask_digest": ask_digest(ask.positions, ask.state),
     }
 
 

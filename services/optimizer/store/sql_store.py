@@ -362,11 +362,12 @@ class SqlStore(SqlHistory):
             row = held(connection, claim)
             now = self._clock(connection)
             require_budget_of(claim, row)
-            complete_iteration(connection, row, done, now)
+            head = complete_iteration(connection, row, done, now)
             if following is not None:
                 insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
             state = state_after_commit(JobState(row["state"]), following)
-            update_job(connection, row, entering(state, now) | progress_after(row, done))
+            progress = progress_after(row, done) | {"head": head}
+            update_job(connection, row, entering(state, now) | progress)
             return state
 
     def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:

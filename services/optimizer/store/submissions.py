@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, Table, bindparam, insert, literal, select, update
 
 from services.optimizer.errors import Conflict, IdempotencyConflict
+from services.optimizer.jobs.chain import ask_digest
 from services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from services.optimizer.jobs.iteration import best_particle
 from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.provenance import ProvenanceRecords
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.chain import chain_taken
 from services.optimizer.store.job_rows import (
+    chain_documents,
     lineage_document,
     provenance_document,
     spec_document,
@@ -144,14 +147,20 @@ def _take_history(
     count = _copy(connection, evaluations, job_id, lineage, {"walk_key": None})
     _copy(connection, reevaluations, job_id, lineage, {})
     own = (iterations.c.job_id == job_id, iterations.c.iteration == lineage.from_iteration - 1)
-    connection.execute(update(iterations).where(*own).values(optimizer_state=taken.state))
+    last = connection.execute(select(iterations.c.positions).where(*own)).scalar_one()
+    digest = ask_digest(np.array(last, dtype=np.float64), taken.state)
+    state = {"optimizer_state": taken.state, "ask_digest": digest}
+    connection.execute(update(iterations).where(*own).values(**state))
     if taken.fitness is not None:
         _judge_anew(connection, job_id, taken.fitness)
+    provenance = provenance_document(taken.provenance)
+    documents = chain_documents({**job, "provenance": provenance})
     return {
         "iterations": lineage.from_iteration,
         "evaluations": count,
         "evaluations_saved": count,
-        "provenance": provenance_document(taken.provenance),
+        "provenance": provenance,
+        "head": chain_taken(connection, job_id, documents, lineage.from_iteration),
         "accepts_changes": taken.accepts_changes,
         **_best(connection, job_id, job["spec"]["precision"]),
     }
@@ -176,7 +185,9 @@ def _copy(
     if table is iterations:
         rows = rows.where(table.c.committed_at.is_not(None))
     names = [column.name for column in table.c]
-    return connection.execute(insert(table).from_select(names, rows)).rowcount
+    # Drivers tell it for an insertion only as long as its cursor is open.
+    copied = insert(table).from_select(names, rows).execution_options(preserve_rowcount=True)
+    return connection.execute(copied).rowcount
 
 
 def _judge_anew(

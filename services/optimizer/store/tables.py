@@ -179,6 +179,8 @@ jobs: Final = Table(
     Column("waiting", Text),
     # That a design took in the last iterations, these the more the later; NULL before the first.
     Column("recent_seconds", Double),
+    # Digest of its last committed iteration; NULL before the first, and for older jobs.
+    Column("head", Text),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),
@@ -205,6 +207,10 @@ iterations: Final = Table(
     Column("best_so_far", Double),
     Column("failed", Integer),
     Column("evaluate_seconds", Double),
+    # Of positions and state, from the ask on; and of the iteration, chained to that of the one
+    # before. NULL where they were stored before there were any.
+    Column("ask_digest", Text),
+    Column("digest", Text),
     PrimaryKeyConstraint("job_id", "iteration"),
     ForeignKeyConstraint(["job_id"], ["jobs.id"]),
 )

@@ -248,6 +248,7 @@ def print_job(job: JobView) -> None:
     for record in job.provenance:
         since = f" from iteration {record.from_iteration}" if record.from_iteration else ""
         rows[f"computed by{since}"] = provenance_line(record.provenance)
+    rows["head"] = job.head
     table = Table(box=None, show_header=False)
     for name, value in rows.items():
         if value is not None:

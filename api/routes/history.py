@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import StreamingResponse
 
-from api.dependencies import LARGEST_INDEX, AfterIteration, ExistingJob, JobId, Service
+from api.dependencies import (
+    LARGEST_INDEX,
+    AfterIteration,
+    ExistingJob,
+    JobId,
+    ServerSettings,
+    Service,
+    Slots,
+)
 from api.documentation import binary, problems
 from gaitswarm.evidence.contents import evidence
+from gaitswarm.evidence.history import run_verification
+from gaitswarm.settings import Settings
 from gaitswarm.tables import MEDIA_TYPES, TableFormat, encoded_table
 from gaitswarm.views import (
     PREFIX,
@@ -20,8 +31,9 @@ from gaitswarm.views import (
     PageView,
     evaluation_views,
 )
+from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
-from services.optimizer.errors import NotFound
+from services.optimizer.errors import InvalidRequest, NotFound
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
 
@@ -105,6 +117,46 @@ def export_job(
         media_type=MEDIA_TYPES[file_format],
         headers={"Content-Disposition": f'attachment; filename="{job.id}.{file_format}"'},
     )
+
+
+@router.post(
+    "/verify",
+    operation_id="verify_history",
+    summary="Verify what is stored",
+    response_model=HistoryVerificationView,
+    responses=problems(400, 404, 409, 413, 422, 503),
+)
+async def verify_history(
+    request: VerificationRequest,
+    job: ExistingJob,
+    service: Service,
+    settings: ServerSettings,
+    slots: Slots,
+) -> Response:
+    """Compute the digests of a job's iterations again, and name the first that is not the stored
+    one; with `head`, say whether a digest that was noted down earlier is among them.
+
+    With `replay` so many evaluations walk again, and are compared to the bit. The answer waits for
+    these walks, so the time walked is limited.
+    """
+    check = partial(_check_length, settings)
+
+    def found() -> Response:
+        view = run_verification(service, job.id, request, check=check)
+        return Response(view.model_dump_json(), media_type="application/json")
+
+    return await slots.run(found)
+
+
+def _check_length(settings: Settings, seconds: float) -> None:
+    """Raises InvalidRequest."""
+    limit = settings.api_max_sampled_seconds
+    if seconds > limit:
+        raise InvalidRequest(
+            f"the walks of these evaluations last {seconds:g} s together, more than the {limit:g} s"
+            " allowed; choose fewer",
+            field="replay",
+        )
 
 
 @router.get(

@@ -5,22 +5,27 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.evidence.archive import parsed_json
 from gaitswarm.evidence.certificates import SUMMARY, summary_differs
-from gaitswarm.evidence.contents import BEST, best_of
+from gaitswarm.evidence.contents import BEST, CHAIN, best_of
+from gaitswarm.evidence.history import chain_check
 from gaitswarm.evidence.reading import Evidence, by_iteration
 from gaitswarm.views import BestView
 from services.optimizer.analysis.search_path import retraced
+from services.optimizer.analysis.verification import BrokenChain, Chain, judged
+from services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
+from services.optimizer.jobs.chain import ChainDocuments, Link, Outcomes
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.iteration import best_particle
+from services.optimizer.jobs.documents import SPECS, AnySpec
+from services.optimizer.jobs.fork import Lineage
+from services.optimizer.jobs.iteration import Reevaluation, best_particle
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.provenance import job_provenance
+from services.optimizer.jobs.provenance import RECORDS, job_provenance
 from services.optimizer.search.registry import METHODS
 from sim.kernel.source import kernel_identity
 from sim.robot import load_robot
@@ -49,6 +54,7 @@ def checks_of(evidence: Evidence, members: Mapping[str, bytes]) -> dict[str, Cal
         "best": lambda: _best(evidence, members),
         "designs": lambda: _designs(evidence),
         "search": lambda: _search(evidence),
+        "chain": lambda: _chain(evidence),
     }
     if SUMMARY in members:
         found["summary"] = lambda: _summary(evidence, members)
@@ -82,20 +88,12 @@ def _fitness(evidence: Evidence) -> Answer:
     """Fitness follows from raw objectives."""
     wrong, count = 0, 0
     for spec, columns in _tables(evidence):
-        judged = _judged(spec, columns)
-        wrong += int((judged.view(np.uint64) != columns.fitness.view(np.uint64)).sum())
+        again = judged(spec, columns)
+        wrong += int((again.view(np.uint64) != columns.fitness.view(np.uint64)).sum())
         count += len(columns)
     if wrong:
         return False, f"{wrong} of {count} do not follow from the raw objectives"
     return True, f"{count} of {count} follow from the raw objectives, to the bit"
-
-
-def _judged(spec: AnySpec, columns: EvaluationColumns) -> Floats:
-    # What is not finite is stored as nothing, and was infinite where the walk succeeded.
-    lost = ~columns.failed[:, :, np.newaxis] & np.isnan(columns.objectives)
-    with np.errstate(all="ignore"):
-        objectives = np.where(lost, np.inf, columns.objectives)
-        return np.ascontiguousarray(spec.judge(objectives, columns.failed).fitness)
 
 
 def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
@@ -155,6 +153,57 @@ def _search(evidence: Evidence) -> Answer:
             return None, "its memory was judged anew by another preference when it was forked"
         return False, f"{error}: other code, another seed, or numbers that it was never told"
     return True, f"{spec.search.name} asks for the same designs in {len(told)} iterations"
+
+
+def _chain(evidence: Evidence) -> Answer:
+    """The history is the one that its digests are of."""
+    said = evidence.chain
+    if said is None:
+        return None, "the file was written before histories were chained"
+    if said.version != CHAIN_VERSION:
+        return None, f"it is of version {said.version}, which this gaitswarm does not compute"
+    stored = (SPECS.validate_python(said.spec), said.lineage, said.provenance)
+    if not _belongs(evidence, *stored):
+        return False, f"{CHAIN} has another spec, lineage or provenance than the rest of the file"
+    documents = ChainDocuments(said.spec, said.lineage, said.provenance)
+    found = Chain(documents, evidence.spec)
+    anew = _anew(evidence)
+    links = zip(evidence.asked, said.asks, said.digests, strict=True)
+    try:
+        for index, (positions, ask, digest) in enumerate(links):
+            columns = evidence.columns.of_iteration(index)
+            link = Link(index, positions, ask, digest)
+            found.extend(link, Outcomes.read(columns, anew.get(index)))
+    except BrokenChain as error:
+        return False, str(error)
+    check = chain_check(found.iterations, found.chained_from, found.head)
+    return check.passed, check.detail
+
+
+def _belongs(evidence: Evidence, spec: AnySpec, lineage: Any, provenance: Any) -> bool:
+    """Whether documents, as they were stored, are those of the rest of the file."""
+    own = evidence.job.lineage
+    return (
+        spec.with_budget(evidence.spec.iterations) == evidence.spec
+        and (None if lineage is None else Lineage.model_validate(lineage)) == own
+        and RECORDS.validate_python(provenance or ()) == evidence.provenance.records
+    )
+
+
+def _anew(evidence: Evidence) -> dict[int, Reevaluation]:
+    """Reevaluations by iteration."""
+    columns = evidence.reevaluated
+    if columns is None:
+        return {}
+    return {
+        int(columns.iteration[row]): Reevaluation(
+            int(columns.particle[row]),
+            columns.objectives[row],
+            columns.statuses[row],
+            float(columns.fitness[row]),
+        )
+        for row in range(len(columns))
+    }
 
 
 def _summary(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:

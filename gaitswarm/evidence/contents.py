@@ -23,6 +23,8 @@ from gaitswarm.views import BestView, IterationView
 from gaitswarm.views.certificate import CertificateView
 from services.optimizer.analysis.fork import budgets_of
 from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
+from services.optimizer.jobs.chain import Link
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
@@ -42,6 +44,7 @@ ITERATIONS: Final = "history/iterations.json"
 EVALUATIONS: Final = "history/evaluations.parquet"
 ASKS: Final = "history/asks.parquet"
 REEVALUATIONS: Final = "history/reevaluations.parquet"
+CHAIN: Final = "history/chain.json"
 PAGE: Final = "index.html"
 
 _PIECE: Final = 1000
@@ -120,6 +123,7 @@ def _run(service: JobService, job: Job) -> _Run:
         BEST: None if view is None else json.loads(view.model_dump_json()),
         ITERATIONS: [json.loads(iteration.model_dump_json()) for iteration in iterations],
     }
+    documents[CHAIN] = chain_document(service, job)
     certified = None
     if isinstance(spec, CertificateSpec) and len(columns) > spec.nominal_rows:
         certified = summary(job.id, spec, columns)
@@ -155,6 +159,35 @@ def provenance_document(job: Job) -> dict[str, Any]:
         "written_by": here.model_dump(mode="json"),
         "kernels": kernels,
     }
+
+
+def chain_document(service: JobService, job: Job) -> dict[str, Any]:
+    """What the chain of a job's history depends on beside its tables, as it is stored.
+
+    Args:
+        service: Where the job is.
+        job: As it was read.
+
+    Returns:
+        The document; digests are those that are stored, and null where there is none.
+    """
+    stored = service.store.chain_documents(job.id)
+    links = [link for piece in _links(service, job) for link in piece]
+    return {
+        "version": CHAIN_VERSION,
+        "spec": stored.spec,
+        "lineage": stored.lineage,
+        "provenance": stored.provenance,
+        "asks": [link.ask_digest for link in links],
+        "digests": [link.digest for link in links],
+    }
+
+
+def _links(service: JobService, job: Job) -> Iterator[list[Link]]:
+    end = job.progress.iterations
+    for first in range(0, end, _PIECE):
+        found = service.store.links(job.id, first, min(first + _PIECE, end))
+        yield [stored.link for stored in found]
 
 
 def best_of(columns: EvaluationColumns, anew: EvaluationColumns | None) -> Evaluation | None:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from gaitswarm.evidence.archive import parsed_json
 from gaitswarm.evidence.contents import (
     ASKS,
+    CHAIN,
     EVALUATIONS,
     JOB,
     PROVENANCE,
@@ -75,6 +76,17 @@ class ProvenanceDocument(_Read):
     kernels: tuple[str, ...]
 
 
+class ChainDocument(_Read):
+    """What the chain of the history depends on beside the tables, as it was stored."""
+
+    version: int
+    spec: dict[str, Any]
+    lineage: dict[str, Any] | None
+    provenance: tuple[dict[str, Any], ...] | None
+    asks: tuple[str | None, ...]
+    digests: tuple[str | None, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
     """What a file of evidence says.
@@ -87,6 +99,7 @@ class Evidence:
         asked: (n, d) positions that the search asked for, by iteration.
         reevaluated: Designs that were evaluated anew in double; None of a search in double.
         recordings: Recorded walks that its cases need.
+        chain: Of its history; None in a file that was written before histories were chained.
     """
 
     job: JobDocument
@@ -96,6 +109,7 @@ class Evidence:
     asked: tuple[Floats, ...]
     reevaluated: EvaluationColumns | None
     recordings: Recordings
+    chain: ChainDocument | None
 
 
 def read_evidence(members: Mapping[str, bytes]) -> Evidence:
@@ -127,6 +141,7 @@ def read_evidence(members: Mapping[str, bytes]) -> Evidence:
             name: _parsed(RecordedWalk, members, f"recordings/{name}.json")
             for name in spec.recording_ids
         },
+        _parsed(ChainDocument, members, CHAIN) if CHAIN in members else None,
     )
     _check_order(evidence)
     return evidence

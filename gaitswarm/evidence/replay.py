@@ -19,6 +19,9 @@ from sim.mujoco.engines import ENGINE
 from sim.outcome import Outcome, Status
 from sim.provenance import provenance_of
 
+Table = tuple[AnySpec, EvaluationColumns]
+"""Evaluations, with a spec that says in which cases and precision they were made."""
+
 
 def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
     """Say whether evaluations of a job can be compared here.
@@ -56,14 +59,14 @@ def has_same_bits_anywhere(spec: AnySpec, columns: EvaluationColumns) -> NDArray
 
 
 def simulated_differences(
-    tables: Sequence[tuple[AnySpec, EvaluationColumns]],
+    tables: Sequence[Table],
     recordings: Recordings,
     certificate: str | None = None,
 ) -> list[DifferenceView]:
     """Simulate evaluations, and list what is not the same to the bit.
 
     Args:
-        tables: Evaluations, with a spec that says in which cases and precision they were made.
+        tables: What is compared.
         recordings: Recorded walks that the cases need.
         certificate: Id of the one that they are of; None for the job itself.
 
@@ -86,6 +89,28 @@ def simulated_differences(
             for number, (case, outcome) in enumerate(zip(spec.case_names, outcomes, strict=True)):
                 found += _different(spec, columns, number, case, outcome)
     return [one.model_copy(update={"certificate": certificate}) for one in found]
+
+
+def replay_answer(
+    count: int, with_best: bool, spec: AnySpec, differences: Sequence[DifferenceView]
+) -> tuple[bool, str]:
+    """Say what came of a replay.
+
+    Args:
+        count: Evaluations that were simulated.
+        with_best: Whether the best one is among them.
+        spec: Of the job.
+        differences: What is not the same.
+
+    Returns:
+        Whether nothing differs, and a sentence about it.
+    """
+    among = ", the best among them," if with_best else ""
+    what = f"{count} evaluations{among} in {len(spec.case_names)} cases"
+    if not differences:
+        return True, f"{what}: every bit is the same"
+    evaluations = len({(d.iteration, d.particle) for d in differences})
+    return False, f"{what}: {len(differences)} numbers of {evaluations} of them differ"
 
 
 def _different(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -27,9 +28,15 @@ from gaitswarm.evidence.checks import (
     checks_of,
 )
 from gaitswarm.evidence.contents import JOB, row_of
+from gaitswarm.evidence.history import head_check
 from gaitswarm.evidence.reading import Evidence, read_evidence
-from gaitswarm.evidence.replay import has_same_bits_anywhere, simulated_differences, why_no_replay
-from gaitswarm.views.verification import CheckView, DifferenceView, VerificationView
+from gaitswarm.evidence.replay import (
+    has_same_bits_anywhere,
+    replay_answer,
+    simulated_differences,
+    why_no_replay,
+)
+from gaitswarm.views.verification import DIGEST, CheckView, DifferenceView, VerificationView
 from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
 from services.optimizer.jobs.kinds.tuning import JobSpec
 
@@ -54,7 +61,11 @@ class _Found:
 
 
 def verify(
-    evidence: bytes | str | os.PathLike[str], *, replay: int = 20, seed: int | None = None
+    evidence: bytes | str | os.PathLike[str],
+    *,
+    replay: int = 20,
+    seed: int | None = None,
+    head: str | None = None,
 ) -> VerificationView:
     """Check evidence of a job, by itself: no database is needed.
 
@@ -65,23 +76,28 @@ def verify(
         replay: Evaluations to draw and simulate anew, besides the best one, of the job and of each
             certificate in its evidence; 0 for no walk at all.
         seed: By which they are drawn; None for one that nobody can foresee.
+        head: Digest of an iteration of the job that was noted down earlier, as `JobView.head`, to
+            be looked for; None to look for none.
 
     Returns:
         What was checked, and what differs.
 
     Raises:
         NotFound: There is no such file.
-        InvalidRequest: The file cannot be opened, or `replay` or `seed` is negative.
+        InvalidRequest: The file cannot be opened, `replay` or `seed` is negative, or `head` is no
+            digest.
         EvaluatorUnavailable: Walks cannot be run here.
     """
     for name, value in (("replay", replay), ("seed", seed or 0)):
         if value < 0:
             raise InvalidRequest("must not be negative", field=name)
+    if head is not None and not re.fullmatch(DIGEST, head):
+        raise InvalidRequest("must be 64 hexadecimal digits, in lower case", field="head")
     seed = secrets.randbelow(1 << 32) if seed is None else seed
     content = evidence if isinstance(evidence, bytes) else _content(Path(evidence))
     found = _Found()
     try:
-        _check(content, found, replay, seed)
+        _check(content, found, replay, seed, head)
     except BadArchive as error:
         found.add("contents" if found.checks else "archive", False, str(error))
     return VerificationView(
@@ -106,7 +122,7 @@ def _content(path: Path) -> bytes:
         raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="evidence") from error
 
 
-def _check(content: bytes, found: _Found, replay: int, seed: int) -> None:
+def _check(content: bytes, found: _Found, replay: int, seed: int, head: str | None) -> None:
     members = unzipped(content)
     wrong = check_hashes(members)
     found.add("archive", True, f"{len(members)} members, none compressed or hidden")
@@ -114,6 +130,10 @@ def _check(content: bytes, found: _Found, replay: int, seed: int) -> None:
     found.add("hashes", not wrong, "; ".join(wrong[:5]) or hashes)
     evidence = _check_run(members, found, replay, np.random.default_rng(seed))
     found.job = evidence.job.id
+    if head is not None:
+        digests = () if evidence.chain is None else evidence.chain.digests
+        at = digests.index(head) if head in digests else None
+        found.checks.append(head_check(head, at, len(evidence.asked)))
     certificates = by_certificate(members)
     for number, (job_id, own) in enumerate(sorted(certificates.items())):
         drawn = np.random.default_rng((seed, number))
@@ -216,9 +236,4 @@ def _replay(
     differences = simulated_differences(tables, evidence.recordings, certificate)
     found.differences += differences
     found.replayed += len(rows)
-    among = ", the best among them," if len(best) else ""
-    what = f"{len(rows)} evaluations{among} in {len(spec.case_names)} cases"
-    if not differences:
-        return True, f"{what}: every bit is the same"
-    evaluations = len({(d.iteration, d.particle) for d in differences})
-    return False, f"{what}: {len(differences)} numbers of {evaluations} of them differ"
+    return replay_answer(len(rows), len(best) > 0, spec, differences)

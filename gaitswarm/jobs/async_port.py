@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         TournamentView,
     )
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
+    from gaitswarm.views.verification import HistoryVerificationView
     from services.optimizer.analysis.fits.targets import LeaveOut
     from sim.identification.recorded_walk import RecordedWalk
 
@@ -238,6 +239,12 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def evidence(self, job_id: str) -> bytes:
         """Write one file that proves a job's run, for `gaitswarm.verify`."""
+
+    @abstractmethod
+    async def verify(
+        self, job_id: str, *, replay: int = 0, seed: int | None = None, head: str | None = None
+    ) -> HistoryVerificationView:
+        """Check that what is stored of a job is what was committed."""
 
     @abstractmethod
     async def record(self, walk: RecordedWalk) -> RecordingView:

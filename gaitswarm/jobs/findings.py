@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
+    from gaitswarm.views.verification import HistoryVerificationView
     from services.optimizer.analysis.fits.targets import LeaveOut
     from sim.kernel.walk import Precision
 
@@ -257,4 +258,25 @@ class Findings(ABC):
 
         Raises:
             Conflict: The job has committed no iteration yet, or is too large to be held in memory.
+        """
+
+    @abstractmethod
+    def verify(
+        self, job_id: str, *, replay: int = 0, seed: int | None = None, head: str | None = None
+    ) -> HistoryVerificationView:
+        """Check that what is stored of a job is what was committed.
+
+        Args:
+            job_id: Identifier of the job.
+            replay: Evaluations to draw and simulate anew, besides the best one; 0 for no walk.
+            seed: By which they are drawn; None for one that nobody can foresee.
+            head: Digest of an iteration that was noted down earlier, as `JobView.head`, to be
+                looked for.
+
+        Returns:
+            How far its iterations are those that their digests are of, and what differs first.
+
+        Raises:
+            InvalidRequest: An argument makes no sense, or the walks are more than a server allows.
+            EvaluatorUnavailable: Walks cannot be run there.
         """

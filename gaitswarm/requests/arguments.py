@@ -21,6 +21,7 @@ from gaitswarm.specs import (
 )
 from gaitswarm.tables import TableFormat
 from gaitswarm.views import RankingRequest
+from gaitswarm.views.verification import VerificationRequest
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.analysis.robustness.certificate import MOST_WORST
 from services.optimizer.jobs.fork import ForkRequest
@@ -214,6 +215,23 @@ def preferences(
         "precision": precision,
     }
     return checked(PreferencesRequest, document)
+
+
+def verification(replay: int, seed: int | None, head: str | None) -> VerificationRequest:
+    """How thoroughly to verify the history of a job.
+
+    Args:
+        replay: Evaluations to simulate anew.
+        seed: By which they are drawn.
+        head: Digest to look for.
+
+    Returns:
+        The request, checked.
+
+    Raises:
+        InvalidRequest: An argument makes no sense; names it.
+    """
+    return checked(VerificationRequest, {"replay": replay, "seed": seed, "head": head})
 
 
 def fork(from_iteration: int, options: ForkOptions) -> ForkRequest:

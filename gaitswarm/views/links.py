@@ -40,6 +40,7 @@ def job_links(job: Job) -> dict[str, str]:
         commands["extend"] = f"{here}/extend"
     if job.readable and job.progress.iterations:
         resources["evidence"] = f"{here}/evidence"
+        resources["verify"] = f"{here}/verify"
         commands["fork"] = f"{here}/fork"
     if job.lineage is not None:
         resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"

@@ -44,6 +44,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/events",
         f"get {job}/export",
         f"get {job}/evidence",
+        f"post {job}/verify",
         f"get {job}/distribution",
         f"get {job}/particles",
         f"post {job}/ranking",

@@ -6,7 +6,7 @@ import io
 import json
 import shutil
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ JOB: dict[str, Any] = {
 
 EVALUATIONS = "history/evaluations.parquet"
 ASKS = "history/asks.parquet"
+CHAIN = "history/chain.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +97,9 @@ def certified(proved: Proved, tmp_path_factory: pytest.TempPathFactory) -> Certi
 Change = Callable[[bytes], bytes]
 
 
-def tampered(content: bytes, changes: dict[str, Change]) -> bytes:
-    """Evidence with other members, and a manifest that says so."""
-    members = unzipped(content)
-    del members[MANIFEST]
+def tampered(content: bytes, changes: Mapping[str, Change], without: Sequence[str] = ()) -> bytes:
+    """Evidence with other members, without some, and a manifest that says so."""
+    members = {n: m for n, m in unzipped(content).items() if n not in (MANIFEST, *without)}
     return archived(
         {name: changes[name](m) if name in changes else m for name, m in members.items()}
     )

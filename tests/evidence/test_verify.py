@@ -17,6 +17,7 @@ from gaitswarm.zip_archive import unzipped
 from sim.controllers import CONTROLLERS
 from tests.evidence.conftest import (
     ASKS,
+    CHAIN,
     EVALUATIONS,
     JOB,
     Change,
@@ -34,7 +35,7 @@ ALL = 1000
 
 CHECKS = [
     *("archive", "hashes", "contents", "robot"),
-    *("fitness", "best", "designs", "search", "replay"),
+    *("fitness", "best", "designs", "search", "chain", "replay"),
 ]
 
 Columns = dict[str, list[Any]]
@@ -82,6 +83,7 @@ def test_untouched_evidence_is_verified_in_all_it_says(proved: Proved) -> None:
             "best",
             "designs",
             "search",
+            "chain",
             "replay",
         ],
         True,
@@ -110,7 +112,7 @@ def test_one_bit_of_an_objective_that_nothing_follows_from_is_caught_by_the_repl
         row = walked(columns)
         columns["short.height_loss"][row] = next_up(columns["short.height_loss"][row])
 
-    content = tampered(proved.content, {EVALUATIONS: with_cells(change)})
+    content = tampered(proved.content, {EVALUATIONS: with_cells(change)}, without=[CHAIN])
     assert gaitswarm.verify(content, replay=0).verified
     found = gaitswarm.verify(content, replay=ALL)
     assert failed(found) == ["replay"]
@@ -149,7 +151,7 @@ def test_one_bit_of_an_objective_that_counts_is_caught_without_a_walk(proved: Pr
         columns["short.torque"][row] *= 1.001
 
     found = gaitswarm.verify(tampered(proved.content, {EVALUATIONS: with_cells(change)}), replay=0)
-    assert failed(found) == ["fitness"]
+    assert failed(found) == ["fitness", "chain"]
 
 
 def test_one_bit_of_a_file_is_caught_by_its_hash(proved: Proved) -> None:
@@ -182,9 +184,9 @@ def test_another_best_another_design_another_search_and_another_robot_are_caught
 
     assert of(changed("job.json", worse)) == ["best"]
     assert of(changed("best.json", {"design": {"P": 0.0, "I": 0.0}})) == ["best"]
-    assert of({EVALUATIONS: with_cells(moved)}) == ["designs"]
-    assert of({ASKS: with_cells(asked)}) == ["designs", "search"]
-    assert of(changed("spec.json", {"seed": 6})) == ["search"]
+    assert of({EVALUATIONS: with_cells(moved)}) == ["designs", "chain"]
+    assert of({ASKS: with_cells(asked)}) == ["designs", "search", "chain"]
+    assert of(changed("spec.json", {"seed": 6})) == ["search", "chain"]
     assert of({"robots/0/robot.urdf": lambda urdf: urdf + b" "}) == ["robot"]
 
 
@@ -194,7 +196,7 @@ def test_other_code_is_reported_and_equal_bits_verify_all_the_same(proved: Prove
         document["records"][0]["provenance"]["simulation"]["code_digest"] = "0" * 32
         return json.dumps(document).encode()
 
-    content = tampered(proved.content, {"provenance.json": other})
+    content = tampered(proved.content, {"provenance.json": other}, without=[CHAIN])
     found = gaitswarm.verify(content, replay=2, seed=1)
     assert found.verified
     assert found.provenance[0] == "from iteration 0 on: other simulation code"
@@ -211,8 +213,8 @@ def test_a_search_in_single_precision_is_verified_with_its_best_in_double(tmp_pa
         columns["short.height_loss"][-1] = next_up(columns["short.height_loss"][-1])
 
     content = tampered(content, {"history/reevaluations.parquet": with_cells(better)})
-    assert failed(gaitswarm.verify(content, replay=0)) == ["best"]
-    assert failed(gaitswarm.verify(content, replay=1)) == ["best", "replay"]
+    assert failed(gaitswarm.verify(content, replay=0)) == ["best", "chain"]
+    assert failed(gaitswarm.verify(content, replay=1)) == ["best", "chain", "replay"]
 
 
 def test_a_fork_that_was_judged_anew_is_verified_but_for_the_way_of_its_search(
@@ -271,4 +273,4 @@ def test_what_a_multi_objective_search_was_told_is_checked_too(tmp_path: Path) -
             columns["short.energy"][row] = 1.0 / columns["short.energy"][row]
 
     found = gaitswarm.verify(tampered(content, {EVALUATIONS: with_cells(change)}), replay=0)
-    assert failed(found) == ["search"]
+    assert failed(found) == ["search", "chain"]

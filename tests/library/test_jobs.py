@@ -140,6 +140,7 @@ REFUSED: dict[str, tuple[Callable[[gaitswarm.Jobs, str], Any], str]] = {
     ),
     "a drive's certificate": (lambda jobs, job: jobs.certificate(job), "job_id"),
     "no world": (lambda jobs, job: jobs.certificate(job, worlds=0), "worlds"),
+    "verify by no digest": (lambda jobs, job: jobs.verify(job, head="abc"), "head"),
     "no design": (lambda jobs, _: jobs.simulate(cast(Any, 3)), "design"),
     "half a design": (lambda jobs, _: jobs.simulate({"P": 0.4}, controller="pi"), "design"),
     "gait out of reach": (
@@ -354,6 +355,20 @@ def test_designs_are_ranked_by_another_preference(reach: Reach, finished: Finish
     by_torque = np.sort(np.exp(np.log(table.objectives[:, :, 0]).mean(axis=1)))
     assert [design.fitness for design in ranking.top] == pytest.approx(by_torque[:2])
     assert jobs.ranking(finished.id, "B").preference == "B"
+
+
+def test_the_stored_history_is_verified(reach: Reach, finished: Finished) -> None:
+    jobs = reach(finished.db)
+    head = jobs.job(finished.id).head
+    found = jobs.verify(finished.id, replay=2, seed=1, head=head)
+    assert found.verified and [check.name for check in found.checks] == ["chain", "head", "replay"]
+    assert (found.iterations, found.head, found.seed) == (2, head, 1)
+    assert found.head == finished.result.job.head == list(jobs.iterations(finished.id))[-1].digest
+    with closing(sqlite3.connect(finished.db)) as connection:
+        connection.execute("UPDATE evaluations SET fitness = 1 WHERE iteration = 1")
+        connection.commit()
+    changed = jobs.verify(finished.id)
+    assert not changed.verified and changed.broken_at == 1
 
 
 def test_runs_of_other_seeds_tell_which_parameters_agree(reach: Reach, finished: Finished) -> None:

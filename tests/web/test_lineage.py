@@ -49,3 +49,17 @@ def test_evidence_is_downloaded_and_verified(
         evidence.get_by_role("link", name="Download").click()
     assert download.value.suggested_filename == f"{finished_job}.zip"
     assert gaitswarm.verify(download.value.path(), replay=1).verified
+
+
+def test_the_history_is_verified_on_the_page(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/reproduce")
+    card = page.get_by_role("region", name="What its numbers depend on")
+    with gaitswarm.connect(server.url) as jobs:
+        head = jobs.job(finished_job).head
+    expect(card.locator(f"[data-head='{head}']")).to_contain_text(str(head)[:16])
+    card.get_by_role("button", name="Verify").click()
+    verified = card.locator("[data-verified='true']")
+    expect(verified).to_contain_text("History verified: ")
+    expect(verified).to_contain_text(f"iterations chained, head {head}")

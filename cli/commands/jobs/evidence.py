@@ -10,7 +10,8 @@ import typer
 from cli.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from gaitswarm.views.verification import VerificationView
+    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.views.verification import HistoryVerificationView, VerificationView
 
 
 def register(app: typer.Typer) -> None:
@@ -45,7 +46,7 @@ def evidence(
 def verify(
     source: Annotated[
         str,
-        typer.Argument(metavar="FILE|ID", help="File of `evidence`, or a job's id to check it by."),
+        typer.Argument(metavar="FILE|ID", help="File of `evidence`, or a job's id."),
     ],
     replay: Annotated[
         int,
@@ -60,25 +61,35 @@ def verify(
         int | None,
         typer.Option(min=0, help="By which they are drawn. [default: one that is not foreseen]"),
     ] = None,
+    head: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DIGEST",
+            help="Of an iteration, noted down earlier: the history has to be the one it was of.",
+        ),
+    ] = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Check evidence: hashes, what follows from what, and walks, to the bit; 1 if any differs.
+    """Check evidence, or the stored history of a job, to the bit; 1 if anything differs.
 
-    It needs neither database nor network, and never trusts the file.
+    A file needs neither database nor network, and is never trusted. Of a job the digests of its
+    iterations are computed again from what is stored, and the first that differs is named.
     """
     from cli.exit_codes import CheckFailed
     from cli.output import print_json
     from gaitswarm.evidence.verify import verify as verified
     from gaitswarm.jobs.open import open_jobs
 
+    found: VerificationView | HistoryVerificationView
     if Path(source).exists() or Path(source).name != source or "." in source:
-        found = verified(source, replay=replay, seed=seed)
+        found = verified(source, replay=replay, seed=seed, head=head)
     else:
         with open_jobs(server, db) as jobs:
-            content = jobs.evidence(source)
-        found = verified(content, replay=replay, seed=seed)
+            found = jobs.verify(source, head=head)
+            if found.verified:
+                found = _in_full(jobs, source, found, replay=replay, seed=seed, head=head)
     if as_json:
         print_json(found)
     else:
@@ -87,12 +98,36 @@ def verify(
         raise CheckFailed(f"{source} is not what it says to be")
 
 
-def _print(found: VerificationView) -> None:
+def _in_full(
+    jobs: Jobs,
+    job_id: str,
+    found: HistoryVerificationView,
+    *,
+    replay: int,
+    seed: int | None,
+    head: str | None,
+) -> VerificationView | HistoryVerificationView:
+    """What is stored of a job as it was committed, checked here as evidence."""
+    from gaitswarm.errors import Conflict
+    from gaitswarm.evidence.verify import verify as verified
+
+    try:
+        content = jobs.evidence(job_id)
+    except Conflict:
+        if not found.iterations:
+            raise
+        # A history that is too large for a file: only drawn evaluations of it are in memory.
+        return jobs.verify(job_id, replay=replay, seed=seed, head=head)
+    return verified(content, replay=replay, seed=seed, head=head)
+
+
+def _print(found: VerificationView | HistoryVerificationView) -> None:
     from rich.table import Table
     from rich.text import Text
 
     from cli.output import stdout_console
     from cli.tables import number
+    from gaitswarm.views.verification import VerificationView
 
     console = stdout_console()
     table = Table(box=None, show_header=False)
@@ -117,4 +152,8 @@ def _print(found: VerificationView) -> None:
     if found.replayed:
         console.print(f"drawn by seed {found.seed}", markup=False)
     result = "verified" if found.verified else "NOT verified"
-    console.print(f"{result}: SHA-256 {found.sha256}", markup=False)
+    if isinstance(found, VerificationView):
+        what = f"SHA-256 {found.sha256}"
+    else:
+        what = f"job {found.job}"
+    console.print(f"{result}: {what}", markup=False)

@@ -27,6 +27,7 @@ from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
+from gaitswarm.views.verification import HistoryVerificationView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from sim.kernel.walk import Precision
 
@@ -144,6 +145,14 @@ class AsyncDatabaseFindings(ABC):
         """Write evidence from what is stored."""
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.evidence, job_id)
+
+    async def verify(
+        self, job_id: str, *, replay: int = 0, seed: int | None = None, head: str | None = None
+    ) -> HistoryVerificationView:
+        """Compute a job's chain again from what is stored, in a thread."""
+        jobs = await self._jobs()
+        asked = partial(jobs.verify, job_id, replay=replay, seed=seed, head=head)
+        return await to_thread.run_sync(asked)
 
     async def tournaments(self) -> list[TournamentView]:
         """Read which tournaments there are."""

@@ -29,6 +29,7 @@ from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
+from gaitswarm.views.verification import HistoryVerificationView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.service import JobService
 from sim.kernel.walk import Precision
@@ -139,6 +140,15 @@ class DatabaseFindings(Findings, Tournaments):
         from gaitswarm.evidence.contents import evidence
 
         return evidence(self._service, job_id)
+
+    def verify(
+        self, job_id: str, *, replay: int = 0, seed: int | None = None, head: str | None = None
+    ) -> HistoryVerificationView:
+        """Compute a job's chain again from what is stored, and walk here."""
+        from gaitswarm.evidence.history import run_verification
+
+        request = arguments.verification(replay, seed, head)
+        return run_verification(self._service, job_id, request)
 
     def tournaments(self) -> list[TournamentView]:
         """Read which tournaments there are."""

@@ -34,6 +34,7 @@ from gaitswarm.views.tournament import (
     TournamentsView,
 )
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
+from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
@@ -186,6 +187,16 @@ def evidence(job_id: str) -> Call[bytes]:
         job_id: Identifier of the job.
     """
     return Call("GET", f"{job_path(job_id)}/evidence", bytes)
+
+
+def verify(job_id: str, request: VerificationRequest) -> Call[HistoryVerificationView]:
+    """Check that what is stored of a job is what was committed.
+
+    Args:
+        job_id: Identifier of the job.
+        request: How thoroughly.
+    """
+    return posted(f"{job_path(job_id)}/verify", HistoryVerificationView, request, reads=True)
 
 
 def events(job_id: str, last: int | None) -> Call[bytes]:

@@ -36,6 +36,7 @@ from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
+from gaitswarm.views.verification import HistoryVerificationView
 from services.optimizer.analysis.fits.targets import LeaveOut
 from sim.kernel.walk import Precision
 
@@ -148,6 +149,13 @@ class ServerFindings(Findings, Tournaments, ABC):
     def evidence(self, job_id: str) -> bytes:
         """Let the server write evidence, and download it."""
         return self._send(calls.evidence(job_id))
+
+    def verify(
+        self, job_id: str, *, replay: int = 0, seed: int | None = None, head: str | None = None
+    ) -> HistoryVerificationView:
+        """Let the server compute a job's chain again, and walk."""
+        request = arguments.verification(replay, seed, head)
+        return self._send(calls.verify(job_id, request))
 
     def tournaments(self) -> list[TournamentView]:
         """Ask the server which tournaments there are."""

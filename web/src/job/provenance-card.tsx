@@ -1,6 +1,7 @@
 /** What a job's numbers depend on beside its spec, since which iteration. */
 
 import type { Job } from '../api/types'
+import { HistoryCheck } from './history-check'
 
 /** Digits of a digest that tell it from others. */
 const SHOWN = 8
@@ -53,6 +54,7 @@ export function ProvenanceCard({ job }: { job: Job }) {
           </table>
         </div>
       )}
+      {job.iterations > 0 && <HistoryCheck job={job} />}
     </section>
   )
 }

@@ -6,7 +6,7 @@ What a body is validated by is Python: in the event loop, every other request wo
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any, Final
 
@@ -16,18 +16,13 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
 from sim.errors import RobotFileError
-from sim.robot.check import check_files
+from sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
 
 MOST_NAMES: Final = 10_000
 """Names of fields in a body, designs to start from aside: each may be an error to be told."""
 
 MOST_VARIABLES: Final = 128
 """Names of a design to start from that do not count."""
-
-MOST_ROBOTS: Final = 16
-"""Robots of one's own in a body."""
-
-Location = tuple[str | int, ...]
 
 
 def validated(model: Any, name: str) -> Callable[..., Any]:
@@ -72,12 +67,12 @@ def _validated(adapter: TypeAdapter[Any], document: Any) -> Any:
 def _check_bounds(document: Any) -> None:
     """What is costly before it is refused: very many names, and robots."""
     names, robots = 0, list[tuple[Location, str, str]]()
-    for where, part in _objects(document):
+    for where, part in objects_in(document):
         # Of designs to start from the first bad one is told; there may be many.
         names += len(part) if where[-2:-1] != ("start",) else max(0, len(part) - MOST_VARIABLES)
-        toml, urdf = part.get("toml"), part.get("urdf")
-        if isinstance(toml, str) and isinstance(urdf, str):
-            robots.append((where, toml, urdf))
+        files = files_of(part)
+        if files is not None:
+            robots.append((where, *files))
         if names > MOST_NAMES:
             raise _refusal(where, f"more than {MOST_NAMES} fields by here; send fewer", document)
         if len(robots) > MOST_ROBOTS:
@@ -93,15 +88,3 @@ def _check_bounds(document: Any) -> None:
 def _refusal(where: Location, problem: str, document: Any) -> RequestValidationError:
     entry = {"type": "value_error", "loc": ("body", *where), "msg": problem, "input": None}
     return RequestValidationError([entry], body=document)
-
-
-def _objects(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
-    """All objects of a document, and where they are."""
-    waiting: list[tuple[Location, Any]] = [((), document)]
-    while waiting:
-        where, value = waiting.pop()
-        if isinstance(value, dict):
-            yield where, value
-            waiting += [((*where, key), part) for key, part in value.items()]
-        elif isinstance(value, list):
-            waiting += [((*where, index), part) for index, part in enumerate(value)]

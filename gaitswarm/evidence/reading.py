@@ -26,8 +26,10 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
+from sim.errors import RobotFileError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 from sim.outcome import Status
+from sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -37,6 +39,9 @@ _LARGEST_TABLE: Final = 1 << 30
 
 _THRIFT: Final = 1 << 22
 """Of strings and lists in a Parquet file's own description."""
+
+_WITH_ROBOTS: Final = (SPEC, CHAIN)
+"""Documents that hold specs."""
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -145,6 +150,31 @@ def read_evidence(members: Mapping[str, bytes]) -> Evidence:
     )
     _check_order(evidence)
     return evidence
+
+
+def check_robots(members: Mapping[str, bytes]) -> None:
+    """Check the robots of all documents of an archive, in a process that may be ended.
+
+    Args:
+        members: Contents by name, those of certificates among them.
+
+    Raises:
+        BadArchive: There are too many of them, or one cannot be used; names the document.
+    """
+    robots: dict[tuple[str, str], str] = {}
+    for name, content in members.items():
+        if name.endswith(_WITH_ROBOTS):
+            for _, part in objects_in(parsed_json(content, name)):
+                files = files_of(part)
+                if files is not None:
+                    robots.setdefault(files, name)
+                if len(robots) > MOST_ROBOTS:
+                    raise BadArchive(f"{name}: it has more than {MOST_ROBOTS} robots")
+    for files, name in robots.items():
+        try:
+            check_files(*files)
+        except RobotFileError as error:
+            raise BadArchive(f"{name} cannot be read: {error}") from error
 
 
 def _check_order(evidence: Evidence) -> None:

@@ -29,7 +29,7 @@ from gaitswarm.evidence.checks import (
 )
 from gaitswarm.evidence.contents import JOB, row_of
 from gaitswarm.evidence.history import head_check
-from gaitswarm.evidence.reading import Evidence, read_evidence
+from gaitswarm.evidence.reading import Evidence, check_robots, read_evidence
 from gaitswarm.evidence.replay import (
     has_same_bits_anywhere,
     replay_answer,
@@ -128,6 +128,7 @@ def _check(content: bytes, found: _Found, replay: int, seed: int, head: str | No
     found.add("archive", True, f"{len(members)} members, none compressed or hidden")
     hashes = f"SHA-256 of {len(members) - 1} members are those of the manifest"
     found.add("hashes", not wrong, "; ".join(wrong[:5]) or hashes)
+    check_robots(members)
     evidence = _check_run(members, found, replay, np.random.default_rng(seed))
     found.job = evidence.job.id
     if head is not None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterator
+from typing import Any, Final
 
 from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
 from sim.limited_process import Document, LimitedProcesses, serve
@@ -19,6 +20,11 @@ CPU_SECONDS: Final = 10
 
 MEMORY: Final = 2 << 30
 """Address space of a process that checks [B]; it takes a tenth of that."""
+
+MOST_ROBOTS: Final = 16
+"""Robots of one's own in a document."""
+
+Location = tuple[str | int, ...]
 
 PROCESSES: Final = LimitedProcesses(
     "sim.robot.check", count=2, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
@@ -48,6 +54,38 @@ def check_files(toml: str, urdf: str) -> None:
     except SimulationInputError as error:
         raise RobotFileError(str(error)) from error
     PASSED.add(digest)
+
+
+def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
+    """Walk through a document of JSON.
+
+    Args:
+        document: Of what JSON has.
+
+    Yields:
+        All objects in it, and where they are.
+    """
+    waiting: list[tuple[Location, Any]] = [((), document)]
+    while waiting:
+        where, value = waiting.pop()
+        if isinstance(value, dict):
+            yield where, value
+            waiting += [((*where, key), part) for key, part in value.items()]
+        elif isinstance(value, list):
+            waiting += [((*where, index), part) for index, part in enumerate(value)]
+
+
+def files_of(part: dict[str, Any]) -> tuple[str, str] | None:
+    """A robot's files in an object of a document.
+
+    Args:
+        part: The object.
+
+    Returns:
+        Texts of robot.toml and robot.urdf; None for anything else.
+    """
+    toml, urdf = part.get("toml"), part.get("urdf")
+    return (toml, urdf) if isinstance(toml, str) and isinstance(urdf, str) else None
 
 
 def _answer(request: Document) -> Document:

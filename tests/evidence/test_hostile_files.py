@@ -16,7 +16,10 @@ import pytest
 import gaitswarm
 from gaitswarm.evidence.archive import MANIFEST, archived
 from gaitswarm.zip_archive import unzipped
-from tests.evidence.conftest import EVALUATIONS, Proved, tampered, with_manifest
+from sim.errors import ProcessEnded
+from sim.robot import check, variant
+from tests.evidence.conftest import CHAIN, EVALUATIONS, Change, Proved, tampered, with_manifest
+from tests.examples.hostile import TOML, URDF, chain
 
 pytestmark = pytest.mark.slow
 
@@ -120,6 +123,57 @@ def test_a_manifest_cannot_vouch_for_itself(proved: Proved) -> None:
     assert [check.detail for check in found.checks if check.passed is False] == [
         f"{MANIFEST} has another SHA-256"
     ]
+
+
+def with_robot(toml: str, urdf: str) -> Change:
+    """A document that names a robot of its own."""
+
+    def change(content: bytes) -> bytes:
+        return json.dumps(json.loads(content) | {"robot": {"toml": toml, "urdf": urdf}}).encode()
+
+    return change
+
+
+@pytest.mark.parametrize("name", ["spec.json", CHAIN, "certificates/of-best/spec.json"])
+def test_a_robot_that_ends_a_parser_ends_another_process_than_this(
+    proved: Proved, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def ended(_: object) -> dict[str, object]:
+        raise ProcessEnded("was ended by SIGSEGV")
+
+    def parsed_here(*_: str) -> None:
+        raise AssertionError("the robot was read in this process")
+
+    monkeypatch.setattr(check.PROCESSES, "ask", ended)
+    monkeypatch.setattr(variant, "parse_robot", parsed_here)
+    members = {n: m for n, m in unzipped(proved.content).items() if n != MANIFEST}
+    members["certificates/of-best/spec.json"] = members["spec.json"]
+    members[name] = with_robot(f"# {name}\n{TOML}", URDF)(members[name])
+    why = refusal(archived(members))
+    assert why.startswith(f"{name} cannot be read: ") and "was ended by SIGSEGV" in why
+
+
+def test_a_robot_that_breaks_a_bound_is_refused_as_text(
+    proved: Proved, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(check.PROCESSES, "ask", None)
+    for robot in (with_robot(TOML, chain(4500)), with_robot("a." * 8000 + "a = 1", URDF)):
+        assert "spec.json cannot be read: robot." in refusal(
+            tampered(proved.content, {"spec.json": robot})
+        )
+
+
+def test_more_robots_than_a_job_has_are_not_tried(
+    proved: Proved, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(check.PROCESSES, "ask", None)
+
+    def crowded(content: bytes) -> bytes:
+        robots = [{"toml": f"# {number}", "urdf": URDF} for number in range(check.MOST_ROBOTS + 1)]
+        return json.dumps(json.loads(content) | {"robot": robots}).encode()
+
+    why = refusal(tampered(proved.content, {"spec.json": crowded}))
+    assert why == f"spec.json: it has more than {check.MOST_ROBOTS} robots"
 
 
 def parquet(table: pa.Table, **options: object) -> bytes:

@@ -8,7 +8,10 @@ from pathlib import Path
 
 from cli.exit_codes import ExitCode
 from services.optimizer.store.revisions import head
-from tests.cli.conftest import Gaitswarm
+from services.optimizer.store.sql_store import open_store
+from tests.cli.conftest import Finished, Gaitswarm
+from tests.store.examples import spec
+from tests.store.test_opening import edit
 from tests.store.test_upgrades import OLDER, store_older
 
 
@@ -38,3 +41,41 @@ def test_a_database_in_use_is_not_upgraded(gaitswarm: Gaitswarm, db: Path) -> No
 def test_a_database_that_is_not_there_is_not_made(gaitswarm: Gaitswarm, db: Path) -> None:
     assert gaitswarm("db", "upgrade", "--db", db).code == ExitCode.NOT_FOUND
     assert not db.exists()
+
+
+def test_a_backup_is_made_and_restored_and_overwrites_only_by_force(
+    gaitswarm: Gaitswarm, finished: Finished, db: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "backup.db"
+    assert gaitswarm("db", "backup", file, "--db", finished.db).code == ExitCode.OK
+    again = gaitswarm("db", "backup", file, "--db", finished.db)
+    assert again.code == ExitCode.CONFLICT and "--force" in again.err
+    assert gaitswarm("db", "backup", file, "--force", "--db", finished.db).code == ExitCode.OK
+
+    assert gaitswarm("db", "restore", file, "--db", db).code == ExitCode.OK
+    assert gaitswarm("best", finished.id, "--db", db, "--json").json
+    again = gaitswarm("db", "restore", file, "--db", db)
+    assert again.code == ExitCode.CONFLICT and "--force" in again.err
+    assert gaitswarm("db", "restore", file, "--force", "--db", db).code == ExitCode.OK
+
+
+def test_a_check_says_what_is_wrong_and_ends_so(gaitswarm: Gaitswarm, db: Path) -> None:
+    open_store(str(db)).close()
+    sound = gaitswarm("db", "check", "--db", db, "--json")
+    assert (sound.code, sound.json) == (ExitCode.OK, [])
+    store_job_without_iterations(db)
+    broken = gaitswarm("db", "check", "--db", db, "--json")
+    assert broken.code == ExitCode.JOB_FAILED
+    assert any("counts 3 iterations, but has 0" in finding for finding in broken.json)
+
+
+def store_job_without_iterations(db: Path) -> None:
+    with closing(open_store(str(db))) as store:
+        store.create_job(spec())
+    edit(f"sqlite:///{db}", "UPDATE jobs SET iterations = 3")
+
+
+def test_pruning_says_what_it_removed(gaitswarm: Gaitswarm, finished: Finished) -> None:
+    pruned = gaitswarm("db", "prune", "--db", finished.db)
+    assert pruned.code == ExitCode.OK and "0 recorded walks" in pruned.err
+    assert gaitswarm("best", finished.id, "--db", finished.db, "--json").json

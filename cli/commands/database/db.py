@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
-from cli.options import Db
+from cli.options import Db, Json
+
+Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
 
 
 def register(app: typer.Typer) -> None:
     """Add the group of commands."""
     group = typer.Typer(help="Upgrade, check, back up, restore and prune the database.")
-    group.command()(upgrade)
+    for command in (upgrade, check, backup, restore, prune):
+        group.command()(command)
     app.add_typer(group, name="db")
 
 
@@ -28,6 +34,71 @@ def upgrade(db: Db = None) -> None:
         note(f"the database has this version's schema already, revision {before}")
     else:
         note(f"the database has schema revision {head()} now, after {before or 'none'}")
+
+
+def check(db: Db = None, as_json: Json = False) -> None:
+    """Read all of the database, and look for what contradicts itself. Jobs may run meanwhile.
+
+    Exit code 1 if there is anything.
+    """
+    import json
+
+    from cli.exit_codes import CheckFailed
+    from cli.output import note, print_text
+    from services.optimizer.store import maintenance
+
+    findings = maintenance.check(_database(db))
+    if as_json:
+        print_text(json.dumps(findings, indent=2) + "\n")
+    else:
+        print_text("".join(f"{finding}\n" for finding in findings))
+    if findings:
+        raise CheckFailed(f"the database is not as it should be: {len(findings)} findings")
+    note("the database is as it should be")
+
+
+def backup(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="To be made.")],
+    force: Force = False,
+    db: Db = None,
+) -> None:
+    """Write all that the database holds at one moment to a file. Jobs may run meanwhile.
+
+    The file is an SQLite database, whatever the database is.
+    """
+    from cli.output import note
+    from services.optimizer.store import backup
+
+    backup.backup(_database(db), file, overwrite=force)
+    note(f"{file} holds all of the database")
+
+
+def restore(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="As `backup` made it.")],
+    force: Force = False,
+    db: Db = None,
+) -> None:
+    """Fill an empty database with a backup. It must not be in use.
+
+    A backup by an older version comes in this version's schema, one of SQLite may be restored to
+    PostgreSQL, and the other way round.
+    """
+    from cli.output import note
+    from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.settings import read_settings
+    from services.optimizer.store import backup
+
+    backup.restore(database_to_write(read_settings(db=db or None)), file, overwrite=force)
+    note(f"the database holds what {file} does")
+
+
+def prune(db: Db = None) -> None:
+    """Remove recorded walks that no job refers to, a day after they came, and free their space."""
+    from cli.output import note
+    from services.optimizer.store import maintenance
+
+    removed = maintenance.prune(_database(db))
+    note(f"{removed} recorded walks are removed, and free space is given back")
 
 
 def _database(db: str | None) -> str:

@@ -132,17 +132,36 @@ class Database:
         Raises:
             StoreUnavailable: The database is unreachable, or locked for `BUSY_SECONDS`.
         """
+        with self._translated(), self.engine.connect() as connection:
+            connection.execution_options(**{_WRITE: write})
+            if before is not None:
+                before(connection)
+            with connection.begin():
+                yield connection
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        """Raise StoreUnavailable for what is the database's fault."""
         try:
-            with self.engine.connect() as connection:
-                connection.execution_options(**{_WRITE: write})
-                if before is not None:
-                    before(connection)
-                with connection.begin():
-                    yield connection
+            yield
         except (DatabaseError, InterfaceError, PoolTimeout) as error:
             if not _is_infrastructure(error):
                 raise
             raise StoreUnavailable(f"database {self.name}: {_cause(error)}") from error
+
+    @contextmanager
+    def outside_transactions(self) -> Iterator[Connection]:
+        """Commit each statement by itself, for those that no transaction may hold.
+
+        Yields:
+            A connection.
+
+        Raises:
+            StoreUnavailable: As for `transaction`.
+        """
+        engine = self.engine.execution_options(isolation_level="AUTOCOMMIT")
+        with self._translated(), engine.connect() as connection:
+            yield connection
 
     def close(self) -> None:
         """Release the pooled connections. Idempotent."""
@@ -188,8 +207,11 @@ def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> 
 
     @event.listens_for(engine, "begin")
     def _begin(connection: Connection) -> None:
+        options = connection.get_execution_options()
+        if options.get("isolation_level") == "AUTOCOMMIT":
+            return
         # A deferred transaction that turns to writing fails at once if another has written since.
-        write = connection.get_execution_options().get(_WRITE, False)
+        write = options.get(_WRITE, False)
         connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN DEFERRED")
 
     return engine

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import Any, Final
@@ -41,17 +42,28 @@ def exclusive(database: Database) -> Iterator[Connection]:
 
 
 def _lock_file(connection: Connection) -> None:
-    """Leave the write-ahead log, which takes that nobody else has the file open, and stay alone."""
     with closing(connection.connection.cursor()) as cursor:
-        cursor.execute("PRAGMA busy_timeout = 1000")
-        cursor.execute("PRAGMA locking_mode = EXCLUSIVE")
-        try:
-            cursor.execute("PRAGMA journal_mode = DELETE")
-        except connection.dialect.loaded_dbapi.OperationalError as error:
-            name = connection.engine.url.database
-            raise Conflict(
-                f"database {name} is in use by another process: end all that use it first"
-            ) from error
+        lock_file(cursor, str(connection.engine.url.database))
+
+
+def lock_file(cursor: Any, name: str) -> None:
+    """Leave an SQLite file's write-ahead log, which only one who is alone can, and stay alone.
+
+    Args:
+        cursor: Of a connection outside a transaction, with which the lock ends.
+        name: Of the file, for people.
+
+    Raises:
+        Conflict: Somebody else has the file open.
+    """
+    cursor.execute("PRAGMA busy_timeout = 1000")
+    cursor.execute("PRAGMA locking_mode = EXCLUSIVE")
+    try:
+        cursor.execute("PRAGMA journal_mode = DELETE")
+    except sqlite3.OperationalError as error:
+        raise Conflict(
+            f"database {name} is in use by another process: end all that use it first"
+        ) from error
 
 
 def _lock_out(connection: Connection, name: str) -> None:

@@ -1,0 +1,154 @@
+"""Backups while jobs run, and what becomes of them: the same rows on either database."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import select
+
+from services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
+from services.optimizer.store.backup import backup, restore
+from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.maintenance import check
+from services.optimizer.store.sql_store import SqlStore, open_store
+from services.optimizer.store.tables import metadata
+from tests.store.examples import ask, begun, completed, spec
+from tests.store.test_upgrades import JOB, store_older
+
+Content = dict[str, list[tuple[Any, ...]]]
+
+
+def content(url: str) -> Content:
+    """All rows of all tables."""
+    with (
+        closing(connect(parse_url(url))) as database,
+        database.transaction(write=False) as connection,
+    ):
+        return {
+            table.name: sorted(map(tuple, connection.execute(select(table))), key=repr)
+            for table in metadata.sorted_tables
+        }
+
+
+@pytest.fixture
+def filled(store: SqlStore, database_url: str) -> Content:
+    """What a database holds with jobs in several states."""
+    claim = begun(store)
+    store.commit(claim, completed(0), ask(1))
+    done = begun(store, iterations=1)
+    store.commit(done, completed(0), None)
+    store.create_job(spec(), idempotency_key="a key")
+    store.tokens.create_first()
+    return content(database_url)
+
+
+def test_a_backup_is_restored_row_by_row_on_either_database(
+    filled: Content, database_url: str, fresh_url: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "backup.db"
+    backup(database_url, file)
+    # One file is all there is.
+    assert [path.name for path in tmp_path.glob("backup*")] == ["backup.db"]
+    before = file.read_bytes()
+    restore(fresh_url, file)
+    assert content(fresh_url) == filled
+    assert check(fresh_url) == []
+    assert file.read_bytes() == before
+
+
+def test_a_backup_is_of_one_moment_while_a_job_runs(
+    store: SqlStore, database_url: str, tmp_path: Path
+) -> None:
+    claim = begun(store, iterations=200)
+    begin, stop = threading.Event(), threading.Event()
+
+    def run() -> None:
+        for index in range(199):
+            store.commit(claim, completed(index), ask(index + 1))
+            begin.set()
+            if stop.is_set():
+                return
+
+    runner = threading.Thread(target=run)
+    runner.start()
+    begin.wait(10.0)
+    file = tmp_path / "backup.db"
+    try:
+        backup(database_url, file)
+    finally:
+        stop.set()
+        runner.join()
+    assert check(str(file)) == []
+    with closing(open_store(str(file))) as copy:
+        assert 0 < copy.job(claim.job.id).progress.iterations <= 199
+
+
+def test_nothing_is_replaced_unless_that_is_asked_for(
+    filled: Content, store: SqlStore, database_url: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "backup.db"
+    backup(database_url, file)
+    with pytest.raises(Conflict, match=r"exists already.*--force"):
+        backup(database_url, file)
+    backup(database_url, file, overwrite=True)
+    store.create_job(spec())
+    store.close()
+    give_up_leases(database_url)
+    with pytest.raises(Conflict, match="--force replaces all"):
+        restore(database_url, file)
+    restore(database_url, file, overwrite=True)
+    assert content(database_url) == filled
+
+
+def give_up_leases(url: str) -> None:
+    """As time does, after all processes have ended."""
+    with (
+        closing(connect(parse_url(url))) as database,
+        database.transaction(write=True) as connection,
+    ):
+        connection.execute(metadata.tables["jobs"].update().values(lease_expires_at=None))
+
+
+def test_a_database_in_use_is_not_restored_over(
+    filled: Content, database_url: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "backup.db"
+    backup(database_url, file)
+    with pytest.raises(Conflict, match="in use"):
+        restore(database_url, file, overwrite=True)
+    assert content(database_url) == filled
+
+
+def test_a_backup_of_an_older_version_comes_in_the_newest_schema(
+    fresh_url: str, tmp_path: Path
+) -> None:
+    file, older = tmp_path / "backup.db", f"sqlite:///{tmp_path / 'older.db'}"
+    store_older(older)
+    backup(older, file)
+    restore(fresh_url, file)
+    with closing(open_store(fresh_url)) as store:
+        assert store.job(JOB).spec.iterations == 7
+
+
+@pytest.mark.parametrize(
+    ("written", "error", "words"),
+    [
+        (None, NotFound, "there is no backup"),
+        (b"{}" * 1000, StoreUnavailable, "not a database"),
+        (b"", InvalidRequest, "no backup of gaitswarm"),
+    ],
+    ids=["missing", "something else", "empty"],
+)
+def test_what_is_no_backup_is_named_and_makes_no_database(
+    tmp_path: Path, written: bytes | None, error: type[Exception], words: str
+) -> None:
+    file, target = tmp_path / "backup.db", tmp_path / "jobs.db"
+    if written is not None:
+        file.write_bytes(written)
+    with pytest.raises(error, match=words):
+        restore(str(target), file)
+    assert {path.name for path in tmp_path.iterdir()} <= {"backup.db"}

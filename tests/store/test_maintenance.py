@@ -1,0 +1,105 @@
+"""What `check` finds in a database, and what `prune` takes away."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from services.optimizer.errors import NotFound, StoreUnavailable
+from services.optimizer.store.maintenance import check, prune
+from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.store.examples import ask, begun, completed
+from tests.store.test_opening import edit
+from tests.store.test_recordings import recording
+from tests.store.test_recordings import spec as fit_to
+
+
+@pytest.fixture
+def job_id(store: SqlStore) -> str:
+    """A job with two iterations, and a third one under way."""
+    claim = begun(store, iterations=5)
+    store.commit(claim, completed(0), ask(1))
+    store.commit(claim, completed(1), ask(2))
+    return claim.job.id
+
+
+def test_a_database_in_use_is_as_it_should_be(job_id: str, database_url: str) -> None:
+    assert check(database_url) == []
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        ("UPDATE jobs SET iterations = 3", "counts 3 iterations, but has 2"),
+        ("UPDATE jobs SET evaluations = 5", "counts 5 evaluations, but has 4"),
+        ("UPDATE jobs SET best_particle = 7", "the best design of job"),
+        (
+            "DELETE FROM evaluations WHERE iteration = 1",
+            "iteration 1 of job .* is committed without evaluations",
+        ),
+        (
+            "UPDATE iterations SET committed_at = NULL WHERE iteration = 1",
+            "iteration 1 of job .* has evaluations, but is not committed",
+        ),
+    ],
+)
+def test_what_contradicts_itself_is_found(
+    job_id: str, database_url: str, damage: str, words: str
+) -> None:
+    edit(database_url, damage)
+    assert re.search(words, "\n".join(check(database_url)))
+
+
+def test_a_database_without_schema_is_not_checked(fresh_url: str) -> None:
+    with pytest.raises(StoreUnavailable, match="revision none"):
+        check(fresh_url)
+
+
+def test_rows_that_refer_to_nothing_are_found(database: Path) -> None:
+    with closing(sqlite3.connect(database)) as connection, connection:
+        connection.execute(
+            "INSERT INTO evaluations (job_id, iteration, particle, design, objectives, statuses)"
+            " VALUES ('gone', 0, 0, '[]', '[]', '[]')"
+        )
+    (finding,) = [found for found in check(str(database)) if "refers" in found]
+    assert "of evaluations refers to a row of iterations that is not there" in finding
+
+
+def test_damaged_pages_are_found(database: Path) -> None:
+    with closing(sqlite3.connect(database)) as connection, connection:
+        # Its pages belong to nothing then.
+        connection.execute("PRAGMA writable_schema = ON")
+        connection.execute("DELETE FROM sqlite_master WHERE name = 'ix_jobs_parent_id'")
+    assert any("damaged" in found for found in check(str(database)))
+
+
+def test_recordings_that_nothing_refers_to_are_removed_a_day_after_they_came(
+    store: SqlStore, database_url: str
+) -> None:
+    wanted, unused = (store.add_recording(recording(first_tick=tick)) for tick in (20, 21))
+    store.create_job(fit_to(wanted))
+    edit(database_url, "UPDATE recordings SET created_at = '2026-01-01 00:00:00'")
+    waiting = store.add_recording(recording(first_tick=22))
+    later = (
+        "UPDATE recordings SET created_at = '2126-01-01 00:00:00' WHERE created_at > '2026-01-02'"
+    )
+    edit(database_url, later)
+    assert prune(database_url) == 1
+    assert set(store.recordings([wanted, waiting])) == {wanted, waiting}
+    with pytest.raises(NotFound):
+        store.recordings([unused])
+    assert prune(database_url) == 0
+
+
+def test_space_that_rows_have_left_is_given_back(database: Path) -> None:
+    with closing(open_store(str(database))) as store:
+        for tick in range(60):
+            store.add_recording(recording(first_tick=tick))
+    edit(str(database), "UPDATE recordings SET created_at = '2026-01-01 00:00:00'")
+    before = database.stat().st_size
+    assert prune(str(database)) == 60
+    assert database.stat().st_size < before / 2

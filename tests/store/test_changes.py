@@ -66,6 +66,27 @@ def test_commits_and_commands_of_another_process_are_told(
         assert woken.wait(10.0)
 
 
+def test_what_a_job_waits_for_is_told_once(
+    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+) -> None:
+    claim = begun(store)
+    other, _ = store.create_job(spec())
+    mine, theirs = threading.Event(), threading.Event()
+    with (
+        waiting.changes.watch(claim.job.id, mine.set, poll_seconds=poll_seconds),
+        waiting.changes.watch(other.id, theirs.set, poll_seconds=poll_seconds),
+    ):
+        settle(database_url, waiting, mine)
+        store.renew(claim, lease_seconds=LEASE, waiting="no route to host")
+        assert mine.wait(10.0)
+        mine.clear()
+        store.renew(claim, lease_seconds=LEASE, waiting="no route to host")
+        theirs.clear()
+        store.command(other.id, Command.CANCEL)
+        assert theirs.wait(10.0)
+        assert not mine.is_set()
+
+
 def test_neither_heartbeats_nor_other_jobs_are_told(
     store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
 ) -> None:

@@ -19,7 +19,7 @@ from services.optimizer.store.tables import jobs
 
 _CHANNEL: Final = "gaitswarm_jobs"
 
-_TOLD: Final = frozenset({"state", "iterations"})
+_TOLD: Final = frozenset({"state", "iterations", "waiting"})
 """Columns of jobs whose changes are news."""
 
 _GLANCE: Final = 0.5
@@ -27,6 +27,9 @@ _GLANCE: Final = 0.5
 
 _LONGEST_SILENCE: Final = 15.0
 """Seconds after which a listener looks for itself, however still it is."""
+
+_Seen = tuple[str, int, str | None]
+"""State, committed iterations, and what is waited for."""
 
 _log = logging.getLogger(__name__)
 
@@ -67,7 +70,7 @@ class SqlChanges:
         self._database = database
         self._condition = threading.Condition()
         self._watchers: set[_Watcher] = set()
-        self._seen: dict[str, tuple[str, int] | None] = {}
+        self._seen: dict[str, _Seen | None] = {}
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
 
@@ -160,11 +163,11 @@ class SqlChanges:
         """Wake those whose jobs are not as they were at the last poll."""
         with self._condition:
             watched = {watcher.job_id for watcher in self._watchers}
-        columns = (jobs.c.id, jobs.c.state, jobs.c.iterations)
+        columns = (jobs.c.id, jobs.c.state, jobs.c.iterations, jobs.c.waiting)
         with self._database.transaction(write=False) as connection:
             rows = connection.execute(select(*columns).where(jobs.c.id.in_(watched))).all()
-        found: dict[str, tuple[str, int] | None] = dict.fromkeys(watched)
-        found |= {row.id: (row.state, row.iterations) for row in rows}
+        found: dict[str, _Seen | None] = dict.fromkeys(watched)
+        found |= {row.id: (row.state, row.iterations, row.waiting) for row in rows}
         changed = {job for job in watched if job not in self._seen or self._seen[job] != found[job]}
         self._seen = found
         self._wake(changed)

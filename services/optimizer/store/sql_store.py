@@ -333,8 +333,11 @@ class SqlStore(SqlHistory):
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
             expires = self._clock(connection) + timedelta(seconds=lease_seconds)
+            changes: dict[str, Any] = {"lease_expires_at": expires}
             reason = None if waiting is None else storable(waiting)
-            update_job(connection, row, {"lease_expires_at": expires, "waiting": reason})
+            if reason != row["waiting"]:
+                changes |= {"waiting": reason}
+            update_job(connection, row, changes)
             return JobState(row["state"])
 
     def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:

@@ -202,7 +202,7 @@ class _Link:
         try:
             _Pump(session, dispatcher, self.warm).run()
         except Exception as error:  # noqa: BLE001 - whatever Ray raises when it is going down
-            _log.warning("Ray was lost: %s", error)
+            _log.info("Ray was lost: %s", error)
             dispatcher.close(f"Ray was lost: {error}")
         finally:
             session.close()

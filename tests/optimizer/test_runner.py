@@ -295,6 +295,7 @@ class AbsentStore:
             raise StoreUnavailable("the server is being restarted")
         return getattr(self.store, name)(*given, **options)
 
+    claim = partialmethod(_ask, "claim")
     job = partialmethod(_ask, "job")
     begin = partialmethod(_ask, "begin")
     commit = partialmethod(_ask, "commit")
@@ -466,6 +467,20 @@ def test_a_runner_outlives_a_machine_without_threads_to_spare(
 
     assert refused and runner.running
     runner.stop()
+
+
+def test_a_runner_outlives_a_store_that_cannot_be_asked_for_jobs_with_one_line_in_the_log(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    job_id = queue(store)
+    absent = AbsentStore(store, lambda access: absent.refused.count("claim") < 3)
+    runner = Runner(cast(Store, absent), FormulaEvaluator(), poll_seconds=0.01)
+    with caplog.at_level(logging.WARNING):
+        runner.start()
+        eventually(lambda: store.job(job_id).state is JobState.SUCCEEDED)
+        runner.stop()
+    (record,) = caplog.records
+    assert record.exc_info is None and "being restarted" in record.getMessage()
 
 
 class NotingEvaluator(FormulaEvaluator):

@@ -78,7 +78,7 @@ def deviations(trace: Trace | WalkLog, log: WalkLog, seconds: float = np.inf) ->
     ("variant", "drive", "scenario"),
     [
         (DEFAULT, "published optimum A", LOADED_FAST),
-        (PLAIN, "stiff PI", NORMAL_FAST),
+        (PLAIN, "stiff PI", one_cycle(NORMAL_FAST)),
         (DEFAULT, "stiff PI", one_cycle(SLOPE_FAST)),
         (PLAIN, "published optimum A", one_cycle(LOADED_FAST)),
         (PLAIN, "stiff PI", one_cycle(SLOPE_FAST)),
@@ -148,7 +148,9 @@ def test_in_mujocos_own_steps_a_walk_is_worth_the_same_within_two_percent(
 
 
 @pytest.mark.parametrize(
-    ("scenario", "drive"), list(zip(SCENARIOS, cycle(DRIVES), strict=False)), ids=named
+    ("scenario", "drive"),
+    list(zip(map(one_cycle, SCENARIOS), cycle(DRIVES), strict=False)),
+    ids=named,
 )
 def test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts(
     scenario: Scenario, drive: str
@@ -166,7 +168,7 @@ def test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts(
 
 def test_most_of_the_torques_difference_is_the_lever_of_the_sole() -> None:
     """In long strides, MuJoCo's forces at the tibia's end bring the gear torques nearer."""
-    scenario = LOADED_SLOW.model_copy(update=walks.LONG_STRIDES)
+    scenario = one_cycle(LOADED_SLOW.model_copy(update=walks.LONG_STRIDES))
     objectives, _ = our_walk("stiff PI", scenario)
     controller, design, _ = DRIVES["stiff PI"]
     away = {}

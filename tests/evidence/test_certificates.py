@@ -15,6 +15,7 @@ import gaitswarm
 from gaitswarm import VerificationView
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import (
+    CHAIN,
     EVALUATIONS,
     Certified,
     Change,
@@ -28,7 +29,7 @@ pytestmark = pytest.mark.slow
 ALL = 1000
 """More worlds than there are."""
 
-CHECKS = ["contents", "robot", "fitness", "best", "designs", "search", "summary"]
+CHECKS = ["contents", "robot", "fitness", "best", "designs", "search", "chain", "summary"]
 
 
 def failed(found: VerificationView) -> list[tuple[str | None, str]]:
@@ -80,8 +81,11 @@ def test_one_bit_of_a_world_is_caught_by_the_replay(certified: Certified) -> Non
     def change(columns: dict[str, list[Any]]) -> None:
         columns["short.height_loss"][3] = next_up(columns["short.height_loss"][3])
 
-    name = f"certificates/{certified.of_best}/{EVALUATIONS}"
-    content = tampered(certified.content, {name: with_cells(change)})
+    folder = f"certificates/{certified.of_best}"
+    changes = {f"{folder}/{EVALUATIONS}": with_cells(change)}
+    chained = gaitswarm.verify(tampered(certified.content, changes), replay=0)
+    assert failed(chained) == [(certified.of_best, "chain")]
+    content = tampered(certified.content, changes, without=[f"{folder}/{CHAIN}"])
     assert gaitswarm.verify(content, replay=0).verified
     found = gaitswarm.verify(content, replay=ALL)
     assert failed(found) == [(certified.of_best, "replay")]
@@ -107,7 +111,7 @@ def test_another_summary_another_world_and_another_design_are_caught(
     assert of("certificate.json", changed({"worlds": 6})) == ["summary"]
     assert "design" in of("spec.json", changed({"design": {"P": 0.9, "I": 0.0}}))
     assert "designs" in of(EVALUATIONS, with_cells(kinder))
-    assert of("spec.json", changed({"seed": 99})) == ["search", "summary"]
+    assert of("spec.json", changed({"seed": 99})) == ["search", "chain", "summary"]
     assert of("spec.json", lambda _: b"{}") == ["contents"]
     assert of("job.json", changed({"id": certified.of_another})) == ["summary", "contents"]
 

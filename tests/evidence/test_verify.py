@@ -252,9 +252,10 @@ def test_a_fuzzy_design_and_a_robot_of_ones_own_can_be_proved(tmp_path: Path) ->
 def test_a_file_that_is_not_there_and_a_negative_count_are_errors(tmp_path: Path) -> None:
     with pytest.raises(gaitswarm.NotFound):
         gaitswarm.verify(tmp_path / "none.zip")
-    for given in ({"replay": -1}, {"seed": -1}):
-        with pytest.raises(gaitswarm.InvalidRequest):
-            gaitswarm.verify(b"", **given)
+    with pytest.raises(gaitswarm.InvalidRequest):
+        gaitswarm.verify(b"", replay=-1)
+    with pytest.raises(gaitswarm.InvalidRequest):
+        gaitswarm.verify(b"", seed=-1)
 
 
 def test_what_a_multi_objective_search_was_told_is_checked_too(tmp_path: Path) -> None:

@@ -58,6 +58,10 @@ def test_a_backup_is_restored_row_by_row_on_either_database(
     assert content(fresh_url) == filled
     assert check(fresh_url) == []
     assert file.read_bytes() == before
+    # Numbers go on where those of the backup end.
+    with closing(open_store(fresh_url)) as store:
+        store.create_job(spec())
+    assert len(content(fresh_url)["audit"]) > len(filled["audit"])
 
 
 def test_a_backup_is_of_one_moment_while_a_job_runs(

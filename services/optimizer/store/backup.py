@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from sqlalchemy import JSON, URL, Connection, Table, bindparam, delete, insert, select
+from sqlalchemy import JSON, URL, Connection, Table, bindparam, delete, func, insert, select
 
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
 from services.optimizer.store.engine import connect, parse_url
@@ -183,6 +183,17 @@ def _copy_rows(source: Connection, target: Connection) -> None:
         statement = insert(table).values(_parameters(table))
         for batch in rows.partitions():
             target.execute(statement, [dict(row) for row in batch])
+        _count_on(target, table)
+
+
+def _count_on(connection: Connection, table: Table) -> None:
+    """Let a server give the numbers that follow those of rows which came with theirs."""
+    column = table.autoincrement_column
+    if column is None or connection.dialect.name != "postgresql":
+        return
+    sequence = func.pg_get_serial_sequence(table.name, column.name)
+    last = func.coalesce(func.max(column), 0)
+    connection.execute(select(func.setval(sequence, last + 1, False)).select_from(table))
 
 
 def _parameters(table: Table) -> dict[str, Any]:

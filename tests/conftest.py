@@ -5,6 +5,7 @@ And what takes long to make, once for all tests of a process.
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 from collections.abc import Callable, Iterator
@@ -88,6 +89,17 @@ def serve_database(lasting_server: Server) -> Iterator[Callable[[Path], str]]:
             return lasting_server.url
 
         yield serve
+
+
+def pytest_configure() -> None:
+    """What is imported and collected lasts: nothing of it is garbage."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Garbage is looked for from now on, in what tests make."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
+import multiprocessing
 import random
-import signal
-import subprocess
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +22,8 @@ from services.optimizer.search.evolution.hype import HypeSettings
 from services.optimizer.store.base import Store
 from services.runtime import open_evaluator, open_store, run_embedded
 from tests.examples.jobs import history
-from tests.examples.processes import output, start_python
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
+from tests.resume import job_process
 
 pytestmark = pytest.mark.slow
 
@@ -96,15 +94,42 @@ def best_in_double(store: Store, job_id: str) -> tuple[bytes, float] | None:
     return None if anew is None else (anew.objectives.tobytes(), anew.fitness)
 
 
-def start(url: str, job_id: str, kind: str = "in-process") -> subprocess.Popen[str]:
-    arguments = ("-m", "tests.resume.job_process", url, job_id, kind)
-    return start_python(*arguments, stderr=None, start_new_session=True)
+PROCESSES = multiprocessing.get_context("forkserver")
+"""Processes of one that has imported all that a job needs, and nothing else."""
+
+PROCESSES.set_forkserver_preload(["tests.resume.job_process"])
 
 
-def kill_group(process: subprocess.Popen[str]) -> None:
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    output(process.stdout).close()
+class Life:
+    """A process that runs a job."""
+
+    def __init__(self, url: str, job_id: str, kind: str = "in-process") -> None:
+        self._told, told = PROCESSES.Pipe(duplex=False)
+        self._process = PROCESSES.Process(target=job_process.main, args=(url, job_id, kind, told))
+        self._process.start()
+        told.close()
+
+    def wait_for_a_commit(self) -> None:
+        """Until it has committed an iteration, so that start-up is not all that is killed."""
+        self._told.recv()
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._end()
+
+    def code(self) -> int | None:
+        """Its exit code, once it has ended by itself."""
+        with suppress(EOFError):
+            while True:
+                self._told.recv()
+        return self._end()
+
+    def _end(self) -> int | None:
+        self._process.join(120.0)
+        code = self._process.exitcode
+        self._process.close()
+        self._told.close()
+        return code
 
 
 @pytest.mark.parametrize(
@@ -131,16 +156,13 @@ def test_resumed_job_equals_one_never_killed(
     progress: list[int] = []
     # Three lives, or fewer where the machine becomes so fast that they would reach the end.
     while len(progress) < 3 and (not progress or progress[-1] < SPEC.iterations - 4):
-        process = start(url, job_id)
-        # A life begins at its first commit, so that start-up is not all that is killed.
-        output(process.stdout).readline()
+        life = Life(url, job_id)
+        life.wait_for_a_commit()
         time.sleep(chance.uniform(0.0, 1.5 * one_iteration))
-        kill_group(process)
+        life.kill()
         progress.append(store.job(job_id).progress.iterations)
-    last = start(url, job_id)
-    last.communicate(timeout=120)
 
-    assert last.returncode == 0
+    assert Life(url, job_id).code() == 0
     assert store.job(job_id).state is JobState.SUCCEEDED
     assert len(progress) >= 2 and progress[0] >= 1 and progress == sorted(progress)
     assert walked(store, job_id) == walked(store, whole)
@@ -152,14 +174,12 @@ def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
     whole, killed = (run_alone(store, evaluator) for _ in range(2))
     for job_id in (whole, killed):
         store.extend(job_id, SPEC.iterations + 3)
-    process = start(url, killed)
-    output(process.stdout).readline()
-    kill_group(process)
+    life = Life(url, killed)
+    life.wait_for_a_commit()
+    life.kill()
     assert store.job(killed).progress.iterations > SPEC.iterations
-    last = start(url, killed)
-    last.communicate(timeout=120)
 
-    assert last.returncode == 0
+    assert Life(url, killed).code() == 0
     assert run_embedded(store, evaluator, whole).state is JobState.SUCCEEDED
     assert store.job(killed).progress.iterations == SPEC.iterations + 3
     assert history(store, killed) == history(store, whole)
@@ -170,12 +190,10 @@ def test_a_job_resumed_on_ray_equals_one_run_in_threads(
     store: Store, url: str, alone: Walked
 ) -> None:
     job_id = queue(store)
-    killed = start(url, job_id)
-    output(killed.stdout).readline()
-    kill_group(killed)
-    resumed = start(url, job_id, "ray")
-    resumed.communicate(timeout=120)
-    assert resumed.returncode == 0
+    killed = Life(url, job_id)
+    killed.wait_for_a_commit()
+    killed.kill()
+    assert Life(url, job_id, "ray").code() == 0
     assert walked(store, job_id) == alone
 
 

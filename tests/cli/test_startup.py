@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from functools import partial
+from functools import cache, partial
 
 import pytest
 
@@ -97,7 +97,7 @@ def test_bench_names_what_it_does_not_know(gaitswarm: Gaitswarm, option: str) ->
 def test_a_profile_says_what_each_part_takes_of_the_slots_time(
     gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    brief = partial(profile_job, particles=2, iterations=2, cpus=1)
+    brief = cache(partial(profile_job, particles=2, iterations=2, cpus=1))
     monkeypatch.setattr("services.profile.profile_job", brief)
     result = gaitswarm("bench", "--profile", "--evaluator", "in-process", "--json")
     assert result.code == 0, result.err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import subprocess
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ import pytest
 
 from sim.compiler.target import ARM, X86, Target, cpu_flags, host_architecture, target
 from sim.compiler.toolchain import Compiler, find_compiler, without_compiler
+from tests.examples.walks import SHORT_WALK
 from tests.sim.processes import run_python
 
 V2 = "fpu sse2 pni ssse3 cx16 sse4_1 sse4_2 popcnt"
@@ -140,8 +142,8 @@ print(done.outcome.statuses, done.outcome.objectives[0, 0])
 """
 OPTIMIZE = """
 from cli.main import main
-sys.argv = "gaitswarm optimize --particles 2 --iterations 1 --scenarios 1".split()
-sys.argv += ["--evaluator", "in-process"]
+sys.argv = "gaitswarm optimize --particles 2 --iterations 1 --evaluator in-process".split()
+sys.argv += ["--controller", "pi", "--scenarios", os.environ["SCENARIO"]]
 main()
 """
 
@@ -160,6 +162,10 @@ def test_without_posix_and_a_compiler_the_interpreter_walks_and_says_why() -> No
 
 @pytest.mark.slow
 def test_without_posix_a_job_is_optimized_in_this_process(tmp_path: Path) -> None:
-    done = run_python(f"{ANOTHER_SYSTEM}{OPTIMIZE}", XDG_DATA_HOME=str(tmp_path))
+    brief = tmp_path / "brief.json"
+    brief.write_text(json.dumps(SHORT_WALK | {"cycle_time": 0.3}), encoding="utf-8")
+    done = run_python(
+        f"{ANOTHER_SYSTEM}{OPTIMIZE}", XDG_DATA_HOME=str(tmp_path), SCENARIO=str(brief)
+    )
     assert done.returncode == 0, done.stderr
     assert "fitness of best:" in done.stdout

@@ -36,9 +36,14 @@ narrow = target.Target(int(sys.argv[1]), sys.argv[2])
 compilation.target = lambda: narrow
 from sim.robot import DEFAULT_ROBOT, load_robot
 from sim.assembly import kernel_of
+from sim.scenario import SCENARIOS
 from tests.golden.numbers import objectives_of_the_optimum
-print(json.dumps([kernel_of(load_robot(DEFAULT_ROBOT)).lanes, objectives_of_the_optimum()]))
+found = objectives_of_the_optimum(tuple(s for s in SCENARIOS if s.name in sys.argv[3:]))
+print(json.dumps([kernel_of(load_robot(DEFAULT_ROBOT)).lanes, found]))
 """
+
+NARROWLY_WALKED = ("slope-fast", "turn-right-fast")
+"""Where all six legs differ; a machine without fused multiply-adds takes seconds for each."""
 
 AVX512 = "X86_V4 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"
 AVX2 = "X86_V3 AVX2 FMA3"
@@ -96,13 +101,13 @@ def test_a_machine_with_narrower_vectors_gives_the_same_bits(
         pytest.skip("NOT TESTED without a C compiler: there is no kernel to compile more narrowly")
     narrow = min(narrow, target(), key=lambda candidate: candidate.lanes)
     done = python(
-        *("-c", NARROW_MACHINE, str(narrow.lanes), narrow.level),
+        *("-c", NARROW_MACHINE, str(narrow.lanes), narrow.level, *NARROWLY_WALKED),
         environment={"NPY_DISABLE_CPU_FEATURES": without},
     )
     assert done.returncode == 0, done.stderr
     lanes, found = json.loads(done.stdout)
     assert lanes == narrow.lanes
-    assert found == GOLDEN.optimum
+    assert found == {name: GOLDEN.optimum[name] for name in NARROWLY_WALKED}
 
 
 @pytest.mark.slow

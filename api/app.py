@@ -35,6 +35,7 @@ from api.routes import (
     history,
     identification,
     jobs,
+    notifications,
     session,
     simulations,
     tournaments,
@@ -95,6 +96,7 @@ def create_app(
     )
     for module in (
         jobs,
+        notifications,
         history,
         events,
         analysis,

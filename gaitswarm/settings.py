@@ -76,6 +76,13 @@ class Settings(BaseSettings):
         le=1000,
         description="A job with which so many runner processes in a row went down fails.",
     )
+    webhook_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
+        default=(),
+        description="Hosts, with or without port, that may be told of ended jobs; none: nobody is.",
+    )
+    webhook_secret: str | None = Field(
+        default=None, description="Signs what they are told.", repr=False
+    )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
     log_format: Literal["console", "json"] = Field(
         default="console", description="Lines for people, or an object of JSON for each message."

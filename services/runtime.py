@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import FrameType
@@ -88,6 +88,8 @@ def open_runtime(
     longest_job: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
     metrics: Metrics | None = None,
+    webhook_hosts: Collection[str] = (),
+    webhook_secret: str | None = None,
 ) -> Iterator[Runtime]:
     """Open a database and run its queued jobs until the block is left; then close all.
 
@@ -104,6 +106,8 @@ def open_runtime(
         longest_job: Simulated time of all walks of all designs that a new job may have [s].
         should_stop: As for `open_evaluator`.
         metrics: Are told what store, runner and workers do; None: nobody asks.
+        webhook_hosts: Hosts that may be told that jobs have ended; none: nobody is.
+        webhook_secret: Signs what they are told.
 
     Yields:
         What was opened.
@@ -120,6 +124,12 @@ def open_runtime(
             from services.monitoring.measured_store import measured  # noqa: PLC0415
 
             store = measured(store, metrics)
+        if webhook_hosts:
+            from services.monitoring.webhooks import Notifier  # noqa: PLC0415
+
+            notifier = Notifier(store, webhook_hosts, webhook_secret)
+            stack.callback(notifier.stop)
+            notifier.start()
         service = JobService(store, longest_job=longest_job)
         if evaluator is None:
             yield Runtime(service, None, None)

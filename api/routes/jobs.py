@@ -9,7 +9,7 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, 
 
 from api.access import Actor, Owner, may_command
 from api.bodies import validated
-from api.dependencies import JobId, JobIdText, Service, Slots
+from api.dependencies import JobId, JobIdText, ServerSettings, Service, Slots
 from api.documentation import problems
 from gaitswarm.views import (
     PREFIX,
@@ -23,6 +23,7 @@ from gaitswarm.views import (
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from services.optimizer.jobs.notification import check_url
 from services.optimizer.service import JobService
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
@@ -39,6 +40,29 @@ IdempotencyKey = Annotated[
         examples=["7d9f2b1e"],
     ),
 ]
+
+
+async def notify_url(
+    settings: ServerSettings,
+    url: Annotated[
+        str | None,
+        Header(
+            alias="Notify-URL",
+            min_length=1,
+            max_length=2000,
+            description="Where a JSON document is sent when the job has ended; its host must be one"
+            " that the server allows. What came of it: `/v1/jobs/{job_id}/notifications`.",
+            examples=["https://ci.example/hook"],
+        ),
+    ] = None,
+) -> str | None:
+    """The URL that is told of the job's end, checked."""
+    if url is not None:
+        check_url(url, settings.webhook_hosts, field="Notify-URL")
+    return url
+
+
+NotifyUrl = Annotated[str | None, Depends(notify_url)]
 
 SpecBody = Annotated[AnySpec, Depends(validated(AnySpec, "spec"))]
 ForkBody = Annotated[ForkRequest, Depends(validated(ForkRequest, "request"))]
@@ -73,6 +97,7 @@ def submit_job(
     response: Response,
     owner: Owner,
     sent: Annotated[Any, Depends(request_document)],
+    notify: NotifyUrl,
     idempotency_key: IdempotencyKey = None,
 ) -> JobView:
     """Check that the job can be simulated and queue it.
@@ -81,7 +106,9 @@ def submit_job(
     `Idempotency-Key` used before, the same body answers 200 with the job that it made, even if
     presets have changed since; a body that asks for another job answers 409.
     """
-    job, new = service.submit(spec, idempotency_key=idempotency_key, request=sent, owner=owner)
+    job, new = service.submit(
+        spec, idempotency_key=idempotency_key, request=sent, owner=owner, notify_url=notify
+    )
     if not new:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
@@ -109,6 +136,7 @@ def fork_job(
     response: Response,
     owner: Owner,
     sent: Annotated[Any, Depends(request_document)],
+    notify: NotifyUrl,
     idempotency_key: IdempotencyKey = None,
 ) -> JobView:
     """Queue a job that begins with iterations of this one, of which nothing is changed.
@@ -120,7 +148,12 @@ def fork_job(
     numbers depend on has changed and that is not accepted.
     """
     job, new = service.fork(
-        job_id, request, idempotency_key=idempotency_key, sent=sent, owner=owner
+        job_id,
+        request,
+        idempotency_key=idempotency_key,
+        sent=sent,
+        owner=owner,
+        notify_url=notify,
     )
     if not new:
         response.status_code = status.HTTP_200_OK

@@ -59,6 +59,7 @@ class JobService(Questions):
         idempotency_key: str | None = None,
         request: Any = None,
         owner: str | None = None,
+        notify_url: str | None = None,
     ) -> tuple[Job, bool]:
         """Check that the job can be simulated and queue it.
 
@@ -70,6 +71,7 @@ class JobService(Questions):
             request: The JSON document that asked for the job, as it was sent; None: the fields
                 that were given to the spec.
             owner: Name of the token that the request came with, if any.
+            notify_url: Where its end is told, if anywhere; checked.
 
         Returns:
             The job, and whether it is new.
@@ -87,6 +89,7 @@ class JobService(Questions):
             idempotency_key=idempotency_key,
             request=request,
             owner=owner,
+            notify_url=notify_url,
         )
 
     def fork(
@@ -97,6 +100,7 @@ class JobService(Questions):
         idempotency_key: str | None = None,
         sent: Any = None,
         owner: str | None = None,
+        notify_url: str | None = None,
     ) -> tuple[Job, bool]:
         """Queue a job that begins with iterations of another one.
 
@@ -107,6 +111,7 @@ class JobService(Questions):
             sent: the JSON document that asked for the fork, as it was sent; None: the fields that
                 were given to the request.
             owner: name of the token that the request came with, if any.
+            notify_url: where its end is told, if anywhere; checked.
 
         Returns:
             The fork, whose `lineage` says what it took over, and whether it is new.
@@ -141,6 +146,7 @@ class JobService(Questions):
             request={"fork": job_id, "request": sent},
             fork=fork,
             owner=owner,
+            notify_url=notify_url,
         )
 
     def submit_embedded(self, spec: Spec) -> Claim:

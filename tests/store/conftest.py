@@ -50,7 +50,10 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     database = connect(parse_url(url))
     with database.transaction(write=True) as connection:
         connection.execute(
-            text("TRUNCATE jobs, iterations, evaluations, reevaluations, recordings, tokens, audit")
+            text(
+                "TRUNCATE jobs, iterations, evaluations, reevaluations, recordings, tokens, audit,"
+                " notifications"
+            )
         )
     database.close()
     return url

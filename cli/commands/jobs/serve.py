@@ -179,6 +179,8 @@ def _runtime(
         longest_job=settings.api_max_job_seconds,
         should_stop=should_stop,
         metrics=metrics,
+        webhook_hosts=settings.webhook_hosts,
+        webhook_secret=settings.webhook_secret,
     )
 
 

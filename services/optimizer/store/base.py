@@ -10,6 +10,7 @@ from services.optimizer.jobs.audit import LOCAL, AuditEntry
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, Job, JobOrder, JobState
+from services.optimizer.jobs.notification import Notification
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.reading import Changes, CommittedHistory, Page, Queue
@@ -40,6 +41,7 @@ class Store(CommittedHistory, Protocol):
         request: Any = None,
         fork: Fork | None = None,
         owner: str | None = None,
+        notify_url: str | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job of the resolved spec, or find the one that the same key made before.
 
@@ -53,6 +55,7 @@ class Store(CommittedHistory, Protocol):
             fork: How the job is forked from another one. What it takes over is copied, so that it
                 stays when its parent goes; None for a job of its own.
             owner: Name of the token that it comes with, if any.
+            notify_url: Where its end is told, if anywhere; checked.
 
         Returns:
             The job, and whether it is new.
@@ -328,6 +331,39 @@ class Store(CommittedHistory, Protocol):
 
         Raises:
             InvalidRequest: `after` is no cursor of the audit log, or `limit` is less than 1.
+        """
+
+    def take_notification(self, *, lease_seconds: float) -> Notification | None:
+        """Take the notification that has been due for longest, for one attempt.
+
+        A job that ends leaves one in the transaction that ends it, if it was submitted with a URL.
+
+        Args:
+            lease_seconds: For so long it is nobody else's; then it is due again [s].
+
+        Returns:
+            The notification; None if none is due.
+        """
+
+    def settle_notification(
+        self, taken: Notification, error: str | None, *, final: bool = False
+    ) -> None:
+        """Note what came of an attempt: it is delivered, due again later, or given up.
+
+        Args:
+            taken: As `take_notification` gave it.
+            error: Why it failed, for people; None if it was delivered.
+            final: Whether it is given up at once.
+        """
+
+    def notifications(self, job_id: str) -> tuple[Notification, ...]:
+        """Read the notifications about a job.
+
+        Args:
+            job_id: Of the job.
+
+        Returns:
+            The oldest first; none while the job has not ended, or if nobody is notified.
         """
 
     def ping(self) -> None:

@@ -19,6 +19,7 @@ from services.optimizer.store.chain import chained_columns
 from services.optimizer.store.changes import announce
 from services.optimizer.store.columns import select_columns
 from services.optimizer.store.job_rows import provenance_document, provenance_records, to_job
+from services.optimizer.store.notifications import note_end
 from services.optimizer.store.rows import (
     Row,
     ask_columns,
@@ -76,7 +77,7 @@ def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
 
 
 def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> Row:
-    """Change a job's row.
+    """Change a job's row; a job that ends leaves a notification, if it has somebody to notify.
 
     Args:
         connection: The transaction in which the row was locked.
@@ -88,7 +89,10 @@ def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> 
     """
     connection.execute(update(jobs).where(jobs.c.id == row["id"]).values(**columns))
     announce(connection, row["id"], frozenset(columns))
-    return {**row, **columns}
+    after = {**row, **columns}
+    if after["notify_url"] is not None and "state" in columns and after["finished_at"] is not None:
+        note_end(connection, after)
+    return after
 
 
 def provenance_columns(job: Row, provenance: JobProvenance) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from services.optimizer.jobs.job import (
     commanded,
     extended,
 )
+from services.optimizer.jobs.notification import Notification
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.audit import audit_page, note_change
@@ -61,6 +62,7 @@ from services.optimizer.store.job_list import (
 )
 from services.optimizer.store.job_rows import request_digest, storable, to_job
 from services.optimizer.store.migrate import create
+from services.optimizer.store.notifications import is_due, notifications_of, settle, take_due
 from services.optimizer.store.queue import count_jobs
 from services.optimizer.store.reading import Page, Queue
 from services.optimizer.store.recordings import (
@@ -140,6 +142,7 @@ class SqlStore(SqlHistory):
         request: Any = None,
         fork: Fork | None = None,
         owner: str | None = None,
+        notify_url: str | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job, or find the one that the same key made before."""
         _check_key(idempotency_key)
@@ -148,7 +151,9 @@ class SqlStore(SqlHistory):
             sent = spec.model_dump(mode="json", exclude_unset=True) if request is None else request
             digest = request_digest(sent)
         records = first_record(provenance)
-        asked = Submission(spec.resolved(), idempotency_key, digest, records, fork, owner)
+        asked = Submission(
+            spec.resolved(), idempotency_key, digest, records, fork, owner, notify_url
+        )
         try:
             with self._database.transaction(write=True) as connection:
                 earlier = repeated_job(connection, asked)
@@ -391,6 +396,28 @@ class SqlStore(SqlHistory):
         limit = checked_limit(limit)
         with self._database.transaction(write=False) as connection:
             return audit_page(connection, job_id, after, limit)
+
+    def take_notification(self, *, lease_seconds: float) -> Notification | None:
+        """Take a notification that is due."""
+        # Looking first: most of the time there is none, and a look needs no lock.
+        with self._database.transaction(write=False) as connection:
+            if not is_due(connection, self._clock(connection)):
+                return None
+        with self._database.transaction(write=True) as connection:
+            return take_due(connection, self._clock(connection), lease_seconds)
+
+    def settle_notification(
+        self, taken: Notification, error: str | None, *, final: bool = False
+    ) -> None:
+        """Note what came of an attempt."""
+        with self._database.transaction(write=True) as connection:
+            settle(connection, taken, self._clock(connection), error, final=final)
+
+    def notifications(self, job_id: str) -> tuple[Notification, ...]:
+        """Read the notifications about a job."""
+        with self._database.transaction(write=False) as connection:
+            job_row(connection, job_id)
+            return notifications_of(connection, job_id)
 
     def ping(self) -> None:
         """Ask the database for its schema revision."""

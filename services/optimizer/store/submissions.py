@@ -44,6 +44,7 @@ class Submission:
         provenance: What its numbers are to depend on; empty where its first claim says that.
         fork: How it is forked from another job; None for a job of its own.
         owner: Name of the token that it comes with, if any.
+        notify_url: Where its end is told, if anywhere.
     """
 
     spec: Spec
@@ -52,6 +53,7 @@ class Submission:
     provenance: ProvenanceRecords = ()
     fork: Fork | None = None
     owner: str | None = None
+    notify_url: str | None = None
 
     @property
     def lineage(self) -> Lineage | None:
@@ -113,6 +115,7 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
         "parent_id": None if asked.lineage is None else asked.lineage.parent,
         "lineage": lineage_document(asked.lineage),
         "owner": asked.owner,
+        "notify_url": asked.notify_url,
         "idempotency_key": asked.key,
         "request_digest": asked.digest,
         "created_at": now,

@@ -181,6 +181,8 @@ jobs: Final = Table(
     Column("recent_seconds", Double),
     # Digest of its last committed iteration; NULL before the first, and for older jobs.
     Column("head", Text),
+    # Where its end is told; NULL for nowhere.
+    Column("notify_url", Text),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),
@@ -288,4 +290,23 @@ audit: Final = Table(
     Index(None, "job_id", "id"),
     # A number is never given twice, whatever is removed.
     sqlite_autoincrement=True,
+)
+
+notifications: Final = Table(
+    "notifications",
+    metadata,
+    Column("id", Text, nullable=False),
+    # No foreign key: one that is under way outlives its job.
+    Column("job_id", Text, nullable=False),
+    Column("url", Text, nullable=False),
+    Column("document", JSON, nullable=False),
+    Column("created_at", UtcDateTime, nullable=False),
+    Column("attempts", Integer, nullable=False),
+    # NULL once it was delivered or given up.
+    Column("next_attempt_at", UtcDateTime),
+    Column("delivered_at", UtcDateTime),
+    Column("error", Text),
+    PrimaryKeyConstraint("id"),
+    Index(None, "next_attempt_at"),
+    Index(None, "job_id"),
 )

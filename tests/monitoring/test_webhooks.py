@@ -1,0 +1,261 @@
+"""Notifications: left by the end of a job, delivered at least once, and only where allowed."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gaitswarm.settings import Settings
+from services.monitoring.webhooks import Notifier
+from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.job import Command, JobState
+from services.optimizer.jobs.notification import MOST_ATTEMPTS, check_url, pause_after
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.processes import COMMAND_LINE, eventually, start_python
+from tests.examples.servers import Server
+from tests.monitoring.receiver import Receiver, receiving
+from tests.optimizer.formula import SPEC
+from tests.store.examples import Clock
+
+SECRET = "whsec_" + base64.b64encode(b"of the tests").decode()
+
+
+@pytest.fixture
+def receiver() -> Iterator[Receiver]:
+    with receiving() as started:
+        yield started
+
+
+@contextmanager
+def notifying(
+    store: SqlStore, receiver: Receiver, *, hosts: tuple[str, ...] | None = None
+) -> Iterator[None]:
+    notifier = Notifier(store, (receiver.host,) if hosts is None else hosts, SECRET)
+    notifier.start()
+    try:
+        yield
+    finally:
+        notifier.stop()
+
+
+def cancelled(store: SqlStore, url: str) -> str:
+    """A job that has ended, with a URL to be told."""
+    job, _ = store.create_job(SPEC, notify_url=url)
+    store.command(job.id, Command.CANCEL)
+    return job.id
+
+
+def test_the_end_of_a_job_is_told_once_and_signed(store: SqlStore, receiver: Receiver) -> None:
+    job_id = cancelled(store, receiver.url)
+    store.create_job(SPEC)
+    with notifying(store, receiver):
+        eventually(lambda: store.notifications(job_id)[0].delivered_at is not None)
+    ((headers, body),) = receiver.received
+    (told,) = receiver.documents()
+    assert (told["type"], told["data"]["id"]) == ("job.cancelled", job_id)
+    assert told["data"] | {"state": "cancelled", "iterations": 0, "error": None} == told["data"]
+    (stored,) = store.notifications(job_id)
+    assert (stored.id, stored.attempts, stored.error) == (headers["webhook-id"], 1, None)
+    signed = f"{stored.id}.{headers['webhook-timestamp']}.".encode() + body
+    expected = hmac.new(b"of the tests", signed, hashlib.sha256).digest()
+    assert headers["webhook-signature"] == f"v1,{base64.b64encode(expected).decode()}"
+    assert "authorization" not in headers and "cookie" not in headers
+
+
+def test_failed_and_succeeded_jobs_are_told_and_pauses_are_not(store: SqlStore) -> None:
+    url = "http://ci.example/"
+    job, _ = store.create_job(SPEC, notify_url=url)
+    for state in (JobState.QUEUED, JobState.PAUSED, JobState.FAILED):
+        if store.job(job.id).state is JobState.PAUSED:
+            store.command(job.id, Command.RESUME)
+        claim = store.claim("runner", lease_seconds=30.0)
+        assert claim is not None
+        store.release(claim, state, error="of the test" if state is JobState.FAILED else None)
+    (failed,) = store.notifications(job.id)
+    assert failed.document["type"] == "job.failed"
+    assert failed.document["data"]["error"] == "of the test"
+    store.command(job.id, Command.RESUME)
+    store.command(job.id, Command.CANCEL)
+    first, second = store.notifications(job.id)
+    assert first.id != second.id
+    assert {first.document["type"], second.document["type"]} == {"job.failed", "job.cancelled"}
+
+
+@pytest.mark.parametrize("answer", [500, 404, "http://127.0.0.1:9/elsewhere"])
+def test_what_is_not_taken_is_sent_again_with_the_same_id_and_no_redirection_is_followed(
+    database: Path, receiver: Receiver, answer: int | str
+) -> None:
+    clock = Clock()
+    store = open_store(str(database), clock=clock)
+    receiver.statuses = [answer]
+    job_id = cancelled(store, receiver.url)
+    with notifying(store, receiver):
+        eventually(lambda: store.notifications(job_id)[0].attempts == 1)
+        (waiting,) = store.notifications(job_id)
+        status = 307 if isinstance(answer, str) else answer
+        assert waiting.error == f"the receiver answered {status}"
+        assert waiting.delivered_at is None and waiting.next_attempt_at is not None
+        assert (waiting.next_attempt_at - clock.now).total_seconds() == pause_after(1)
+        clock.advance(60.0)
+        eventually(lambda: store.notifications(job_id)[0].delivered_at is not None)
+    first, second = receiver.ids()
+    assert first == second
+    assert store.notifications(job_id)[0].attempts == 2
+    store.close()
+
+
+def test_pauses_grow_to_an_hour_and_end_some_day() -> None:
+    pauses = [pause_after(attempts) for attempts in range(1, MOST_ATTEMPTS)]
+    assert None not in pauses and pauses == sorted(pauses, key=float)  # type: ignore[arg-type]
+    assert (pauses[0], pauses[-1]) == (5.0, 3600.0)
+    assert pause_after(MOST_ATTEMPTS) is None
+
+
+def test_one_that_nobody_takes_is_given_up(database: Path) -> None:
+    clock = Clock()
+    store = open_store(str(database), clock=clock)
+    job_id = cancelled(store, "http://ci.example/")
+    for _ in range(MOST_ATTEMPTS):
+        due = store.take_notification(lease_seconds=60.0)
+        assert due is not None
+        store.settle_notification(due, "the receiver answered 500")
+        clock.advance(3601.0)
+    assert store.take_notification(lease_seconds=60.0) is None
+    (given_up,) = store.notifications(job_id)
+    assert (given_up.attempts, given_up.next_attempt_at) == (MOST_ATTEMPTS, None)
+    assert given_up.delivered_at is None
+    store.close()
+
+
+def test_a_notification_is_one_senders_at_a_time_and_anothers_when_that_has_gone(
+    database: Path,
+) -> None:
+    clock = Clock()
+    store = open_store(str(database), clock=clock)
+    cancelled(store, "http://ci.example/")
+    lost = store.take_notification(lease_seconds=60.0)
+    assert store.take_notification(lease_seconds=60.0) is None
+    clock.advance(61.0)
+    again = store.take_notification(lease_seconds=60.0)
+    assert lost is not None and again is not None and lost.id == again.id
+    store.close()
+
+
+ALLOWED = ("ci.example", "hooks.example:8443", "[::1]:80")
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "https://ci.example/hook",
+        "https://CI.example:9000/x?y=1",
+        "https://hooks.example:8443",
+        "http://[::1]/",
+    ],
+)
+def test_hosts_that_are_allowed_may_be_told(url: str) -> None:
+    check_url(url, ALLOWED, field="Notify-URL")
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "https://hooks.example/",
+        "https://hooks.example:80/",
+        "http://127.0.0.1/",
+        "http://localhost:8000/v1/jobs",
+        "http://169.254.169.254/latest/meta-data",
+        "https://ci.example.evil.example/",
+        "https://evil.example/ci.example",
+        "https://ci.example@evil.example/",
+        "https://user:password@ci.example/",
+        "https://evil.example\\@ci.example/",
+        "file:///etc/passwd",
+        "gopher://ci.example/",
+        "//ci.example/",
+        "https://",
+        "https://[",
+        "https://ci.example:99999/",
+        "https://ci.example/a b",
+        "https://ci.example/\r\nX: 1",
+        "https://cı.example/",
+        "https://ci.example/" + "x" * 2000,
+    ],
+)
+def test_all_others_are_refused(url: str) -> None:
+    with pytest.raises(InvalidRequest, match=r"^Notify-URL: "):
+        check_url(url, ALLOWED, field="Notify-URL")
+
+
+def test_unless_hosts_are_allowed_nobody_is_told() -> None:
+    assert Settings().webhook_hosts == ()
+    with pytest.raises(InvalidRequest, match="GAITSWARM_WEBHOOK_HOSTS"):
+        check_url("https://ci.example/", Settings().webhook_hosts, field="Notify-URL")
+
+
+def test_a_host_that_is_allowed_no_more_is_not_told(store: SqlStore, receiver: Receiver) -> None:
+    job_id = cancelled(store, receiver.url)
+    with notifying(store, receiver, hosts=("ci.example",)):
+        eventually(lambda: store.notifications(job_id)[0].attempts == 1)
+    (given_up,) = store.notifications(job_id)
+    assert given_up.next_attempt_at is None and "not among the hosts" in str(given_up.error)
+    assert receiver.received == []
+
+
+def test_a_url_is_a_header_of_the_submission_and_what_came_of_it_is_seen_at_the_job(
+    store: SqlStore, receiver: Receiver
+) -> None:
+    server = Server(JobService(store), webhook_hosts=receiver.host)
+    try:
+        post = server.client.post
+        refused = post("/v1/jobs", json=SMALL_SPEC, headers={"Notify-URL": "http://127.0.0.1/"})
+        assert refused.status_code == 422
+        assert refused.json()["errors"][0]["field"] == "Notify-URL"
+        headers = {"Notify-URL": receiver.url}
+        job = post("/v1/jobs", json=SMALL_SPEC, headers=headers).json()["id"]
+        path = f"/v1/jobs/{job}/notifications"
+        assert server.client.get(path).json() == []
+        post(f"/v1/jobs/{job}/cancel")
+        (waiting,) = server.client.get(path).json()
+        assert (waiting["state"], waiting["event"]) == ("waiting", "job.cancelled")
+        assert waiting["host"] == "127.0.0.1" and "key=1" not in str(waiting)
+        with notifying(store, receiver):
+            eventually(lambda: server.client.get(path).json()[0]["state"] == "delivered")
+        assert server.client.get("/v1/jobs/none/notifications").status_code == 404
+    finally:
+        server.close()
+
+
+@pytest.mark.slow
+def test_a_server_that_is_killed_between_end_and_delivery_tells_after_its_restart(
+    database: Path, receiver: Receiver
+) -> None:
+    options = ("--db", str(database), "--port", "0", "--evaluator", "in-process", "--cpus", "1")
+    environment: dict[str, Any] = {"GAITSWARM_WEBHOOK_HOSTS": receiver.host}
+    receiver.statuses = [500]
+    store = open_store(str(database))
+    job_id = cancelled(store, receiver.url)
+    for kill in (True, False):
+        process = start_python(
+            *COMMAND_LINE, "serve", *options, environment=environment, stdout=None, stderr=None
+        )
+        try:
+            if kill:
+                eventually(lambda: store.notifications(job_id)[0].attempts == 1)
+            else:
+                eventually(lambda: store.notifications(job_id)[0].delivered_at is not None)
+        finally:
+            process.send_signal(signal.SIGKILL if kill else signal.SIGTERM)
+            process.wait(timeout=60.0)
+    assert len(set(receiver.ids())) == 1 and len(receiver.received) == 2
+    store.close()

@@ -25,6 +25,7 @@ from services.worker.ray_evaluator import RayEvaluator
 
 if TYPE_CHECKING:
     from services.monitoring.metrics import Metrics
+    from services.monitoring.tracing import Tracing
 
 
 def open_evaluator(
@@ -88,6 +89,7 @@ def open_runtime(
     longest_job: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
     metrics: Metrics | None = None,
+    tracing: Tracing | None = None,
     webhook_hosts: Collection[str] = (),
     webhook_secret: str | None = None,
 ) -> Iterator[Runtime]:
@@ -106,6 +108,7 @@ def open_runtime(
         longest_job: Simulated time of all walks of all designs that a new job may have [s].
         should_stop: As for `open_evaluator`.
         metrics: Are told what store, runner and workers do; None: nobody asks.
+        tracing: Is told of the jobs that are run, and closed; None: nobody follows them.
         webhook_hosts: Hosts that may be told that jobs have ended; none: nobody is.
         webhook_secret: Signs what they are told.
 
@@ -124,6 +127,10 @@ def open_runtime(
             from services.monitoring.measured_store import measured  # noqa: PLC0415
 
             store = measured(store, metrics)
+        runners_store = store
+        if tracing is not None:
+            stack.callback(tracing.close)
+            runners_store = tracing.traced_store(store)
         if webhook_hosts:
             from services.monitoring.webhooks import Notifier  # noqa: PLC0415
 
@@ -141,8 +148,8 @@ def open_runtime(
 
             metrics.registry.register(WorkersCollector(lambda: workers.loads))
         runner = Runner(
-            store,
-            workers,
+            runners_store,
+            workers if tracing is None else tracing.traced_evaluator(workers),
             concurrency=concurrent_jobs,
             lease_seconds=lease_seconds,
             cache=cache,

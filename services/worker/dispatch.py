@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, TaskReport
 from services.worker.cutting import Chunk, cut
 from services.worker.durations import CaseTime, Durations, costs_of
 from services.worker.failures import killed_workers, misshapen, unlike
@@ -217,6 +217,8 @@ class Dispatcher:
         expected = batch.request.provenance
         with self._changed:
             self._settled(work)
+            if isinstance(answer, Answer):
+                self._report(work, answer.seconds, answer.host)
             if not batch.awaits(chunk):
                 return
             # A worker of an earlier version answers with the bare outcome.
@@ -256,6 +258,7 @@ class Dispatcher:
         """
         with self._changed:
             self._settled(work)
+            self._report(work, error="its worker was lost")
             batch, chunk = work.batch, work.chunk
             if not batch.awaits(chunk):
                 return
@@ -275,6 +278,7 @@ class Dispatcher:
         """
         with self._changed:
             self._settled(work)
+            self._report(work, error=f"{type(error).__name__}: {error}")
             if work.batch.awaits(work.chunk):
                 self._end(work.batch, error)
 
@@ -347,6 +351,15 @@ class Dispatcher:
         if self._all_run_since is None and len(self._out) <= self.slots:
             # Until now it may have lain at hand, behind another one.
             self._all_run_since = self.clock()
+
+    def _report(
+        self, work: Work, compute_seconds: float = 0.0, host: str = "", *, error: str | None = None
+    ) -> None:
+        on_task = work.batch.request.on_task
+        if on_task is not None:
+            walks = sum(part.stop - part.start for part in work.chunk.parts)
+            seconds = self.clock() - work.taken
+            on_task(TaskReport(walks, seconds, compute_seconds, host, error))
 
     def _running(self, work: Work) -> Running:
         known = self._durations.get(work.batch.request.job_id, Durations())

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from gaitswarm.settings import Settings
     from services.monitoring.metrics import Metrics
+    from services.monitoring.tracing import Tracing
     from services.optimizer.access import Tokens
     from services.runtime import Runtime
 
@@ -179,9 +180,29 @@ def _runtime(
         longest_job=settings.api_max_job_seconds,
         should_stop=should_stop,
         metrics=metrics,
+        tracing=_tracing() if runs_jobs else None,
         webhook_hosts=settings.webhook_hosts,
         webhook_secret=settings.webhook_secret,
     )
+
+
+def _tracing() -> Tracing | None:
+    """Where OpenTelemetry's variables name a collector, spans are sent there."""
+    import logging
+    import os
+
+    names = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
+    if not any(os.environ.get(name) for name in names):
+        return None
+    try:
+        from services.monitoring.tracing import exporting_tracing
+    except ModuleNotFoundError as error:
+        # Other programs on the machine may have asked for it.
+        logging.getLogger(__name__).warning(
+            "no spans are sent, %s is missing: install gaitswarm[telemetry]", error.name
+        )
+        return None
+    return exporting_tracing()
 
 
 @contextmanager

@@ -14,6 +14,28 @@ from sim.outcome import Outcome
 from sim.provenance import Provenance
 
 
+@dataclass(frozen=True, slots=True)
+class TaskReport:
+    """Some of a request's walks, as a worker ran them.
+
+    Attributes:
+        walks: Their number.
+        seconds: From when a worker was given them to its answer [s].
+        compute_seconds: Of these, how long the worker computed [s].
+        host: Name of the worker's machine; "" if it did not answer.
+        error: Why there is no result, for people; None if there is one.
+    """
+
+    walks: int
+    seconds: float
+    compute_seconds: float = 0.0
+    host: str = ""
+    error: str | None = None
+
+
+OnTask = Callable[[TaskReport], None]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationRequest:
     """One iteration of one job: every design in every case.
@@ -25,6 +47,7 @@ class EvaluationRequest:
         provenance: That of the process that asks; the outcomes are to have it.
         iterations_left: Iterations of the job that follow this one, as far as is known.
         iteration: Index of the iteration, from 0.
+        on_task: Is told of every task that ends; it must return at once.
     """
 
     job_id: str
@@ -33,6 +56,7 @@ class EvaluationRequest:
     provenance: Provenance
     iterations_left: int = 0
     iteration: int = 0
+    on_task: OnTask | None = None
 
 
 class Evaluator(Protocol):

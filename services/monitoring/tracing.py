@@ -1,0 +1,240 @@
+"""Spans for OpenTelemetry: a job's run by this process, its iterations, and their tasks.
+
+Nothing here is imported unless spans are sent, or without the extra `telemetry`.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, cast
+
+from opentelemetry.sdk.resources import Resource
+from opentelemetry.sdk.trace import SpanProcessor, TracerProvider
+from opentelemetry.trace import Span, Status, StatusCode, set_span_in_context
+
+from services.optimizer.errors import LeaseLost
+from services.optimizer.jobs.iteration import CompletedIteration
+from services.optimizer.jobs.job import Claim, JobState
+from services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
+from services.optimizer.store.base import Store
+from sim.outcome import Outcome
+
+
+def exporting_tracing() -> Tracing:
+    """Tracing that sends its spans by OTLP over HTTP, as OpenTelemetry's variables say.
+
+    Returns:
+        The tracing; whoever opens it closes it.
+    """
+    from opentelemetry.exporter.otlp.proto.http.trace_exporter import (  # noqa: PLC0415
+        OTLPSpanExporter,
+    )
+    from opentelemetry.sdk.trace.export import BatchSpanProcessor  # noqa: PLC0415
+
+    return Tracing(BatchSpanProcessor(OTLPSpanExporter()))
+
+
+class Tracing:
+    """Spans of the jobs that this process runs. Thread-safe.
+
+    A job's span is from its claim to its release or end; an iteration's from its evaluation to its
+    commit; a task's as long as workers had it.
+
+    Args:
+        processor: Takes the spans when they end.
+    """
+
+    def __init__(self, processor: SpanProcessor) -> None:
+        name = os.environ.get("OTEL_SERVICE_NAME", "gaitswarm")
+        resource = Resource.create({"service.name": name})
+        self._provider = TracerProvider(resource=resource, shutdown_on_exit=False)
+        self._provider.add_span_processor(processor)
+        self._tracer = self._provider.get_tracer("gaitswarm")
+        self._lock = threading.Lock()
+        self._jobs: dict[str, Span] = {}
+        self._iterations: dict[str, tuple[int, Span]] = {}
+
+    def traced_store(self, store: Store) -> Store:
+        """Wrap a store, so that claims, commits and releases begin and end spans.
+
+        Args:
+            store: Does the work.
+
+        Returns:
+            A store that answers and raises as the other one does.
+        """
+        return cast(Store, _TracedStore(store, self))
+
+    def traced_evaluator(self, evaluator: Evaluator) -> Evaluator:
+        """Wrap an evaluator, so that evaluations and tasks have spans.
+
+        Args:
+            evaluator: Does the work.
+
+        Returns:
+            An evaluator that answers and raises as the other one does.
+        """
+        return _TracedEvaluator(evaluator, self)
+
+    def close(self) -> None:
+        """Send what has not been sent. Idempotent."""
+        self._provider.shutdown()
+
+    def job_begins(self, claim: Claim) -> None:
+        """Begin the span of a job's run.
+
+        Args:
+            claim: On the job.
+        """
+        job = claim.job
+        attributes: dict[str, str | int] = {
+            "gaitswarm.job.id": job.id,
+            "gaitswarm.job.kind": job.spec.kind,
+            "gaitswarm.job.iterations": job.spec.iterations,
+            "gaitswarm.runner": claim.runner,
+        }
+        with self._lock:
+            self._jobs[job.id] = self._tracer.start_span("job", attributes=attributes)
+
+    def job_ends(self, job_id: str, state: str, error: str | None = None) -> None:
+        """End the span of a job's run, and of an iteration that is under way.
+
+        Args:
+            job_id: Of the job; nothing happens if it has no span.
+            state: How this process leaves it.
+            error: Why it failed, or was lost.
+        """
+        with self._lock:
+            job = self._jobs.pop(job_id, None)
+            _, iteration = self._iterations.pop(job_id, (0, None))
+        for span in (iteration, job):
+            if span is not None:
+                if error is not None:
+                    span.set_status(Status(StatusCode.ERROR, error))
+                span.set_attribute("gaitswarm.job.state", state)
+                span.end()
+
+    def iteration(self, request: EvaluationRequest) -> Span | None:
+        """Find the span of an iteration, which begins with its first evaluation.
+
+        Args:
+            request: Of the evaluation.
+
+        Returns:
+            The span; None for a job that has none.
+        """
+        with self._lock:
+            job = self._jobs.get(request.job_id)
+            if job is None:
+                return None
+            index, span = self._iterations.get(request.job_id, (-1, None))
+            if span is None or index != request.iteration:
+                span = self._tracer.start_span(
+                    "iteration",
+                    context=set_span_in_context(job),
+                    attributes={
+                        "gaitswarm.job.id": request.job_id,
+                        "gaitswarm.iteration": request.iteration,
+                        "gaitswarm.designs": len(request.designs),
+                    },
+                )
+                self._iterations[request.job_id] = (request.iteration, span)
+            return span
+
+    def iteration_ends(self, job_id: str, done: CompletedIteration) -> None:
+        """End the span of an iteration that is committed.
+
+        Args:
+            job_id: Of the job.
+            done: What it came to.
+        """
+        with self._lock:
+            _, span = self._iterations.pop(job_id, (0, None))
+        if span is not None:
+            span.set_attribute("gaitswarm.designs.saved", done.saved)
+            span.end()
+
+    def task(self, parent: Span, report: TaskReport) -> None:
+        """Make the span of a task that has ended.
+
+        Args:
+            parent: Of the iteration.
+            report: What the task was, and how long it took.
+        """
+        ended = time.time_ns()
+        span = self._tracer.start_span(
+            "task",
+            context=set_span_in_context(parent),
+            start_time=ended - round(report.seconds * 1e9),
+            attributes={
+                "gaitswarm.task.walks": report.walks,
+                "gaitswarm.task.compute_seconds": report.compute_seconds,
+                "host.name": report.host,
+            },
+        )
+        if report.error is not None:
+            span.set_status(Status(StatusCode.ERROR, report.error))
+        span.end(ended)
+
+
+class _TracedEvaluator:
+    def __init__(self, inner: Evaluator, tracing: Tracing) -> None:
+        self._inner = inner
+        self._tracing = tracing
+
+    @property
+    def slots(self) -> int:
+        return self._inner.slots
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        span = self._tracing.iteration(request)
+        if span is None:
+            return self._inner.evaluate(request, should_stop)
+        observed = replace(request, on_task=lambda report: self._tracing.task(span, report))
+        return self._inner.evaluate(observed, should_stop)
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+class _TracedStore:
+    def __init__(self, inner: Store, tracing: Tracing) -> None:
+        self._inner = inner
+        self._tracing = tracing
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+    def claim(self, *args: Any, **kwargs: Any) -> Claim | None:
+        claim = self._inner.claim(*args, **kwargs)
+        if claim is not None:
+            self._tracing.job_begins(claim)
+        return claim
+
+    def renew(self, claim: Claim, **kwargs: Any) -> JobState:
+        state: JobState = self._held(claim, lambda: self._inner.renew(claim, **kwargs))
+        return state
+
+    def commit(self, claim: Claim, done: CompletedIteration, following: Any) -> JobState:
+        state: JobState = self._held(claim, lambda: self._inner.commit(claim, done, following))
+        self._tracing.iteration_ends(claim.job.id, done)
+        if state not in (JobState.RUNNING, JobState.PAUSING):
+            self._tracing.job_ends(claim.job.id, state)
+        return state
+
+    def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
+        self._held(claim, lambda: self._inner.release(claim, state, error=error))
+        self._tracing.job_ends(claim.job.id, state, error)
+
+    def _held(self, claim: Claim, access: Callable[[], Any]) -> Any:
+        try:
+            return access()
+        except LeaseLost as lost:
+            self._tracing.job_ends(claim.job.id, "lost", str(lost))
+            raise

@@ -1,0 +1,145 @@
+"""Spans of a real job: who is whose parent, what they say, and that they cost nothing when off."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from opentelemetry.sdk.trace import ReadableSpan
+from opentelemetry.sdk.trace.export import SimpleSpanProcessor
+from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
+from opentelemetry.trace import StatusCode
+
+from services.monitoring.tracing import Tracing
+from services.optimizer.errors import LeaseLost
+from services.optimizer.jobs.documents import SPECS
+from services.optimizer.jobs.job import Command, JobState
+from services.optimizer.run.evaluator import TaskReport
+from services.optimizer.run.execution import Surroundings, run_claim
+from services.optimizer.store.sql_store import SqlStore
+from services.runtime import open_runtime
+from services.worker.dispatch import Dispatcher
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.processes import eventually, loaded_by
+from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
+from tests.worker.requests import never, request
+
+
+@pytest.fixture
+def exporter() -> InMemorySpanExporter:
+    return InMemorySpanExporter()
+
+
+@pytest.fixture
+def tracing(exporter: InMemorySpanExporter) -> Tracing:
+    return Tracing(SimpleSpanProcessor(exporter))
+
+
+def named(exporter: InMemorySpanExporter, name: str) -> list[ReadableSpan]:
+    return [span for span in exporter.get_finished_spans() if span.name == name]
+
+
+def parent_of(span: ReadableSpan) -> int | None:
+    return None if span.parent is None else span.parent.span_id
+
+
+def id_of(span: ReadableSpan) -> int:
+    context = span.get_span_context()
+    assert context is not None
+    return context.span_id
+
+
+def test_a_job_has_its_iterations_and_these_their_tasks(
+    database: Path, tracing: Tracing, exporter: InMemorySpanExporter
+) -> None:
+    with open_runtime(str(database), evaluator="in-process", cpus=1, tracing=tracing) as opened:
+        store = opened.service.store
+        job_id = store.create_job(SPECS.validate_python(SMALL_SPEC), owner="ann")[0].id
+        eventually(lambda: bool(named(exporter, "job")))
+        assert store.job(job_id).state is JobState.SUCCEEDED
+    (job,) = named(exporter, "job")
+    iterations, tasks = named(exporter, "iteration"), named(exporter, "task")
+    assert job.parent is None
+    assert job.attributes is not None
+    assert job.attributes["gaitswarm.job.id"] == job_id
+    assert job.attributes["gaitswarm.job.state"] == "succeeded"
+    assert [parent_of(span) for span in iterations] == [id_of(job)] * 2
+    assert [(span.attributes or {})["gaitswarm.iteration"] for span in iterations] == [0, 1]
+    assert {parent_of(span) for span in tasks} == set(map(id_of, iterations))
+    assert sum(int(str((s.attributes or {})["gaitswarm.task.walks"])) for s in tasks) == 6
+    spans = exporter.get_finished_spans()
+    assert {span.status.status_code for span in spans} == {StatusCode.UNSET}
+    for inner in (*iterations, *tasks):
+        (outer,) = [span for span in spans if id_of(span) == parent_of(inner)]
+        assert (outer.start_time or 0) <= (inner.start_time or 0)
+        assert (inner.end_time or 0) <= (outer.end_time or 0)
+    assert "ann" not in "".join(span.to_json() for span in spans)
+    assert job.resource.attributes["service.name"] == "gaitswarm"
+
+
+def test_a_job_that_fails_and_its_iteration_say_why(
+    store: SqlStore, tracing: Tracing, exporter: InMemorySpanExporter
+) -> None:
+    traced = tracing.traced_store(store)
+    traced.create_job(SPEC)
+    claim = traced.claim("runner", lease_seconds=30.0)
+    assert claim is not None
+    evaluator = tracing.traced_evaluator(FormulaEvaluator([None, ZeroDivisionError("of the test")]))
+    run_claim(claim, Surroundings(traced, evaluator, provenance=lambda _: HERE))
+    (job,) = named(exporter, "job")
+    first, second = named(exporter, "iteration")
+    assert first.status.status_code is StatusCode.UNSET
+    for span in (job, second):
+        assert span.status.status_code is StatusCode.ERROR
+        assert "ZeroDivisionError: of the test" in str(span.status.description)
+
+
+def test_a_job_that_is_lost_ends_its_span(
+    store: SqlStore, tracing: Tracing, exporter: InMemorySpanExporter
+) -> None:
+    traced = tracing.traced_store(store)
+    job, _ = traced.create_job(SPEC)
+    claim = traced.claim("runner", lease_seconds=30.0)
+    assert claim is not None
+    store.command(job.id, Command.CANCEL)
+    with pytest.raises(LeaseLost):
+        traced.renew(claim, lease_seconds=30.0)
+    (span,) = named(exporter, "job")
+    assert span.status.status_code is StatusCode.ERROR
+    assert (span.attributes or {})["gaitswarm.job.state"] == "lost"
+
+
+def test_every_end_of_a_task_is_told() -> None:
+    told: list[TaskReport] = []
+    dispatcher = Dispatcher(1, lambda _: 4)
+    asked = replace(request(2), on_task=told.append)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(dispatcher.evaluate, asked, never)
+        lost = dispatcher.take(timeout=10.0)
+        assert lost is not None
+        dispatcher.again(lost)
+        failed = dispatcher.take(timeout=10.0)
+        assert failed is not None
+        dispatcher.fail(failed, ZeroDivisionError("of the test"))
+        with pytest.raises(ZeroDivisionError):
+            waiting.result()
+    assert [report.error for report in told] == [
+        "its worker was lost",
+        "ZeroDivisionError: of the test",
+    ]
+    assert all(report.walks > 0 and report.seconds >= 0.0 for report in told)
+
+
+@pytest.mark.slow
+def test_nothing_is_imported_unless_a_collector_is_named(tmp_path: Path) -> None:
+    database = str(tmp_path / "jobs.db")
+    options = ["serve", "--db", database, "--port", "0", "--evaluator", "in-process"]
+    served = (
+        "from unittest.mock import patch\n"
+        "from cli.main import run\n"
+        f"with patch('api.server.ApiServer.run'): assert run({options!r}) == 0"
+    )
+    found = loaded_by(served, ["opentelemetry.sdk", "services.monitoring.tracing", "sqlalchemy"])
+    assert found == {"sqlalchemy"}

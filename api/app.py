@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -12,7 +12,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 
 from api.access import AccessMiddleware
-from api.dependencies import lifespan
+from api.dependencies import Component, lifespan
 from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
 from api.middleware import (
     BodyLimitMiddleware,
@@ -61,8 +61,8 @@ def create_app(
     *,
     settings: Settings,
     page_folder: Path = FOLDER,
-    runs_jobs: Callable[[], bool] | None = None,
     metrics: Metrics | None = None,
+    components: Sequence[Component] = (),
 ) -> FastAPI:
     """The application around a service: routes, problems, limits, documentation, page.
 
@@ -72,9 +72,9 @@ def create_app(
         service: answers the requests.
         settings: limits and intervals.
         page_folder: of the built page; there need be none.
-        runs_jobs: whether the runner beside it still claims jobs; None if other processes run them.
         metrics: of the process, which the application adds its own and the database's to; None:
             there are no others.
+        components: parts of the process, beside the database, that /v1/readyz tells of.
 
     Returns:
         The application, for `ApiServer` or any other ASGI server with lifespans.
@@ -92,7 +92,7 @@ def create_app(
         description=DESCRIPTION,
         openapi_tags=TAGS,
         separate_input_output_schemas=False,
-        lifespan=lifespan(service, settings, runs_jobs, metrics),
+        lifespan=lifespan(service, settings, components, metrics),
     )
     for module in (
         jobs,

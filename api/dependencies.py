@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from dataclasses import dataclass
 from typing import Annotated, Final, TypedDict, TypeVar, cast
 
 import anyio
@@ -59,28 +60,45 @@ _VALIDATIONS: Final = 2
 """Bodies that are validated at once: threads of Python take turns, the event loop's among them."""
 
 
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A part of the server's process that /v1/readyz tells of.
+
+    Attributes:
+        name: for people and programs, such as `runner`.
+        trouble: says at once what is wrong with it; None if nothing is.
+        vital: whether the server is not ready while something is.
+    """
+
+    name: str
+    trouble: Callable[[], str | None]
+    vital: bool = True
+
+
 class State(TypedDict):
     """`request.state` of every request: what the lifespan of the application yields.
 
-    validations: threads that validate bodies. stopping: set by the server when it begins to stop;
-    event streams end then. topics: jobs that these streams follow. runs_jobs: whether the runner
-    beside it still claims jobs; None if there is none. metrics: of this process.
+    validations: threads that validate bodies. draining: set by the server on the first signal to
+    end; it still answers then. stopping: set when it begins to stop; event streams end then.
+    topics: jobs that these streams follow. components: parts of the process beside the database.
+    metrics: of this process.
     """
 
     service: JobService
     settings: Settings
     slots: SimulationSlots
     validations: anyio.CapacityLimiter
+    draining: asyncio.Event
     stopping: asyncio.Event
     topics: Topics
-    runs_jobs: Callable[[], bool] | None
+    components: Sequence[Component]
     metrics: Metrics
 
 
 def lifespan(
     service: JobService,
     settings: Settings,
-    runs_jobs: Callable[[], bool] | None,
+    components: Sequence[Component],
     metrics: Metrics,
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
     """The lifespan of an application around a service.
@@ -88,7 +106,7 @@ def lifespan(
     Args:
         service: answers the requests; its store stays its owner's to close.
         settings: of the application.
-        runs_jobs: whether the runner beside it still claims jobs; None if there is none.
+        components: parts of the process beside the database.
         metrics: of this process.
 
     Returns:
@@ -105,9 +123,10 @@ def lifespan(
             settings=settings,
             slots=slots,
             validations=anyio.CapacityLimiter(_VALIDATIONS),
+            draining=asyncio.Event(),
             stopping=stopping,
             topics=topics,
-            runs_jobs=runs_jobs,
+            components=components,
             metrics=metrics,
         )
         waking.cancel()

@@ -16,6 +16,7 @@
 | a name of the server that is not its own      | 421    | unknown-host          |
 | StoreUnavailable, EvaluatorUnavailable,       | 503    | unavailable           |
 | SimulationError, too many simulations         |        |                       |
+| /v1/readyz of a server that was told to end   | 503    | draining              |
 | anything else                                 | 500    | internal-error        |
 """
 
@@ -78,6 +79,7 @@ _TITLES: Final = {
     "body-too-large": "The body is too large",
     "unknown-host": "The server does not go by this name",
     "unavailable": "The service cannot do it now",
+    "draining": "The server is ending",
     "internal-error": "Something went wrong on the server",
 }
 
@@ -152,6 +154,29 @@ def unauthorized(request_path: str, detail: str) -> Response:
     """
     status, headers = HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"}
     return problem(request_path, status, "unauthorized", detail, headers=headers)
+
+
+def unavailable(
+    request_path: str,
+    detail: str,
+    kind: str = "unavailable",
+    *,
+    errors: Sequence[FieldErrorView] = (),
+) -> Response:
+    """Answer that something is not possible now, and when to ask again.
+
+    Args:
+        request_path: path that was asked for.
+        detail: what is not possible and what to do about it.
+        kind: last part of the problem's type.
+        errors: what is to blame.
+
+    Returns:
+        The response.
+    """
+    _log.error("%s: %s", request_path, detail)
+    status = HTTPStatus.SERVICE_UNAVAILABLE
+    return problem(request_path, status, kind, detail, errors=errors, headers=_RETRY)
 
 
 def internal_error(request_path: str, request_id: str) -> Response:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-import signal
+import asyncio
 import socket
+import threading
+from collections.abc import Callable
 from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
 
 _BACKLOG = 512
+
+Drain = Callable[[threading.Event], None]
+"""Called in a thread before the server stops; its event is set when it is to return at once."""
 
 
 class ApiServer:
@@ -25,6 +30,7 @@ class ApiServer:
         host: str,
         port: int,
         shutdown_seconds: int = 5,
+        drain: Drain = lambda _: None,
         log_level: str = "warning",
     ) -> None:
         """Begin to listen.
@@ -34,6 +40,8 @@ class ApiServer:
             host: address to listen on.
             port: 0 takes a free one.
             shutdown_seconds: how long open requests may finish when the server stops [s].
+            drain: called in a thread when the server is told to end. Requests are answered until it
+                returns.
             log_level: of uvicorn's own messages.
 
         Raises:
@@ -48,7 +56,7 @@ class ApiServer:
             timeout_graceful_shutdown=shutdown_seconds,
             server_header=False,
         )
-        self._server = _Server(config)
+        self._server = _Server(config, drain)
         ipv6 = ":" in host
         self._socket = socket.create_server(
             (host, port),
@@ -62,8 +70,9 @@ class ApiServer:
     def run(self) -> None:
         """Serve until `stop`, or until SIGINT or SIGTERM where this is the main thread.
 
-        Open requests end first, event streams at once. Returns normally, so that the caller can
-        close what it opened.
+        First all is drained, while requests are answered. Then connections are no longer accepted,
+        open requests end, event streams at once. A second signal ends all of that. Returns
+        normally, so that the caller can close what it opened.
         """
         try:
             self._server.run(sockets=[self._socket])
@@ -76,15 +85,28 @@ class ApiServer:
 
 
 class _Server(uvicorn.Server):
-    """uvicorn, which by itself knows nothing of streams that do not end."""
+    """uvicorn, which by itself knows nothing of drains and of streams that do not end."""
+
+    def __init__(self, config: uvicorn.Config, drain: Drain) -> None:
+        super().__init__(config)
+        self._drain = drain
+        self._at_once = threading.Event()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self.lifespan.state["draining"].set()
+        drained = asyncio.create_task(asyncio.to_thread(self._drain, self._at_once))
+        while not (await asyncio.wait([drained], timeout=1.0))[0]:
+            # The `Date` of answers goes on meanwhile.
+            await self.on_tick(0)
+        await drained
         # The lifespan ends after the last answer; streams must hear of it before.
         self.lifespan.state["stopping"].set()
         await super().shutdown(sockets)
 
-    def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002 - uvicorn's
         # uvicorn's own keeps the signal, to raise it again when all is done: that would end the
         # process before its owner has closed the runner and the store.
-        self.force_exit |= self.should_exit and sig == signal.SIGINT
+        if self.should_exit:
+            self.force_exit = True
+            self._at_once.set()
         self.should_exit = True

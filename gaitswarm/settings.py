@@ -83,6 +83,12 @@ class Settings(BaseSettings):
     webhook_secret: str | None = Field(
         default=None, description="Signs what they are told.", repr=False
     )
+    drain_seconds: float = Field(
+        default=60.0,
+        ge=0.0,
+        le=86_400.0,
+        description="How long iterations under way may take yet when a process is told to end [s].",
+    )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
     log_format: Literal["console", "json"] = Field(
         default="console", description="Lines for people, or an object of JSON for each message."

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.optimizer.run.embedded import run_embedded
-from services.optimizer.run.evaluator import Evaluator
+from services.optimizer.run.evaluator import Evaluator, Watched
 from services.optimizer.run.runner import Runner
 from services.optimizer.service import JobService
 from services.optimizer.store.base import Store
@@ -73,6 +73,11 @@ class Runtime:
     service: JobService
     evaluator: Evaluator | None
     runner: Runner | None
+
+    def workers_trouble(self) -> str | None:
+        """Why walks cannot be run now; None if they can, or nothing is known against it."""
+        watched: object = self.evaluator
+        return watched.trouble() if isinstance(watched, Watched) else None
 
 
 @contextmanager
@@ -161,22 +166,27 @@ def open_runtime(
 
 
 @contextmanager
-def stop_on_signals(stop: threading.Event) -> Iterator[None]:
-    """Let SIGINT and SIGTERM set an event inside the block. The main thread's to use.
+def stop_on_signals(
+    stop: threading.Event, at_once: threading.Event | None = None
+) -> Iterator[None]:
+    """Let SIGINT and SIGTERM set events inside the block. The main thread's to use.
 
-    A second SIGINT raises KeyboardInterrupt, for those who cannot wait.
+    A SIGINT when all of them are set raises KeyboardInterrupt, for those who cannot wait.
 
     Args:
-        stop: What is set.
+        stop: Set by the first signal.
+        at_once: Set by the second.
 
     Yields:
         Nothing.
     """
 
     def _handle(number: int, _frame: FrameType | None) -> None:
-        if stop.is_set() and number == signal.SIGINT:
+        unset = [event for event in (stop, at_once) if event is not None and not event.is_set()]
+        if unset:
+            unset[0].set()
+        elif number == signal.SIGINT:
             raise KeyboardInterrupt
-        stop.set()
 
     before: dict[int, Any] = {}
     try:

@@ -40,6 +40,9 @@ data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"eva
 
 """
 
+_RECONNECT: Final = 1000
+"""After so long a client is to connect again that has lost its server [ms]."""
+
 _PAGE: Final = 200
 """Iterations read at once."""
 
@@ -87,7 +90,8 @@ async def stream_events(
     iteration's index, its data an IterationView. An event `state`, without an id, is sent on
     connecting and whenever the job's state, or what it waits for, changes; its data is a StateView.
     The stream ends after the event of a final state. A broken stream goes on without gap or repeat
-    from `Last-Event-ID` (or `after`). Comments keep idle connections alive.
+    from `Last-Event-ID` (or `after`). Comments keep idle connections alive. A server that ends says
+    so in a comment, and in a field `retry` when to connect again.
     """
     start = after if last_event_id is None else last_event_id
     poll_seconds = settings.api_event_poll_seconds
@@ -151,6 +155,7 @@ async def _events(
         if job.state.terminal or not follow:
             return
         await topic.changed(version, seconds=_LONGEST_WAIT)
+    yield ServerSentEvent(comment="the server is ending", retry=_RECONNECT)
 
 
 async def _pause(stopping: asyncio.Event, seconds: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Literal
 
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -11,8 +11,10 @@ from starlette.responses import RedirectResponse
 
 from api.dependencies import Service
 from api.documentation import problems
-from gaitswarm.views import PREFIX, View
-from services.optimizer.errors import EvaluatorUnavailable
+from api.problems import unavailable
+from gaitswarm.views import PREFIX, FieldErrorView, View
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.service import JobService
 
 router = APIRouter(prefix=PREFIX, tags=["health"])
 
@@ -21,6 +23,27 @@ class HealthView(View):
     """Good news; bad news is a problem."""
 
     status: Literal["ok"] = Field(default="ok", description="Always `ok`.", examples=["ok"])
+
+
+class ComponentView(View):
+    """How a part of the server is."""
+
+    name: str = Field(
+        description="`database`; `runner` claims queued jobs; `workers` run their walks.",
+        examples=["runner"],
+    )
+    status: Literal["ok", "degraded", "failed"] = Field(
+        description="`degraded`: something is wrong, but the server can do without for a while.",
+        examples=["ok"],
+    )
+    detail: str = Field(default="", description="What is wrong, and what to do about it.")
+
+
+class ReadinessView(View):
+    """The server can work."""
+
+    status: Literal["ok"] = Field(default="ok", description="Always `ok`.", examples=["ok"])
+    components: list[ComponentView] = Field(description="Its parts, none of which has failed.")
 
 
 @router.get(
@@ -35,19 +58,48 @@ async def healthz() -> HealthView:
 
 
 @router.get(
-    "/readyz", operation_id="readyz", summary="Can it work?", responses=problems(asks=False)
+    "/readyz",
+    operation_id="readyz",
+    summary="Can it work?",
+    response_model=ReadinessView,
+    responses=problems(asks=False),
 )
-def readyz(service: Service, request: Request) -> HealthView:
-    """Answers ok if the database does and has this version's schema, and a runner that was started
-    with the server still claims jobs; else 503.
+def readyz(service: Service, request: Request) -> ReadinessView | Response:
+    """Answers ok, component by component, if none has failed; else 503, whose `errors` name those
+    that have.
+
+    The database fails if it does not answer or has another schema than this version's, the runner
+    if its thread has ended or is stuck. Once the server was told to end, while jobs commit their
+    iterations under way, the answer is a 503 of the type `draining`.
     """
-    service.store.ping()
-    runs_jobs: Callable[[], bool] | None = request.state.runs_jobs
-    if runs_jobs is not None and not runs_jobs():
-        raise EvaluatorUnavailable(
-            "this server's runner has ended, and runs no more jobs; restart the server"
+    path = request.url.path
+    if request.state.draining.is_set():
+        return unavailable(
+            path, "this server was told to end, and gives its jobs back to the queue", "draining"
         )
-    return HealthView()
+    components = list(_components(service, request))
+    failed = [component for component in components if component.status == "failed"]
+    if failed:
+        errors = [FieldErrorView(field=found.name, message=found.detail) for found in failed]
+        detail = "; ".join(f"{error.field}: {error.message}" for error in errors)
+        return unavailable(path, detail, errors=errors)
+    return ReadinessView(components=components)
+
+
+def _components(service: JobService, request: Request) -> Iterator[ComponentView]:
+    try:
+        service.store.ping()
+    except StoreUnavailable as error:
+        yield ComponentView(name="database", status="failed", detail=str(error))
+    else:
+        yield ComponentView(name="database", status="ok")
+    for component in request.state.components:
+        trouble = component.trouble()
+        if trouble is None:
+            yield ComponentView(name=component.name, status="ok")
+        else:
+            status: Literal["failed", "degraded"] = "failed" if component.vital else "degraded"
+            yield ComponentView(name=component.name, status=status, detail=trouble)
 
 
 def add_short_paths(app: FastAPI) -> None:

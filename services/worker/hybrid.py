@@ -71,6 +71,10 @@ class HybridEvaluator:
         """Whether the next request is run by Ray."""
         return self._ready_ray() is not None
 
+    def trouble(self) -> str | None:
+        """Whether threads are missing; walks go on without Ray."""
+        return self._threads.trouble()
+
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:

@@ -65,6 +65,13 @@ class InProcessEvaluator:
         self._kernels.build(request.cases, should_stop)
         return self._dispatcher.evaluate(request, should_stop)
 
+    def trouble(self) -> str | None:
+        """Whether threads are missing."""
+        lost = sum(not thread.is_alive() for thread in self._threads)
+        if not lost:
+            return None
+        return f"{lost} of {len(self._threads)} threads have ended; restart this process"
+
     def close(self) -> None:
         """End the threads; waits for the chunks that are being run."""
         self._dispatcher.close("the evaluator was closed")

@@ -83,6 +83,12 @@ class RayEvaluator:
         """Whether the connection was lost, or could not be opened."""
         return self._link.lost
 
+    def trouble(self) -> str | None:
+        """Whether Ray was lost, or could not be opened."""
+        if not self.lost:
+            return None
+        return "Ray is out of reach; it is connected again for the next iteration"
+
     def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
         """Return when Ray is open; if it cannot be, or need not be any more, this is closed.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import httpx2
 import pytest
 
+from api.dependencies import Component
 from services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnavailable
 from services.optimizer.jobs.job import Job
 from services.optimizer.store.sql_store import SqlStore
@@ -85,7 +86,8 @@ def test_what_cannot_be_done_now_is_told_apart_from_bugs(
 
 def test_the_server_is_alive_and_ready(client: httpx2.Client) -> None:
     assert client.get("/v1/healthz").json() == {"status": "ok"}
-    assert client.get("/v1/readyz").json() == {"status": "ok"}
+    ready = {"status": "ok", "components": [{"name": "database", "status": "ok", "detail": ""}]}
+    assert client.get("/v1/readyz").json() == ready
 
 
 def test_without_a_database_the_server_is_alive_but_not_ready(
@@ -102,13 +104,30 @@ def test_without_a_database_the_server_is_alive_but_not_ready(
     assert "restore it" in answer.json()["detail"]
 
 
-def test_a_server_whose_runner_has_ended_is_alive_but_not_ready(serve: Serve) -> None:
-    lives = [True, False]
-    client = serve(runs_jobs=lives.pop).client
+def test_a_component_that_has_failed_is_named_and_the_server_is_alive_but_not_ready(
+    serve: Serve,
+) -> None:
+    troubles = [None, "its thread has ended; restart this process"]
+    client = serve(components=[Component("runner", troubles.pop)]).client
 
-    assert client.get("/v1/readyz").status_code == 503
+    answer = client.get("/v1/readyz")
+    assert answer.status_code == 503
+    assert answer.json()["detail"] == "runner: its thread has ended; restart this process"
+    assert [error["field"] for error in answer.json()["errors"]] == ["runner"]
     assert client.get("/v1/healthz").status_code == 200
     assert client.get("/v1/readyz").status_code == 200
+
+
+def test_a_component_that_the_server_can_do_without_is_told_of(serve: Serve) -> None:
+    workers = Component("workers", lambda: "Ray is out of reach", vital=False)
+    answer = serve(components=[workers]).client.get("/v1/readyz")
+
+    assert answer.status_code == 200
+    assert answer.json()["components"][1] == {
+        "name": "workers",
+        "status": "degraded",
+        "detail": "Ray is out of reach",
+    }
 
 
 @pytest.mark.parametrize(

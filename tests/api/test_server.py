@@ -16,9 +16,13 @@ import pytest
 from api.app import create_app
 from api.server import ApiServer
 from gaitswarm.settings import Settings
-from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.service import JobService
-from tests.examples.processes import loaded_by, output, start_python
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Serve
+from tests.examples.jobs import LONG_SPEC
+from tests.examples.processes import eventually, loaded_by, output, start_python
+from tests.examples.servers import ServerProcess
 
 PROGRAM = """
 import sys
@@ -26,6 +30,9 @@ from api.app import create_app
 from api.server import ApiServer
 from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Serve
+from tests.examples.jobs import LONG_SPEC
 from services.optimizer.store.sql_store import open_store
 
 store = open_store(sys.argv[1])
@@ -63,6 +70,50 @@ def test_a_signal_ends_the_process_within_seconds_in_spite_of_open_streams(
     assert said.readline() == "closed\n"
     assert process.wait(timeout=30.0) == 0
     assert time.monotonic() - began < 15.0
+
+
+def test_a_server_that_drains_answers_and_says_that_it_is_not_ready(serve: Serve, job: Job) -> None:
+    drains, drained = threading.Event(), threading.Event()
+
+    def drain(_: threading.Event) -> None:
+        drains.set()
+        drained.wait()
+
+    server = serve(drain=drain)
+    try:
+        with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
+            lines = answer.iter_lines()
+            assert next(lines) == "event: state"
+            server.stop()
+            assert drains.wait(20.0)
+            unready = httpx2.get(f"{server.url}/v1/readyz")
+            assert unready.status_code == 503
+            assert unready.json()["type"] == "urn:gaitswarm:problem:draining"
+            assert unready.headers["Retry-After"]
+            assert httpx2.get(f"{server.url}/v1/healthz").status_code == 200
+            assert httpx2.get(f"{server.url}/v1/jobs/{job.id}").status_code == 200
+            drained.set()
+            assert "retry: 1000" in list(lines)
+    finally:
+        drained.set()
+
+
+@pytest.mark.slow
+def test_a_served_job_commits_its_iteration_under_way_before_the_server_ends(
+    store: SqlStore, database: Path
+) -> None:
+    server = ServerProcess(database, "--evaluator", "in-process", "--cpus", "1")
+    try:
+        job_id = server.submit(LONG_SPEC)
+        eventually(lambda: store.job(job_id).progress.iterations > 0)
+        before = store.job(job_id).progress.iterations
+        server.process.send_signal(signal.SIGTERM)
+        eventually(lambda: server.client.get("/v1/readyz").status_code == 503)
+        assert server.process.wait(timeout=60.0) == 0
+    finally:
+        server.close()
+    ended = store.job(job_id)
+    assert (ended.state, ended.progress.iterations) == (JobState.QUEUED, before + 1)
 
 
 def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobService) -> None:

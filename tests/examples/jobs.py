@@ -16,6 +16,15 @@ SMALL_SPEC: Final[dict[str, Any]] = {
 }
 """Six walks of a second, as a document."""
 
+LONG_SPEC: Final[dict[str, Any]] = {
+    "name": "long",
+    "controller": "pi",
+    "scenarios": ["normal-fast", "slope-fast"],
+    "optimizer": {"name": "pso", "particles": 120},
+    "iterations": 1000,
+    "seed": 7,
+}
+"""An iteration takes some seconds of one processor."""
 
 Bits = tuple[int, int, bytes, bytes, bytes, float]
 """An evaluation, and nothing that is measured: iteration, particle, design, objectives, statuses,

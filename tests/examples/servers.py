@@ -6,7 +6,7 @@ import json
 import struct
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -59,8 +59,9 @@ class Server(Served):
         service: JobService | None,
         *,
         page_folder: Path = Path("none"),
-        runs_jobs: Callable[[], bool] | None = None,
         metrics: Metrics | None = None,
+        components: Sequence[dependencies.Component] = (),
+        drain: Callable[[threading.Event], None] = lambda _: None,
         **settings: Any,
     ) -> None:
         assert set(settings) <= set(Settings.model_fields)
@@ -69,14 +70,15 @@ class Server(Served):
             cast(JobService, service),
             settings=values,
             page_folder=page_folder,
-            runs_jobs=runs_jobs,
             metrics=metrics,
+            components=components,
         )
         self._server = ApiServer(
             self.app,
             host="127.0.0.1",
             port=0,
             shutdown_seconds=values.api_shutdown_seconds,
+            drain=drain,
             log_level="critical",
         )
         self._thread = threading.Thread(target=self._server.run)

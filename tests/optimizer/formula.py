@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -13,6 +14,8 @@ from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import JobProvenance, with_record
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from services.optimizer.run.execution import Surroundings, run_claim
+from services.optimizer.store.base import Store
 from sim.case import Walk
 from sim.outcome import Outcome, Status
 from sim.provenance import Provenance
@@ -112,3 +115,17 @@ class TradeOff(FormulaEvaluator):
         for outcome in outcomes:
             outcome.objectives[:, 4:5] = 1.0 / (0.1 + gains)
         return outcomes
+
+
+def queue(store: Store, spec: JobSpec = SPEC) -> str:
+    job, _ = store.create_job(spec)
+    return job.id
+
+
+def run(
+    store: Store, evaluator: FormulaEvaluator, stop: threading.Event | None = None, **given: object
+) -> Job:
+    claim = store.claim("runner", lease_seconds=0.3)
+    assert claim is not None
+    around = replace(Surroundings(store, evaluator, lease_seconds=0.3), **given)  # type: ignore[arg-type]
+    return run_claim(claim, around, stop)

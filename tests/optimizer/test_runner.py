@@ -7,7 +7,6 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partialmethod
 from typing import cast
 
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 from services.optimizer.errors import EvaluatorUnavailable, KilledWorker, StoreUnavailable
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.time_left import time_left
@@ -31,21 +29,7 @@ from sim.errors import KernelBuildError, SimulationInputError
 from sim.outcome import Outcome
 from tests.examples.jobs import history
 from tests.examples.processes import eventually
-from tests.optimizer.formula import SPEC, FormulaEvaluator
-
-
-def queue(store: Store, spec: JobSpec = SPEC) -> str:
-    job, _ = store.create_job(spec)
-    return job.id
-
-
-def run(
-    store: Store, evaluator: FormulaEvaluator, stop: threading.Event | None = None, **given: object
-) -> Job:
-    claim = store.claim("runner", lease_seconds=0.3)
-    assert claim is not None
-    around = replace(Surroundings(store, evaluator, lease_seconds=0.3), **given)  # type: ignore[arg-type]
-    return run_claim(claim, around, stop)
+from tests.optimizer.formula import SINGLE, SPEC, FormulaEvaluator, queue, run
 
 
 def test_a_claimed_job_runs_to_its_end(store: Store) -> None:
@@ -418,57 +402,6 @@ def test_a_run_that_lost_its_lease_writes_nothing(store: Store) -> None:
     assert (finished.id, finished.state) == (job_id, JobState.SUCCEEDED)
 
 
-def test_a_runner_runs_jobs_side_by_side_to_the_bits_of_jobs_run_alone(store: Store) -> None:
-    specs = [SPEC, SPEC.model_copy(update={"seed": 12}), SPEC.model_copy(update={"iterations": 9})]
-    alone = []
-    for spec in specs:
-        job_id = queue(store, spec)
-        run(store, FormulaEvaluator())
-        alone.append(history(store, job_id))
-    together = [queue(store, spec) for spec in specs]
-    runner = Runner(store, FormulaEvaluator(), concurrency=3, poll_seconds=0.01)
-    runner.start()
-    eventually(lambda: all(store.job(j).state is JobState.SUCCEEDED for j in together))
-    runner.stop()
-    assert [history(store, job_id) for job_id in together] == alone
-
-
-def test_a_runner_that_stops_gives_its_jobs_back_at_once(store: Store) -> None:
-    jobs = [queue(store), queue(store), queue(store)]
-    evaluator = FormulaEvaluator()
-    evaluator.hold.set()
-    runner = Runner(store, evaluator, concurrency=2, poll_seconds=0.01)
-    runner.start()
-    eventually(lambda: evaluator.calls == 2)
-    begun = time.monotonic()
-    runner.stop()
-    assert time.monotonic() - begun < 2.0
-    assert not runner.running
-    assert {store.job(job_id).state for job_id in jobs} == {JobState.QUEUED}
-
-
-def test_a_runner_outlives_a_machine_without_threads_to_spare(
-    store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    job_id = queue(store)
-    refused: list[str] = []
-    start = threading.Thread.start
-
-    def start_unless_it_is_the_first_for_a_job(thread: threading.Thread) -> None:
-        if thread.name == f"job-{job_id}" and not refused:
-            refused.append(thread.name)
-            raise RuntimeError("can't start new thread")
-        start(thread)
-
-    monkeypatch.setattr(threading.Thread, "start", start_unless_it_is_the_first_for_a_job)
-    runner = Runner(store, FormulaEvaluator(), poll_seconds=0.01)
-    runner.start()
-    eventually(lambda: store.job(job_id).state is JobState.SUCCEEDED)
-
-    assert refused and runner.running
-    runner.stop()
-
-
 def test_a_runner_outlives_a_store_that_cannot_be_asked_for_jobs_with_one_line_in_the_log(
     store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -503,3 +436,31 @@ def test_recorded_designs_are_what_was_evaluated(store: Store) -> None:
     run(store, evaluator)
     recorded = [e.design for e in store.evaluations_between(job_id, 0, SPEC.iterations)]
     np.testing.assert_array_equal(recorded, np.concatenate(evaluator.designs))
+
+
+def test_a_drained_job_does_not_wait_for_workers_out_of_reach(store: Store) -> None:
+    job_id = queue(store)
+    drain = threading.Event()
+    claim = store.claim("runner", lease_seconds=60.0, job_id=job_id)
+    assert claim is not None
+    gone = EvaluatorUnavailable("no route to host")
+    around = Surroundings(
+        store,
+        FormulaEvaluator([None, gone]),
+        backoff=Backoff(first=600.0),
+        on_retry=lambda seconds, why: drain.set(),
+    )
+    job = run_claim(claim, around, drain=drain)
+    assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
+
+
+def test_a_drain_in_single_precision_commits_the_best_as_judged_in_double(store: Store) -> None:
+    job_id = queue(store, SINGLE)
+    evaluator = FormulaEvaluator()
+    drain = threading.Event()
+    drain.set()
+    claim = store.claim("runner", lease_seconds=60.0, job_id=job_id)
+    assert claim is not None
+    job = run_claim(claim, Surroundings(store, evaluator), drain=drain)
+    assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
+    assert len(store.reevaluations(job_id)) == 1

@@ -7,6 +7,7 @@ import signal
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -16,10 +17,13 @@ from gaitswarm.jobs.open import open_jobs
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
-from tests.examples.jobs import SMALL_SPEC
-from tests.examples.processes import COMMAND_LINE, eventually, start_python
+from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
+from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
 
 pytestmark = pytest.mark.slow
+
+
+LONG = JobSpec.model_validate(LONG_SPEC)
 
 
 def spec(iterations: int) -> JobSpec:
@@ -52,6 +56,43 @@ def test_runs_what_is_queued_and_gives_back_what_it_has_not_finished(
         started.send_signal(ending)
         assert started.wait(timeout=20) == 0
     assert store.job(endless.id).state is JobState.QUEUED
+
+
+def begun(store: SqlStore, job_id: str) -> int:
+    """Iterations that a job has committed, once it has committed any and asked for the next."""
+    eventually(lambda: store.job(job_id).progress.iterations > 0)
+    return store.job(job_id).progress.iterations
+
+
+def test_a_signal_lets_the_iteration_under_way_be_committed(
+    store: SqlStore, database: Path
+) -> None:
+    job, _ = store.create_job(LONG)
+    with runner(DB=str(database), CPUS="1") as started:
+        before = begun(store, job.id)
+        told = datetime.now(UTC)
+        started.send_signal(signal.SIGTERM)
+        assert started.wait(timeout=60) == 0
+    ended = store.job(job.id)
+    assert (ended.state, ended.progress.iterations) == (JobState.QUEUED, before + 1)
+    (last,) = store.iterations(job.id, after=before - 1).items
+    assert last.committed_at > told
+    # It waits for nobody's lease.
+    claim = store.claim("another", lease_seconds=60.0, job_id=job.id)
+    assert claim is not None and claim.ask is not None
+    assert claim.ask.iteration == before + 1
+
+
+def test_a_second_signal_drops_the_iteration_under_way(store: SqlStore, database: Path) -> None:
+    job, _ = store.create_job(LONG)
+    with runner(DB=str(database), CPUS="1") as started:
+        before = begun(store, job.id)
+        started.send_signal(signal.SIGTERM)
+        line_with(started.stderr, "ending: jobs commit")
+        started.send_signal(signal.SIGTERM)
+        assert started.wait(timeout=60) == 0
+    ended = store.job(job.id)
+    assert (ended.state, ended.progress.iterations) == (JobState.QUEUED, before)
 
 
 def test_without_settings_it_runs_the_jobs_of_the_users_own_database() -> None:

@@ -104,6 +104,20 @@ def test_settings_of_ours_exist() -> None:
     assert ours - known == set()
 
 
+def test_processes_have_time_to_drain_before_they_are_killed() -> None:
+    settings = Settings()
+    needed = {
+        "optimizer": settings.drain_seconds,
+        "api": settings.api_shutdown_seconds,
+    }
+    for name, seconds in needed.items():
+        given = re.fullmatch(r"(\d+)s", SERVICES[name]["stop_grace_period"])
+        assert given and int(given[1]) > seconds
+    text = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+    (unit,) = re.findall(r"^TimeoutStopSec=(\d+)$", text, re.MULTILINE)
+    assert int(unit) > settings.drain_seconds + settings.api_shutdown_seconds
+
+
 def test_every_node_of_the_cluster_has_the_same_token_and_none_is_built_in() -> None:
     nodes = [s["environment"] for name, s in OURS.items() if name != "api"]
     assert len({node["RAY_AUTH_TOKEN"] for node in nodes}) == 1

@@ -11,13 +11,16 @@ import typer
 from cli.options import RunnerOptions, with_groups
 
 if TYPE_CHECKING:
+    import threading
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
+    from api.dependencies import Component
     from gaitswarm.settings import Settings
     from services.monitoring.metrics import Metrics
     from services.monitoring.tracing import Tracing
     from services.optimizer.access import Tokens
+    from services.optimizer.run.runner import Runner
     from services.runtime import Runtime
 
 
@@ -70,9 +73,9 @@ def serve(
         metrics = Metrics()
         with _runtime(settings, metrics, runs_jobs=not no_runner) as opened:
             beside = opened.runner
-            runs_jobs = None if beside is None else lambda: beside.running
+            components = () if beside is None else _components(opened, beside)
             app = create_app(
-                opened.service, settings=settings, runs_jobs=runs_jobs, metrics=metrics
+                opened.service, settings=settings, components=components, metrics=metrics
             )
             try:
                 server = ApiServer(
@@ -80,6 +83,7 @@ def serve(
                     host=settings.api_host,
                     port=settings.api_port,
                     shutdown_seconds=settings.api_shutdown_seconds,
+                    drain=lambda at_once: _drain(beside, settings, at_once),
                 )
             except OSError as error:
                 raise EvaluatorUnavailable(
@@ -99,7 +103,8 @@ def serve(
 def runner(options: RunnerOptions) -> None:
     """Run queued jobs, without page and API, until Ctrl-C or SIGTERM.
 
-    The jobs that are then under way go back to the queue.
+    The jobs that are then under way commit their iterations and go back to the queue; a second
+    signal drops the iterations.
     """
     import logging
     import threading
@@ -114,7 +119,7 @@ def runner(options: RunnerOptions) -> None:
     settings = read_settings(**asdict(options))
     log_to_stderr(settings.log_level, settings.log_format)
     log = logging.getLogger(__name__)
-    stop = threading.Event()
+    stop, at_once = threading.Event(), threading.Event()
     metrics = None
     if settings.metrics_port is not None:
         from services.monitoring.metrics import Metrics
@@ -123,7 +128,7 @@ def runner(options: RunnerOptions) -> None:
     # A stop while a cluster is connected ends the command before it is ready.
     with (
         suppress(EvaluationStopped),
-        stop_on_signals(stop),
+        stop_on_signals(stop, at_once),
         _runtime(settings, metrics, should_stop=stop.is_set) as opened,
         _served(metrics, settings, lambda: opened.service.store.tokens) as url,
     ):
@@ -132,7 +137,31 @@ def runner(options: RunnerOptions) -> None:
         if url is not None:
             log.info("metrics: %s", url)
         stop.wait()
-        log.info("stopping: jobs under way go back to the queue")
+        _drain(opened.runner, settings, at_once)
+
+
+def _drain(runner: Runner | None, settings: Settings, at_once: threading.Event) -> None:
+    import logging
+
+    if runner is None:
+        return
+    seconds = settings.drain_seconds
+    logging.getLogger(__name__).info(
+        "ending: jobs commit their iterations under way, for %g s at most, and go back to the"
+        " queue; a second signal drops the iterations",
+        seconds,
+    )
+    runner.drain(seconds, at_once)
+
+
+def _components(opened: Runtime, runner: Runner) -> tuple[Component, ...]:
+    """Parts of the process that it tells of. Jobs wait for workers that are away."""
+    from api.dependencies import Component
+
+    return (
+        Component("runner", runner.trouble),
+        Component("workers", opened.workers_trouble, vital=False),
+    )
 
 
 def _tell_of_tokens(tell: Callable[[str], None], secret: str | None, url: str) -> None:

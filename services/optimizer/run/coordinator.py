@@ -1,7 +1,7 @@
 """What happens next in a job: a pure function of (state, event) -> (state, actions).
 
-No I/O, clock or thread is in here; `services.optimizer.run.runner` executes the actions, in order,
-and answers the last of them with an event. An action that raises voids those after it.
+No I/O, clock or thread is in here; `services.optimizer.run.execution` executes the actions, in
+order, and answers the last of them with an event. An action that raises voids those after it.
 
 event                  in phase         actions                      phase after
 Claimed                start            [Record, Begin,] Evaluate    evaluating

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +93,14 @@ class Evaluator(Protocol):
 
     def close(self) -> None:
         """Release what was started. Idempotent."""
+
+
+@runtime_checkable
+class Watched(Protocol):
+    """An evaluator that knows whether it can work."""
+
+    def trouble(self) -> str | None:
+        """Why walks cannot be run now, for people; None if they can. Answers at once."""
 
 
 class EvaluationStopped(Exception):

@@ -104,7 +104,12 @@ class Surroundings:
     sleep: Callable[[float], None] = time.sleep
 
 
-def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None = None) -> Job:
+def run_claim(
+    claim: Claim,
+    around: Surroundings,
+    stop: threading.Event | None = None,
+    drain: threading.Event | None = None,
+) -> Job:
     """Run a claimed job until it ends, is paused, or is no longer ours.
 
     Workers or a store that are away are waited for, however long that takes, as long as nobody else
@@ -115,6 +120,8 @@ def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None =
         around: What the run needs beside it.
         stop: When set, work under way is dropped and the job is given back to the queue. So it is
             when `on_commit` raises, which is passed on.
+        drain: When set, the job is given back to the queue as soon as the iteration under way is
+            committed, or at once while it waits for workers.
 
     Returns:
         The job as it is then.
@@ -123,7 +130,7 @@ def run_claim(claim: Claim, around: Surroundings, stop: threading.Event | None =
         StoreUnavailable: The store does not answer in the end; the job then stays as last
             committed, and is taken up again when its lease has run out.
     """
-    run = _Run.of(claim, around, stop or threading.Event())
+    run = _Run.of(claim, around, stop or threading.Event(), drain or threading.Event())
     try:
         with log_context(job=claim.job.id), run.heartbeat:
             state, actions = run.begin()
@@ -158,11 +165,14 @@ class _Run:
     around: Surroundings
     heartbeat: Heartbeat
     stop: threading.Event
+    drain: threading.Event
     workers: Outage
     memory: Outage
 
     @classmethod
-    def of(cls, claim: Claim, around: Surroundings, stop: threading.Event) -> _Run:
+    def of(
+        cls, claim: Claim, around: Surroundings, stop: threading.Event, drain: threading.Event
+    ) -> _Run:
         workers, memory = Outage(around.clock), Outage(around.clock)
         heartbeat = Heartbeat(
             around.store,
@@ -171,7 +181,7 @@ class _Run:
             waiting=lambda: workers.reason,
             outage=memory,
         )
-        return cls(claim, around, heartbeat, stop, workers, memory)
+        return cls(claim, around, heartbeat, stop, drain, workers, memory)
 
     def begin(self) -> Decision:
         """What to do first; a job whose robot cannot be read fails, as in `decide`."""
@@ -233,6 +243,8 @@ class _Run:
                 state = self._stored(lambda: self.around.store.commit(self.claim, done, following))
                 if self.around.on_commit is not None:
                     self.around.on_commit(done, state)
+                if state is JobState.RUNNING and self.drain.is_set():
+                    return StopRequested()
                 return Committed(state)
             case Wait(seconds=seconds, reason=reason):
                 return self._wait(seconds, reason)
@@ -273,6 +285,8 @@ class _Run:
         for _ in self._glances(seconds):
             if self.heartbeat.state is JobState.PAUSING:
                 return PauseSeen()
+            if self.drain.is_set():
+                return StopRequested()
         return Waited()
 
     def _stored(self, access: Callable[[], T]) -> T:
@@ -312,7 +326,7 @@ class _Run:
                 return answer
             failures += 1
             for _ in self._glances(self.around.backoff.pause(failures)):
-                if self.heartbeat.state is JobState.PAUSING:
+                if self.heartbeat.state is JobState.PAUSING or self.drain.is_set():
                     raise EvaluationStopped
 
     def _away(self, outage: Outage, reason: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from services.optimizer.access import Tokens
     from services.optimizer.run.runner import Runner
     from services.runtime import Runtime
+
+_GLANCE: Final = 0.2
+"""Seconds after which a signal is seen at the latest."""
 
 
 def register(app: typer.Typer) -> None:
@@ -136,7 +139,9 @@ def runner(options: RunnerOptions) -> None:
         log.info("ready: %d slots, %d jobs at once", slots, settings.concurrent_jobs)
         if url is not None:
             log.info("metrics: %s", url)
-        stop.wait()
+        # Handlers run in this thread, but the system may hand a signal to another one.
+        while not stop.wait(_GLANCE):
+            pass
         _drain(opened.runner, settings, at_once)
 
 

@@ -13,6 +13,7 @@ from services.optimizer.analysis.fork import Parent, check_begun, forked
 from services.optimizer.analysis.history import read_history
 from services.optimizer.analysis.questions import Questions
 from services.optimizer.analysis.start import started
+from services.optimizer.deletion import Deletion
 from services.optimizer.errors import InvalidRequest, ProvenanceChanged
 from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, duration, estimate
@@ -34,7 +35,7 @@ _MOST_WALKS: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class JobService(Questions):
+class JobService(Questions, Deletion):
     """Jobs as their users see them. Thread-safe, as the store is.
 
     Attributes:

@@ -33,6 +33,10 @@ class JobState(StrEnum):
         return self in (JobState.CANCELLED, JobState.FAILED, JobState.SUCCEEDED)
 
 
+ENDED: Final = frozenset(state for state in JobState if state.terminal)
+"""The states in which nothing more happens to a job by itself."""
+
+
 class Command(StrEnum):
     """What a user may ask of a job."""
 
@@ -191,6 +195,7 @@ class Job:
             until it is claimed.
         lineage: where it comes from, if it was forked from another job.
         owner: name of the token that it was submitted with, if any.
+        kept: whether it is protected from deletion.
         submitted_iterations: budget that it was submitted with.
         waiting: what it waits for while it runs, such as workers that are away; None if nothing.
     """
@@ -208,6 +213,7 @@ class Job:
     accepts_changes: bool = False
     lineage: Lineage | None = None
     owner: str | None = None
+    kept: bool = False
     submitted_iterations: int = 0
     waiting: str | None = None
 

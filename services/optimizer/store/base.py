@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
+from datetime import datetime
 from typing import Any, Protocol
 
 from services.optimizer.access import Tokens
 from services.optimizer.jobs.audit import LOCAL, AuditEntry
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, Job, JobOrder, JobState
+from services.optimizer.jobs.job import (
+    ENDED,
+    QUARANTINE_AFTER,
+    Claim,
+    Command,
+    Job,
+    JobOrder,
+    JobState,
+)
 from services.optimizer.jobs.notification import Notification
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
@@ -181,6 +190,54 @@ class Store(CommittedHistory, Protocol):
             InvalidRequest: The budget is spent already, or a job of this kind and method cannot
                 have it.
             Unreadable: The job's spec cannot be read.
+        """
+
+    def keep(self, job_id: str, kept: bool) -> Job:
+        """Protect a job from deletion, or release it.
+
+        Args:
+            job_id: Of the job.
+            kept: Whether it is protected.
+
+        Returns:
+            The job as it is then.
+        """
+
+    def delete_job(self, job_id: str) -> None:
+        """Delete a job with all that it has committed.
+
+        It is gone for everybody when this returns, and its idempotency key is free. Rows of a long
+        job are removed by `purge_deleted`. Forks have copies of theirs, and stay.
+
+        Args:
+            job_id: Of the job.
+
+        Raises:
+            Conflict: It has not ended and is not paused, or is kept.
+        """
+
+    def delete_ended_before(
+        self, moment: datetime, states: Collection[JobState] = ENDED
+    ) -> tuple[str, ...]:
+        """Delete jobs that ended long ago, as `delete_job` does.
+
+        Those that are kept stay, and parents of forks that have not ended.
+
+        Args:
+            moment: Jobs that ended before this time, aware, are deleted.
+            states: In which they ended.
+
+        Returns:
+            Their ids.
+        """
+
+    def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
+        """Remove what is left of deleted jobs, in many short transactions.
+
+        It may be called by several processes at once, and is gone on with by any later call.
+
+        Args:
+            should_stop: Asked between transactions; the rest is left when it says so.
         """
 
     def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:

@@ -15,7 +15,7 @@ from sqlalchemy import Connection, func, select
 
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.store.engine import Database
-from services.optimizer.store.tables import jobs
+from services.optimizer.store.tables import EXISTING, jobs
 
 _CHANNEL: Final = "gaitswarm_jobs"
 
@@ -165,7 +165,8 @@ class SqlChanges:
             watched = {watcher.job_id for watcher in self._watchers}
         columns = (jobs.c.id, jobs.c.state, jobs.c.iterations, jobs.c.waiting)
         with self._database.transaction(write=False) as connection:
-            rows = connection.execute(select(*columns).where(jobs.c.id.in_(watched))).all()
+            query = select(*columns).where(jobs.c.id.in_(watched), EXISTING)
+            rows = connection.execute(query).all()
         found: dict[str, _Seen | None] = dict.fromkeys(watched)
         found |= {row.id: (row.state, row.iterations, row.waiting) for row in rows}
         changed = {job for job in watched if job not in self._seen or self._seen[job] != found[job]}

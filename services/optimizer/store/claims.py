@@ -187,6 +187,25 @@ def set_aside(connection: Connection, row: Row, reason: Unreadable, now: datetim
     update_job(connection, row, entering(JobState.FAILED, now) | error)
 
 
+def claimed_row(connection: Connection, claim: Claim) -> Row:
+    """Lock the row of a job that was claimed, whoever has it now.
+
+    Args:
+        connection: An open transaction that may write.
+        claim: On the job.
+
+    Returns:
+        The job's row.
+
+    Raises:
+        LeaseLost: The job was deleted.
+    """
+    try:
+        return job_row(connection, claim.job.id, lock=True)
+    except NotFound as error:
+        raise LeaseLost(f"{claim.runner} has lost job {claim.job.id}: it was deleted") from error
+
+
 def held(connection: Connection, claim: Claim) -> Row:
     """Lock the row of a claimed job.
 
@@ -202,7 +221,7 @@ def held(connection: Connection, claim: Claim) -> Row:
     Raises:
         LeaseLost: The claim is no longer the job's.
     """
-    row = job_row(connection, claim.job.id, lock=True)
+    row = claimed_row(connection, claim)
     if row["lease_token"] == claim.token and row["lease_owner"] == claim.runner:
         return row
     owner = row["lease_owner"]

@@ -18,7 +18,7 @@ from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import JobOrder, JobState
 from services.optimizer.store.records import ID_ALPHABET, is_job_id
 from services.optimizer.store.rows import Row
-from services.optimizer.store.tables import jobs
+from services.optimizer.store.tables import EXISTING, jobs
 
 _CURSOR: Final = re.compile(rf"([0-9]{{1,18}})\.([{ID_ALPHABET}]{{12}})", re.ASCII)
 _FITNESS_CURSOR: Final = re.compile(rf"fitness:([0-9.e+-]*):([{ID_ALPHABET}]{{12}})", re.ASCII)
@@ -146,7 +146,7 @@ def among_jobs(state: JobState | None, parent: str | None) -> Among:
     Returns:
         The conditions.
     """
-    found = [] if state is None else [jobs.c.state == state]
+    found = [EXISTING] if state is None else [EXISTING, jobs.c.state == state]
     # An id that is none might have characters that a database refuses.
     if parent is not None:
         found.append(jobs.c.parent_id == parent if is_job_id(parent) else false())

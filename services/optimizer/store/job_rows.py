@@ -70,6 +70,7 @@ def to_job(row: Row) -> Job:
         accepts_changes=bool(row["accepts_changes"]),
         lineage=lineage,
         owner=row["owner"],
+        kept=bool(row["kept"]),
         submitted_iterations=submitted_iterations,
         waiting=row["waiting"],
     )

@@ -28,7 +28,7 @@ from services.optimizer.store.rows import (
     reevaluation_row,
     to_ask,
 )
-from services.optimizer.store.tables import evaluations, iterations, jobs, reevaluations
+from services.optimizer.store.tables import EXISTING, evaluations, iterations, jobs, reevaluations
 
 # No vowels, no look-alikes: an id is read aloud, and it spells no word.
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
@@ -69,7 +69,7 @@ def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
         NotFound: There is no such job.
     """
     if is_job_id(job_id):
-        query = select(jobs).where(jobs.c.id == job_id)
+        query = select(jobs).where(jobs.c.id == job_id, EXISTING)
         row = connection.execute(query.with_for_update() if lock else query).mappings().first()
         if row is not None:
             return row

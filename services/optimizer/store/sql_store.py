@@ -32,6 +32,7 @@ from services.optimizer.store.audit import audit_page, note_change
 from services.optimizer.store.changes import SqlChanges
 from services.optimizer.store.claims import (
     claimable,
+    claimed_row,
     crashes_before,
     held,
     lease_is_live,
@@ -40,6 +41,7 @@ from services.optimizer.store.claims import (
     set_aside,
     take_job,
 )
+from services.optimizer.store.deletion import SqlDeletion
 from services.optimizer.store.engine import (
     Clock,
     Database,
@@ -117,7 +119,7 @@ def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
     return SqlStore(database, clock=clock)
 
 
-class SqlStore(SqlHistory):
+class SqlStore(SqlDeletion, SqlHistory):
     """`Store` on a database that has the newest schema, such as `open_store` gives.
 
     Args:
@@ -126,8 +128,8 @@ class SqlStore(SqlHistory):
     """
 
     def __init__(self, database: Database, *, clock: Clock = database_time) -> None:
-        super().__init__(database)
-        self._clock = clock
+        SqlHistory.__init__(self, database)
+        SqlDeletion.__init__(self, database, clock)
         self.tokens = SqlTokens(database, clock)
         self.changes = SqlChanges(database)
 
@@ -363,7 +365,7 @@ class SqlStore(SqlHistory):
     def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
         """Store an iteration, the ask that follows, and what becomes of the job."""
         with self._database.transaction(write=True) as connection:
-            row = job_row(connection, claim.job.id, lock=True)
+            row = claimed_row(connection, claim)
             # The token outlives the lease, which a commit that ends or pauses the job gives up.
             if row["lease_token"] == claim.token and done.iteration < row["iterations"]:
                 return JobState(row["state"])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Table, bindparam, insert, literal, select, update
 
-from services.optimizer.errors import Conflict, IdempotencyConflict
+from services.optimizer.errors import Conflict, IdempotencyConflict, NotFound
 from services.optimizer.jobs.chain import ask_digest
 from services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from services.optimizer.jobs.iteration import best_particle
@@ -28,7 +28,7 @@ from services.optimizer.store.job_rows import (
     submitted_spec,
     to_job,
 )
-from services.optimizer.store.records import new_job_id, update_job
+from services.optimizer.store.records import job_row, new_job_id, update_job
 from services.optimizer.store.rows import Row, fitness_summary
 from services.optimizer.store.tables import evaluations, iterations, jobs, reevaluations
 
@@ -107,12 +107,15 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
     Raises:
         Conflict: The job that is forked is gone.
     """
+    parent = None if asked.lineage is None else asked.lineage.parent
+    if parent is not None and asked.fork is not None and asked.fork.taken is not None:
+        _require_parent(connection, parent)
     columns = {
         "id": new_job_id(),
         "state": JobState.QUEUED,
         "spec": spec_document(asked.spec),
         "provenance": provenance_document(asked.provenance),
-        "parent_id": None if asked.lineage is None else asked.lineage.parent,
+        "parent_id": parent,
         "lineage": lineage_document(asked.lineage),
         "owner": asked.owner,
         "notify_url": asked.notify_url,
@@ -130,6 +133,14 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
         return to_job(row)
     progress = _take_history(connection, row, asked.fork.lineage, asked.fork.taken, now)
     return to_job(update_job(connection, row, progress))
+
+
+def _require_parent(connection: Connection, parent: str) -> None:
+    """Keep a parent from being deleted while it is copied. Raises Conflict if it is gone."""
+    try:
+        job_row(connection, parent, lock=True)
+    except NotFound as error:
+        raise Conflict(f"job {parent} that was to be forked was deleted") from error
 
 
 def _take_history(

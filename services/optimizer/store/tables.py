@@ -183,12 +183,20 @@ jobs: Final = Table(
     Column("head", Text),
     # Where its end is told; NULL for nowhere.
     Column("notify_url", Text),
+    # Of a job that is no longer there for anybody, until all of its rows are removed.
+    Column("deleted_at", UtcDateTime),
+    # Whether it stays, however long ago it ended; NULL is false.
+    Column("kept", Boolean),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),
     Index(None, "state", "created_at", "id"),
     Index(None, "parent_id"),
+    Index(None, "deleted_at"),
 )
+
+EXISTING: Final = jobs.c.deleted_at.is_(None)
+"""Condition on jobs that are there for their users."""
 
 iterations: Final = Table(
     "iterations",

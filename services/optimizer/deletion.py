@@ -1,0 +1,107 @@
+"""What becomes of jobs that nobody needs any more: deletion on request, and after a time."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from datetime import UTC, datetime, timedelta
+from typing import Final
+
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.jobs.job import Job
+from services.optimizer.store.base import Store
+
+_SECONDS_PER_ROUND: Final = 10.0
+_ROUNDS_PER_RETENTION: Final = 360
+
+_log = logging.getLogger(__name__)
+
+
+class Deletion:
+    """Deletes jobs, or protects them from that. Thread-safe, as the store is."""
+
+    __slots__ = ()
+
+    store: Store
+
+    def keep(self, job_id: str, kept: bool) -> Job:
+        """Protect a job from deletion, or release it.
+
+        Args:
+            job_id: id of the job.
+            kept: whether it is protected.
+
+        Returns:
+            The job as it is then.
+
+        Raises:
+            NotFound: no job of that id.
+        """
+        return self.store.keep(job_id, kept)
+
+    def delete(self, job_id: str) -> None:
+        """Delete a job with all that it has committed.
+
+        It is gone for everybody when this returns. `Store.purge_deleted`, which housekeeping calls,
+        removes what is left of the rows of a long one.
+
+        Args:
+            job_id: id of the job.
+
+        Raises:
+            NotFound: no job of that id.
+            Conflict: it has not ended and is not paused, or is kept; says what to do first.
+        """
+        self.store.delete_job(job_id)
+
+
+class Housekeeping:
+    """Removes rows of deleted jobs, and jobs that ended long ago, in a thread of its own.
+
+    Args:
+        store: Where the jobs are.
+        retention_days: Jobs that ended longer ago than this are deleted [d]; None: none is.
+    """
+
+    def __init__(self, store: Store, retention_days: float | None = None) -> None:
+        self._store = store
+        self._retention = None if retention_days is None else timedelta(days=retention_days)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._rounds, name="housekeeping", daemon=True)
+
+    def start(self) -> None:
+        """Begin with a first round. Returns at once."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Leave the rest for the next time. Idempotent."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def round(self, *, retention: bool = True) -> None:
+        """Do what is to be done now.
+
+        Args:
+            retention: Whether jobs that ended long ago are looked for.
+
+        Raises:
+            StoreUnavailable: The rest is left for the next round.
+        """
+        if retention and self._retention is not None:
+            deleted = self._store.delete_ended_before(datetime.now(UTC) - self._retention)
+            for job_id in deleted:
+                _log.info("job %s is deleted: it ended more than %s ago", job_id, self._retention)
+        self._store.purge_deleted(self._stop.is_set)
+
+    def _rounds(self) -> None:
+        number = 0
+        while not self._stop.is_set():
+            try:
+                self.round(retention=number % _ROUNDS_PER_RETENTION == 0)
+            except StoreUnavailable as error:
+                _log.warning("deleted jobs are not removed yet: %s", error)
+            except Exception:  # noqa: BLE001
+                _log.exception("deleted jobs are not removed yet")
+            number += 1
+            self._stop.wait(_SECONDS_PER_ROUND)

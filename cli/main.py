@@ -28,6 +28,7 @@ from cli.commands.designs import (
 )
 from cli.commands.jobs import (
     audit,
+    delete,
     evidence,
     export,
     fork,
@@ -87,6 +88,7 @@ for _module in (
     optimize,
     serve,
     lifecycle,
+    delete,
     fork,
     history,
     token,

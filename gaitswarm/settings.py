@@ -89,6 +89,12 @@ class Settings(BaseSettings):
         le=86_400.0,
         description="How long iterations under way may take yet when a process is told to end [s].",
     )
+    retention_days: float | None = Field(
+        default=None,
+        gt=0.0,
+        le=100_000.0,
+        description="Jobs that ended longer ago are deleted by `serve` [d]; default: none is.",
+    )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
     log_format: Literal["console", "json"] = Field(
         default="console", description="Lines for people, or an object of JSON for each message."

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from services.optimizer.deletion import Housekeeping
 from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.run.evaluator import Evaluator, Watched
@@ -92,6 +93,8 @@ def open_runtime(
     cache: bool = False,
     quarantine_after: int = QUARANTINE_AFTER,
     longest_job: float = math.inf,
+    keeps_house: bool = False,
+    retention_days: float | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     metrics: Metrics | None = None,
     tracing: Tracing | None = None,
@@ -111,6 +114,8 @@ def open_runtime(
         cache: Whether a design is walked only if no job has walked it before.
         quarantine_after: A job with which so many runner processes in a row went down fails.
         longest_job: Simulated time of all walks of all designs that a new job may have [s].
+        keeps_house: Whether rows of deleted jobs are removed, and jobs that ended long ago.
+        retention_days: After so long they did [d]; None: none is deleted.
         should_stop: As for `open_evaluator`.
         metrics: Are told what store, runner and workers do; None: nobody asks.
         tracing: Is told of the jobs that are run, and closed; None: nobody follows them.
@@ -143,6 +148,10 @@ def open_runtime(
             stack.callback(notifier.stop)
             notifier.start()
         service = JobService(store, longest_job=longest_job)
+        if keeps_house:
+            keeper = Housekeeping(store, retention_days)
+            keeper.start()
+            stack.callback(keeper.stop)
         if evaluator is None:
             yield Runtime(service, None, None)
             return

@@ -55,7 +55,7 @@ _LONGEST_WAIT: Final = 60.0
     operation_id="stream_events",
     summary="Follow a job",
     response_class=EventSourceResponse,
-    response_description="Server-sent events `iteration` and `state`.",
+    response_description="Server-sent events `iteration`, `state` and `deleted`.",
     responses={200: {"content": {"text/event-stream": {"example": _STREAM}}}, **problems(404, 422)},
 )
 async def stream_events(
@@ -90,7 +90,8 @@ async def stream_events(
     iteration's index, its data an IterationView. An event `state`, without an id, is sent on
     connecting and whenever the job's state, or what it waits for, changes; its data is a StateView.
     The stream ends after the event of a final state. A broken stream goes on without gap or repeat
-    from `Last-Event-ID` (or `after`). Comments keep idle connections alive. A server that ends says
+    from `Last-Event-ID` (or `after`). Comments keep idle connections alive. The stream of a job
+    that is deleted ends with an event `deleted`, whose data has its `id`. A server that ends says
     so in a comment, and in a field `retry` when to connect again.
     """
     start = after if last_event_id is None else last_event_id
@@ -101,6 +102,7 @@ async def stream_events(
     ):
         events = _events(
             topic,
+            job.id,
             after=start,
             follow=follow,
             limit=limit,
@@ -115,6 +117,7 @@ async def stream_events(
 
 async def _events(
     topic: Topic,
+    job_id: str,
     *,
     after: int | None,
     follow: bool,
@@ -139,6 +142,7 @@ async def _events(
             await _pause(stopping, pause_seconds)
             continue
         except NotFound:
+            yield ServerSentEvent(event="deleted", data={"id": job_id})
             return
         for iteration in iterations:
             after = iteration.index

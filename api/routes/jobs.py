@@ -296,6 +296,50 @@ def cancel_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     return _in_full(service, service.command(job_id, Command.CANCEL, actor=actor))
 
 
+@router.put(
+    "/jobs/{job_id}/keep",
+    operation_id="keep_job",
+    dependencies=[Depends(may_command)],
+    summary="Protect a job from deletion",
+    responses=problems(403, 404, 422),
+)
+def keep_job(job_id: JobId, service: Service) -> JobView:
+    """A job that is kept cannot be deleted, and stays however long ago it ended."""
+    return _in_full(service, service.keep(job_id, kept=True))
+
+
+@router.delete(
+    "/jobs/{job_id}/keep",
+    operation_id="release_job",
+    dependencies=[Depends(may_command)],
+    summary="Let a job be deleted again",
+    responses=problems(403, 404, 422),
+)
+def release_job(job_id: JobId, service: Service) -> JobView:
+    """A server with a time of retention deletes it when it ended longer ago than that."""
+    return _in_full(service, service.keep(job_id, kept=False))
+
+
+@router.delete(
+    "/jobs/{job_id}",
+    operation_id="delete_job",
+    dependencies=[Depends(may_command)],
+    summary="Delete a job",
+    status_code=status.HTTP_204_NO_CONTENT,
+    response_description="The job is gone.",
+    responses=problems(403, 404, 409, 422),
+)
+def delete_job(job_id: JobId, service: Service) -> None:
+    """Delete a job with its iterations and evaluations; nothing brings them back.
+
+    Forks of it have copies of what they took over, certificates of its designs are jobs of their
+    own: they stay. Its idempotency key can be used again, and streams of its events end with an
+    event `deleted`. 409 for a job that has not ended and is not paused, which can be cancelled
+    first, and for one that is kept.
+    """
+    service.delete(job_id)
+
+
 def _in_full(service: JobService, job: Job) -> JobView:
     found = job.progress.best_fitness is not None
     return JobView.from_job_and_best(job, service.best(job.id) if found else None)

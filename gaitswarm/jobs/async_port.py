@@ -150,6 +150,14 @@ class AsyncJobs(ABC):
         """Take every evaluation of a job at once, as arrays."""
 
     @abstractmethod
+    async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
+        """Protect a job from deletion, or release it."""
+
+    @abstractmethod
+    async def delete(self, job_id: str) -> None:
+        """Delete a job with its iterations and evaluations; nothing brings them back."""
+
+    @abstractmethod
     def follow(self, job_id: str, *, after: int | None = None) -> AsyncIterator[JobEvent]:
         """Follow a job until it has ended; a paused one is waited for.
 

@@ -230,6 +230,32 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         """
 
     @abstractmethod
+    def keep(self, job_id: str, *, kept: bool = True) -> JobView:
+        """Protect a job from deletion, or release it.
+
+        Args:
+            job_id: Identifier of the job.
+            kept: Whether it is protected; False releases it.
+
+        Returns:
+            The job as it is then.
+        """
+
+    @abstractmethod
+    def delete(self, job_id: str) -> None:
+        """Delete a job with its iterations and evaluations; nothing brings them back.
+
+        Forks of it have copies of what they took over, certificates of its designs are jobs of
+        their own: they stay.
+
+        Args:
+            job_id: Identifier of the job.
+
+        Raises:
+            Conflict: It has not ended and is not paused, or is kept.
+        """
+
+    @abstractmethod
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Follow a job until it has ended; a paused one is waited for.
 

@@ -170,6 +170,9 @@ class JobSummaryView(View):
         description="Name of the token that it was submitted with; null for none.",
         examples=["ci"],
     )
+    kept: bool = Field(
+        default=False, description="Whether it is protected from deletion, however old it is."
+    )
     created_at: datetime = Field(description="When it was submitted, UTC.")
     updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
@@ -179,7 +182,8 @@ class JobSummaryView(View):
         " `best`, `distribution`, `particles`, `export`; for a job that tunes a drive `ranking`"
         " (POST) and, once it has a best design, `scenarios`, `preferences` (POST), `firmware`;"
         " `evidence` and `verify` (POST) once an iteration is committed; `parent` of a fork; those"
-        " of `pause`, `resume`, `cancel`, `extend`, `fork` (POST) that its state allows.",
+        " of `pause`, `resume`, `cancel`, `extend`, `fork` (POST), `keep` (PUT, DELETE) and"
+        " `delete` (DELETE) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -358,6 +362,7 @@ def _summary(job: Job) -> dict[str, object]:
         "eta_basis": rates.basis,
         "lineage": job.lineage,
         "owner": job.owner,
+        "kept": job.kept,
         "created_at": job.created_at,
         "updated_at": job.updated_at,
         "started_at": job.started_at,

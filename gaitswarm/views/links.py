@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from services.optimizer.jobs.job import TRANSITIONS, Job, JobState
+from services.optimizer.jobs.job import DELETABLE, TRANSITIONS, Job, JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 
 PREFIX: Final = "/v1"
@@ -42,6 +42,9 @@ def job_links(job: Job) -> dict[str, str]:
         resources["evidence"] = f"{here}/evidence"
         resources["verify"] = f"{here}/verify"
         commands["fork"] = f"{here}/fork"
+    commands["keep"] = f"{here}/keep"
+    if job.state in DELETABLE and not job.kept:
+        commands["delete"] = here
     if job.lineage is not None:
         resources["parent"] = f"{PREFIX}/jobs/{job.lineage.parent}"
     return {"self": here, **resources, **commands}

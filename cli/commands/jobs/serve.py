@@ -74,7 +74,7 @@ def serve(
         log_to_stderr(settings.log_level, settings.log_format)
         tell = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
         metrics = Metrics()
-        with _runtime(settings, metrics, runs_jobs=not no_runner) as opened:
+        with _runtime(settings, metrics, runs_jobs=not no_runner, keeps_house=True) as opened:
             beside = opened.runner
             components = () if beside is None else _components(opened, beside)
             app = create_app(
@@ -197,6 +197,7 @@ def _runtime(
     metrics: Metrics | None,
     *,
     runs_jobs: bool = True,
+    keeps_house: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> AbstractContextManager[Runtime]:
     from gaitswarm.jobs.open import database_to_write
@@ -212,6 +213,8 @@ def _runtime(
         quarantine_after=settings.quarantine_after,
         cache=settings.cache,
         longest_job=settings.api_max_job_seconds,
+        keeps_house=keeps_house,
+        retention_days=settings.retention_days,
         should_stop=should_stop,
         metrics=metrics,
         tracing=_tracing() if runs_jobs else None,

@@ -196,6 +196,16 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.extend, job_id, iterations)
 
+    async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
+        """Write that a job is kept, or is not."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.keep, job_id, kept=kept))
+
+    async def delete(self, job_id: str) -> None:
+        """Delete a job, and remove all of its rows."""
+        jobs = await self._jobs()
+        await to_thread.run_sync(jobs.delete, job_id)
+
     async def follow(self, job_id: str, *, after: int | None = None) -> AsyncIterator[JobEvent]:
         """Look at the job from time to time, and tell what is new."""
         jobs = await self._jobs()

@@ -201,6 +201,15 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         """Write another budget for a job."""
         return self._in_full(self._service.extend(job_id, iterations))
 
+    def keep(self, job_id: str, *, kept: bool = True) -> JobView:
+        """Write that a job is kept, or is not."""
+        return self._in_full(self._service.keep(job_id, kept))
+
+    def delete(self, job_id: str) -> None:
+        """Delete a job, and remove all of its rows."""
+        self._service.delete(job_id)
+        self._service.store.purge_deleted()
+
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Look at the job from time to time, and tell what is new."""
         news = self.news(job_id, after=after)

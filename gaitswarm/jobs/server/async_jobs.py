@@ -159,6 +159,14 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         """Send another budget for a job."""
         return await self._send(calls.extend(job_id, iterations))
 
+    async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
+        """Let the server keep a job, or release it."""
+        return await self._send(calls.keep(job_id, kept))
+
+    async def delete(self, job_id: str) -> None:
+        """Let the server delete a job; it removes the rows of a long one afterwards."""
+        await self._send(calls.delete(job_id))
+
     async def follow(self, job_id: str, *, after: int | None = None) -> AsyncIterator[JobEvent]:
         """Read the server's events; a connection that breaks is taken up again where it broke."""
         await self.job(job_id)

@@ -149,12 +149,17 @@ class Following:
 
         Returns:
             The job's event; None if it is no news.
+
+        Raises:
+            NotFound: The job was deleted.
         """
         self._failures = 0
         if sent.event == "iteration":
             iteration = IterationView.model_validate_json(sent.data)
             self.last = iteration.index
             return iteration
+        if sent.event == "deleted":
+            raise NotFound("the job was deleted while it was followed")
         if sent.event != "state":
             return None
         state = StateView.model_validate_json(sent.data)

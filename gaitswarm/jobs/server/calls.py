@@ -126,6 +126,26 @@ def extend(job_id: str, iterations: int) -> Call[JobView]:
     return Call("POST", f"{job_path(job_id)}/extend", JobView.model_validate_json, body=body)
 
 
+def keep(job_id: str, kept: bool) -> Call[JobView]:
+    """Protect a job from deletion, or release it.
+
+    Args:
+        job_id: Identifier of the job.
+        kept: Whether it is protected.
+    """
+    path = f"{job_path(job_id)}/keep"
+    return Call("PUT" if kept else "DELETE", path, JobView.model_validate_json)
+
+
+def delete(job_id: str) -> Call[bytes]:
+    """Delete a job.
+
+    Args:
+        job_id: Identifier of the job.
+    """
+    return Call("DELETE", job_path(job_id), bytes)
+
+
 def best(job_id: str) -> Call[BestView]:
     """Take the best design.
 

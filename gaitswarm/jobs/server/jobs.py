@@ -163,6 +163,14 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
         """Send another budget for a job."""
         return self._send(calls.extend(job_id, iterations))
 
+    def keep(self, job_id: str, *, kept: bool = True) -> JobView:
+        """Let the server keep a job, or release it."""
+        return self._send(calls.keep(job_id, kept))
+
+    def delete(self, job_id: str) -> None:
+        """Let the server delete a job; it removes the rows of a long one afterwards."""
+        self._send(calls.delete(job_id))
+
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Read the server's events; a connection that breaks is taken up again where it broke."""
         self.job(job_id)

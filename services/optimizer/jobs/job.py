@@ -37,6 +37,10 @@ ENDED: Final = frozenset(state for state in JobState if state.terminal)
 """The states in which nothing more happens to a job by itself."""
 
 
+DELETABLE: Final = ENDED | {JobState.PAUSED}
+"""The states in which nobody works at a job."""
+
+
 class Command(StrEnum):
     """What a user may ask of a job."""
 

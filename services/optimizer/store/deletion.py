@@ -15,7 +15,7 @@ from typing import Final
 from sqlalchemy import Connection, Table, delete, exists, func, select, update
 
 from services.optimizer.errors import Conflict
-from services.optimizer.jobs.job import ENDED, Job, JobState
+from services.optimizer.jobs.job import DELETABLE, ENDED, Job, JobState
 from services.optimizer.store.changes import announce
 from services.optimizer.store.engine import Clock, Database
 from services.optimizer.store.job_rows import to_job
@@ -101,7 +101,7 @@ def _require_deletable(row: Row) -> None:
         Conflict: It is; says what to do first.
     """
     state, job_id = JobState(row["state"]), row["id"]
-    if state not in (*ENDED, JobState.PAUSED):
+    if state not in DELETABLE:
         raise Conflict(
             f"cannot delete a job that is {state}; cancel it first: `gaitswarm cancel {job_id}`, or"
             f" POST /v1/jobs/{job_id}/cancel"

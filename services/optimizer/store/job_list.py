@@ -146,7 +146,9 @@ def among_jobs(state: JobState | None, parent: str | None) -> Among:
     Returns:
         The conditions.
     """
-    found = [EXISTING] if state is None else [EXISTING, jobs.c.state == state]
+    found: list[ColumnElement[bool]] = [EXISTING]
+    if state is not None:
+        found.append(jobs.c.state == state)
     # An id that is none might have characters that a database refuses.
     if parent is not None:
         found.append(jobs.c.parent_id == parent if is_job_id(parent) else false())

@@ -3,7 +3,7 @@
 import { ApiProblem, problemOf } from './problem'
 import type { paths } from './schema'
 
-type Method = 'get' | 'post'
+type Method = 'get' | 'post' | 'delete'
 
 /** Paths that have an operation of the method. */
 export type PathOf<M extends Method> = {
@@ -54,6 +54,14 @@ export async function post<P extends PathOf<'post'>>(
   const request = posted(options.body, options.signal, options.headers)
   const response = await send(url(path, options.path), request)
   return (await response.json()) as Answer<P, 'post'>
+}
+
+/** DELETE a resource. */
+export async function remove<P extends PathOf<'delete'>>(
+  path: P,
+  options: Options & { path?: Params<P, 'delete'> } = {},
+): Promise<void> {
+  await send(url(path, options.path), { method: 'DELETE', signal: options.signal })
 }
 
 /** GET a resource that is not JSON. */

@@ -1,16 +1,17 @@
-/** Pause, resume, extend, cancel and clone, as far as the job's state allows. */
+/** Pause, resume, extend, cancel, delete and clone, as far as the job's state allows. */
 
 import { useState } from 'preact/hooks'
-import { post } from '../api/client'
+import { post, remove } from '../api/client'
 import { isReadable } from '../api/readable'
 import type { StoredJob } from '../api/types'
 import { ConfirmDialog } from '../components/confirm-dialog'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
+import { navigate } from '../router/navigation'
 import { withQuery } from '../router/routes'
 import { budgetSpent, iterationsSpent, spentInWords } from './budget'
 
-type Asking = 'cancel' | 'extend' | null
+type Asking = 'cancel' | 'delete' | 'extend' | null
 
 export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: StoredJob) => void }) {
   const [asking, setAsking] = useState<Asking>(null)
@@ -68,6 +69,11 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
             Cancel…
           </button>
         )}
+        {can('delete') && (
+          <button type="button" class="danger" disabled={busy} onClick={() => setAsking('delete')}>
+            Delete…
+          </button>
+        )}
       </div>
       {error !== null && <ErrorNotice what="That was not done." error={error} />}
       <ConfirmDialog
@@ -82,6 +88,28 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
         <p>
           It cannot be resumed. The {formatCount(job.iterations)} iterations that are committed
           stay; the one under way is lost. To go on later, pause it instead.
+        </p>
+      </ConfirmDialog>
+      <ConfirmDialog
+        open={asking === 'delete'}
+        title="Delete this job and all that it has found?"
+        confirm="Delete the job"
+        dismiss="Keep it"
+        dangerous
+        onConfirm={() => {
+          setBusy(true)
+          setError(null)
+          setAsking(null)
+          remove('/v1/jobs/{job_id}', { path })
+            .then(() => navigate('/'), setError)
+            .finally(() => setBusy(false))
+        }}
+        onDismiss={() => setAsking(null)}
+      >
+        <p>
+          {formatCount(job.iterations)} iterations with {formatCount(job.evaluations)} evaluated
+          designs are lost for good. Forks of the job keep their copies but lose their parent, and
+          certificates of its designs stay as jobs of their own.
         </p>
       </ConfirmDialog>
       <ExtendDialog

@@ -46,6 +46,7 @@ const GATHER_MS = 40
  * | an iteration that is there already | it is dropped |
  * | an iteration further on | reconnect after the last, so that the gap is filled |
  * | the stream breaks | stale; reconnect after the last, waiting longer each time |
+ * | the job was deleted | ended; asking for the job then says that it is gone |
  * | a final state | ended; `restart` follows a job that was resumed or extended |
  */
 export class EventStream {
@@ -115,6 +116,10 @@ export class EventStream {
       heard((data) => this.moved(JSON.parse(data))),
     )
     source.addEventListener(
+      'deleted',
+      heard(() => this.deleted()),
+    )
+    source.addEventListener(
       'error',
       heard(() => this.broken()),
     )
@@ -147,6 +152,14 @@ export class EventStream {
       this.staleSince = null
       this.drop()
     }
+    this.tell()
+  }
+
+  private deleted(): void {
+    this.error = 'This job was deleted.'
+    this.connection = 'ended'
+    this.staleSince = null
+    this.drop()
     this.tell()
   }
 

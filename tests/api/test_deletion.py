@@ -1,0 +1,87 @@
+"""DELETE of jobs: what is answered, who may, what streams say; and housekeeping."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+
+import httpx2
+import pytest
+
+from services.optimizer.deletion import Housekeeping
+from services.optimizer.errors import NotFound
+from services.optimizer.jobs.job import Command, Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Commit
+from tests.examples.processes import eventually
+
+
+def test_a_job_is_deleted_once(client: httpx2.Client, job: Job, commit: Commit) -> None:
+    commit(job, 3)
+    answer = client.delete(f"/v1/jobs/{job.id}")
+    assert (answer.status_code, answer.content) == (204, b"")
+    assert client.get(f"/v1/jobs/{job.id}").status_code == 404
+    assert client.delete(f"/v1/jobs/{job.id}").status_code == 404
+    assert client.get(f"/v1/jobs/{job.id}/events").status_code == 404
+    assert client.get("/v1/jobs").json()["items"] == []
+
+
+def test_links_say_when_a_job_can_be_deleted(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
+    here = f"/v1/jobs/{job.id}"
+    assert "delete" not in client.get(here).json()["links"]
+    refused = client.delete(here)
+    assert refused.status_code == 409
+    assert f"POST {here}/cancel" in refused.json()["detail"]
+
+    commit(job, 3)
+    assert client.get(here).json()["links"]["delete"] == here
+    assert client.put(f"{here}/keep").json()["kept"]
+    assert "delete" not in client.get(here).json()["links"]
+    assert client.delete(here).status_code == 409
+    assert not client.delete(f"{here}/keep").json()["kept"]
+    assert client.delete(here).status_code == 204
+
+
+def test_the_stream_of_a_job_that_is_deleted_ends_with_that(
+    client: httpx2.Client, store: SqlStore, job: Job
+) -> None:
+    store.command(job.id, Command.PAUSE)
+    with client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
+        lines = answer.iter_lines()
+        assert next(lines) == "event: state"
+        store.delete_job(job.id)
+        rest = list(lines)
+    assert "event: deleted" in rest
+    assert json.loads(rest[rest.index("event: deleted") + 1].removeprefix("data: ")) == {
+        "id": job.id
+    }
+
+
+def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
+    store: SqlStore, spec: JobSpec
+) -> None:
+    old, young = (store.create_job(spec)[0] for _ in range(2))
+    store.command(old.id, Command.CANCEL)
+    # The times are the database's: the first is more than a tenth of a second older.
+    since = datetime.now(UTC)
+    eventually(lambda: datetime.now(UTC) > since + timedelta(seconds=0.2))
+    store.command(young.id, Command.CANCEL)
+
+    Housekeeping(store, retention_days=None).round()
+    assert len(store.jobs().items) == 2
+    Housekeeping(store, retention_days=0.1 / 86_400).round()
+    assert [job.id for job in store.jobs().items] == [young.id]
+
+
+def test_housekeeping_that_is_started_does_its_rounds(store: SqlStore, spec: JobSpec) -> None:
+    job, _ = store.create_job(spec)
+    store.command(job.id, Command.CANCEL)
+    keeper = Housekeeping(store, retention_days=1e-9)
+    keeper.start()
+    eventually(lambda: not store.jobs().items)
+    keeper.stop()
+    with pytest.raises(NotFound):
+        store.job(job.id)

@@ -1,0 +1,62 @@
+"""`gaitswarm delete`: asks first, says what is lost; `gaitswarm keep` protects."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Finished, Gaitswarm
+
+
+@pytest.fixture
+def db(finished: Finished, tmp_path: Path) -> Path:
+    """A copy of the database, which a test may change."""
+    return Path(shutil.copy(finished.db, tmp_path / "copy.db"))
+
+
+@pytest.fixture
+def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
+    """Let somebody sit at the terminal, who says yes or no."""
+
+    def answer(yes: bool) -> None:
+        monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+        monkeypatch.setattr("typer.confirm", lambda *_, **__: yes)
+
+    return answer
+
+
+@pytest.mark.parametrize("yes", [True, False])
+def test_it_says_what_is_lost_and_asks(
+    gaitswarm: Gaitswarm, finished: Finished, db: Path, answering: Callable[[bool], None], yes: bool
+) -> None:
+    assert gaitswarm("fork", finished.id, "--from", "1", "--db", db).code == 0
+    answering(yes)
+    deleted = gaitswarm("delete", finished.id, "--db", db)
+    assert deleted.code == 0
+    assert "loses 2 iterations with 6 evaluated designs" in deleted.err
+    assert "forks of it, 1, keep their copies" in deleted.err
+    assert gaitswarm("status", finished.id, "--db", db).code == (3 if yes else 0)
+
+
+def test_without_anybody_to_ask_it_needs_yes(
+    gaitswarm: Gaitswarm, finished: Finished, db: Path
+) -> None:
+    refused = gaitswarm("delete", finished.id, "--db", db)
+    assert refused.code == 2 and "--yes" in refused.err
+    assert gaitswarm("status", finished.id, "--db", db).code == 0
+    deleted = gaitswarm("delete", finished.id, "--yes", "--db", db)
+    assert (deleted.code, deleted.out) == (0, f"job {finished.id} is deleted\n")
+    assert gaitswarm("delete", finished.id, "--yes", "--db", db).code == 3
+
+
+def test_a_job_that_is_kept_is_not_deleted(
+    gaitswarm: Gaitswarm, finished: Finished, db: Path
+) -> None:
+    assert gaitswarm("keep", finished.id, "--db", db).out == f"job {finished.id} is kept\n"
+    refused = gaitswarm("delete", finished.id, "--yes", "--db", db)
+    assert refused.code == 4 and "gaitswarm keep --release" in refused.err
+    assert not gaitswarm("keep", finished.id, "--release", "--db", db, "--json").json["kept"]
+    assert gaitswarm("delete", finished.id, "--yes", "--db", db).code == 0

@@ -176,13 +176,14 @@ def test_a_fork_outlives_its_parent_and_none_is_made_of_one_that_is_gone(store: 
 
 def test_jobs_that_ended_long_ago_are_deleted_and_no_others(store: SqlStore, clock: Clock) -> None:
     old = ended(store)
-    under_way = begun(store).job
+    claim = begun(store)
+    store.renew(claim, lease_seconds=1000.0)
     clock.advance(100.0)
     moment = clock.now
     clock.advance(100.0)
     new = ended(store)
     assert store.delete_ended_before(moment) == (old.id,)
-    assert {job.id for job in store.jobs().items} == {under_way.id, new.id}
+    assert {job.id for job in store.jobs().items} == {claim.job.id, new.id}
 
 
 def test_old_jobs_that_are_kept_or_whose_forks_have_not_ended_stay(

@@ -29,7 +29,8 @@ class ComponentView(View):
     """How a part of the server is."""
 
     name: str = Field(
-        description="`database`; `runner` claims queued jobs; `workers` run their walks.",
+        description="`database`; `events` tells streams of commits; `runner` claims queued jobs;"
+        " `workers` run their walks.",
         examples=["runner"],
     )
     status: Literal["ok", "degraded", "failed"] = Field(
@@ -69,8 +70,9 @@ def readyz(service: Service, request: Request) -> ReadinessView | Response:
     that have.
 
     The database fails if it does not answer or has another schema than this version's, the runner
-    if its thread has ended or is stuck. Once the server was told to end, while jobs commit their
-    iterations under way, the answer is a 503 of the type `draining`.
+    and the news for event streams if their thread has ended or is stuck. Once the server was told
+    to end, while jobs commit their iterations under way, the answer is a 503 of the type
+    `draining`.
     """
     path = request.url.path
     if request.state.draining.is_set():

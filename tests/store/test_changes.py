@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
@@ -195,3 +196,16 @@ def test_who_has_left_is_told_nothing(
         store.commit(claim, completed(0), ask(1))
         assert stays.wait(10.0)
     assert not left.is_set()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_thread_that_has_ended_is_told_of_while_somebody_waits(
+    database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with closing(open_store(database_url)) as store:
+        assert store.changes.trouble() is None
+        monkeypatch.setattr("services.optimizer.store.changes.select", lambda *_: sys.exit())
+        with store.changes.watch("nosuchjob123", lambda: None, poll_seconds=0.01):
+            eventually(lambda: store.changes.trouble() is not None)
+            assert "restart this process" in str(store.changes.trouble())
+        assert store.changes.trouble() is None

@@ -76,7 +76,7 @@ def serve(
         metrics = Metrics()
         with _runtime(settings, metrics, runs_jobs=not no_runner, keeps_house=True) as opened:
             beside = opened.runner
-            components = () if beside is None else _components(opened, beside)
+            components = _components(opened, beside)
             app = create_app(
                 opened.service, settings=settings, components=components, metrics=metrics
             )
@@ -159,11 +159,15 @@ def _drain(runner: Runner | None, settings: Settings, at_once: threading.Event) 
     runner.drain(seconds, at_once)
 
 
-def _components(opened: Runtime, runner: Runner) -> tuple[Component, ...]:
+def _components(opened: Runtime, runner: Runner | None) -> tuple[Component, ...]:
     """Parts of the process that it tells of. Jobs wait for workers that are away."""
     from api.dependencies import Component
 
+    events = Component("events", opened.service.store.changes.trouble)
+    if runner is None:
+        return (events,)
     return (
+        events,
         Component("runner", runner.trouble),
         Component("workers", opened.workers_trouble, vital=False),
     )

@@ -30,6 +30,8 @@ _LONGEST_SILENCE: Final = 15.0
 
 _Seen = tuple[str, int, str | None]
 """State, committed iterations, and what is waited for."""
+_STUCK: Final = 120.0
+"""Seconds after which a thread that has not looked is stuck; polls may be 60 s apart."""
 
 _log = logging.getLogger(__name__)
 
@@ -73,6 +75,7 @@ class SqlChanges:
         self._seen: dict[str, _Seen | None] = {}
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
+        self._looked = time.monotonic()
 
     @contextmanager
     def watch(
@@ -85,6 +88,7 @@ class SqlChanges:
             # A process that follows nothing has no thread for it.
             if self._thread is None:
                 self._stop = threading.Event()
+                self._looked = time.monotonic()
                 run = partial(self._run, self._stop)
                 self._thread = threading.Thread(target=run, name="changes", daemon=True)
                 self._thread.start()
@@ -94,6 +98,16 @@ class SqlChanges:
         finally:
             with self._condition:
                 self._watchers.discard(watcher)
+
+    def trouble(self) -> str | None:
+        """Whether the thread has ended, or is stuck, while somebody waits."""
+        with self._condition:
+            if self._thread is None or not self._watchers:
+                return None
+            if not self._thread.is_alive():
+                return "event streams get no news of jobs; restart this process"
+            silent = time.monotonic() - self._looked
+        return None if silent < _STUCK else f"nobody has looked for news of jobs for {silent:.0f} s"
 
     def close(self) -> None:
         """End the thread; watchers are called no more. Idempotent."""
@@ -125,6 +139,7 @@ class SqlChanges:
         """Wait for the first watcher; false if there is to be none any more."""
         with self._condition:
             self._condition.wait_for(lambda: self._watchers or stop.is_set())
+            self._looked = time.monotonic()
         return not stop.is_set()
 
     def _pause(self, stop: threading.Event) -> None:
@@ -146,6 +161,7 @@ class SqlChanges:
             self._poll()
             looked = time.monotonic()
             while not stop.is_set():
+                self._looked = time.monotonic()
                 with closing(driver.notifies(timeout=_GLANCE)) as announcements:
                     for announcement in announcements:
                         self._wake({announcement.payload})

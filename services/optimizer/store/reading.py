@@ -71,6 +71,9 @@ class Changes(Protocol):
             The block in which the function is called.
         """
 
+    def trouble(self) -> str | None:
+        """Why changes are not told any more, for people; None if they are."""
+
 
 @dataclass(frozen=True, slots=True)
 class Queue:

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.history import HistoryCache
-from services.optimizer.errors import Conflict, NotFound
+from services.optimizer.analysis.history_cache import HistoryCache, HistoryMemory
+from services.optimizer.errors import Conflict, EvaluatorUnavailable, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim
+from services.optimizer.jobs.job import Claim, Job
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome, Status
 from tests.store.examples import LEASE, ask, begun, completed, spec
@@ -133,30 +133,122 @@ def test_columns_cannot_be_written_to(store: SqlStore) -> None:
         columns.fitness[0] = 0.0
 
 
-def test_the_job_asked_about_longest_ago_is_dropped_first(store: SqlStore) -> None:
+def test_the_job_asked_about_longest_ago_is_dropped_first(
+    store: SqlStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
     jobs = []
     for _ in range(3):
         claim = begun(store)
         go_on(store, claim, (4.0, 3.0), (2.0, 1.0))
         jobs.append(store.job(claim.job.id))
-    whole = HistoryCache(store)
-    whole.columns(jobs[0])
+    whole = HistoryMemory()
+    kept = HistoryCache(store, memory=whole)
+    kept.columns(jobs[0])
     size = whole.nbytes
 
-    cache = HistoryCache(store, max_bytes=2 * size)
-    first, second = cache.columns(jobs[0]), cache.columns(jobs[1])
+    memory = HistoryMemory(2 * size)
+    cache = HistoryCache(store, memory=memory)
+    first = cache.columns(jobs[0])
+    cache.columns(jobs[1])
     cache.columns(jobs[0])
     cache.columns(jobs[2])
-    assert cache.nbytes <= 2 * size
+    assert memory.nbytes <= 2 * size
+    asked: list[str] = []
+    read = SqlStore.evaluation_columns
+
+    def counted(self: SqlStore, job_id: str, *given: int) -> EvaluationColumns | None:
+        asked.append(job_id)
+        return read(self, job_id, *given)
+
+    monkeypatch.setattr(SqlStore, "evaluation_columns", counted)
     assert np.shares_memory(cache.columns(jobs[0]).fitness, first.fitness)
-    assert not np.shares_memory(cache.columns(jobs[1]).fitness, second.fitness)
+    del first
+    cache.columns(jobs[1])
+    assert asked == [jobs[1].id]
 
 
 def test_a_job_that_is_too_large_is_refused_with_the_way_out(store: SqlStore) -> None:
     claim = begun(store)
     go_on(store, claim, (4.0, 3.0))
     with pytest.raises(Conflict, match="export"):
-        HistoryCache(store, max_bytes=100).columns(store.job(claim.job.id))
+        HistoryCache(store, memory=HistoryMemory(100)).columns(store.job(claim.job.id))
+
+
+def jobs_with_history(store: SqlStore, count: int) -> list[Job]:
+    jobs = []
+    for _ in range(count):
+        claim = begun(store)
+        go_on(store, claim, *[(4.0, 3.0)] * 10)
+        jobs.append(store.job(claim.job.id))
+    return jobs
+
+
+def memory_of_one(store: SqlStore, job: Job) -> int:
+    memory = HistoryMemory()
+    cache = HistoryCache(store, memory=memory)
+    cache.columns(job)
+    return memory.nbytes
+
+
+def test_many_jobs_in_many_threads_and_caches_stay_within_one_bound(store: SqlStore) -> None:
+    jobs = jobs_with_history(store, 12)
+    bound = 3 * memory_of_one(store, jobs[0])
+    memory = HistoryMemory(bound)
+    caches = [HistoryCache(store, memory=memory) for _ in range(2)]
+    most, wrong = [0], []
+
+    def ask_about_all(offset: int) -> None:
+        for k in range(3 * len(jobs)):
+            job = jobs[(k + offset) % len(jobs)]
+            columns = caches[k % 2].columns(job)
+            most[0] = max(most[0], memory.nbytes)
+            if len(columns) != job.progress.evaluations:
+                wrong.append(job.id)
+            del columns
+
+    threads = [threading.Thread(target=ask_about_all, args=(3 * n,)) for n in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+    assert 0 < most[0] <= bound
+    caches.clear()
+    assert memory.nbytes == 0
+
+
+def test_columns_that_are_computed_with_count_until_they_are_let_go(store: SqlStore) -> None:
+    first, second = jobs_with_history(store, 2)
+    memory = HistoryMemory(memory_of_one(store, first), longest_wait=0.05)
+    cache = HistoryCache(store, memory=memory)
+    used = cache.columns(first).rows(slice(1, 2))
+    with pytest.raises(EvaluatorUnavailable, match="try again"):
+        cache.columns(second)
+    fitness = used.fitness.tolist()
+    del used
+    assert len(cache.columns(second)) == 20
+    assert fitness == [3.0]
+
+
+def test_memory_is_waited_for(store: SqlStore) -> None:
+    first, second = jobs_with_history(store, 2)
+    memory = HistoryMemory(memory_of_one(store, first), longest_wait=60.0)
+    cache = HistoryCache(store, memory=memory)
+    used = [cache.columns(first)]
+    threading.Timer(0.1, used.clear).start()
+    assert len(cache.columns(second)) == 20
+
+
+def test_a_history_that_grows_beyond_half_of_the_memory_is_read_anew(store: SqlStore) -> None:
+    claim = begun(store)
+    go_on(store, claim, *[(4.0, 3.0)] * 6)
+    job = store.job(claim.job.id)
+    # Room for one of 8 iterations, not for it beside one of 6.
+    memory = HistoryMemory(memory_of_one(store, job) * 8 // 6)
+    cache = HistoryCache(store, memory=memory)
+    cache.columns(job)
+    go_on(store, claim, *[(2.0, 1.0)] * 2)
+    assert_as_row_by_row(store, job.id, cache.columns(store.job(job.id)))
 
 
 def test_many_threads_read_the_same_history(store: SqlStore) -> None:

@@ -18,7 +18,8 @@ from services.optimizer.analysis.fits.identifiability import (
     check_comparable,
     identifiability,
 )
-from services.optimizer.analysis.history import PIECE, HistoryCache, read_columns
+from services.optimizer.analysis.history import PIECE, read_columns
+from services.optimizer.analysis.history_cache import HistoryCache
 from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Reevaluation

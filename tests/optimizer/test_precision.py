@@ -29,9 +29,8 @@ from services.optimizer.run.events import (
 )
 from services.optimizer.store.base import Store
 from sim.outcome import Outcome, Status
-from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator, job, walk
-from tests.optimizer.test_runner import queue
-from tests.optimizer.test_runner import run as run_job
+from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator, job, queue, walk
+from tests.optimizer.formula import run as run_job
 
 Walks = Callable[[EvaluationRequest], tuple[Outcome, ...]]
 

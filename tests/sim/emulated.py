@@ -56,8 +56,8 @@ def build_program(source: str, executable: Path, aim: Target = ARM_TARGET) -> Pa
     code.write_text(f"#define DOUBLES {aim.lanes}\n{source}", encoding="utf-8")
     flags = [flag for flag in compiler.flags(aim) if flag not in ("-shared", "-fPIC")]
     built = executable.with_suffix(".o")
-    compiled = [*flags, "-mno-outline-atomics", "-c", code, "-o", built]
-    for arguments in (compiled, ["-static", "-nostdlib", built, "-o", executable]):
+    compiled = [*flags, "-mno-outline-atomics", "-c", str(code), "-o", str(built)]
+    for arguments in (compiled, ["-static", "-nostdlib", str(built), "-o", str(executable)]):
         subprocess.run([*compiler.command, *arguments], check=True)
     return executable
 

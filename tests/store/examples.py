@@ -64,9 +64,9 @@ def completed(
     return CompletedIteration(iteration, designs, outcomes, np.array(fitness), seconds)
 
 
-def begun(store: SqlStore, **options: object) -> Claim:
+def begun(store: SqlStore, notify_url: str | None = None, **options: object) -> Claim:
     """A new job, claimed by `runner-a`, its first ask stored."""
-    store.create_job(spec(**options))  # type: ignore[arg-type]
+    store.create_job(spec(**options), notify_url=notify_url)  # type: ignore[arg-type]
     claim = store.claim("runner-a", lease_seconds=LEASE)
     assert claim is not None
     store.begin(claim, ask(0))

@@ -19,7 +19,7 @@ from services.optimizer.store.tables import metadata
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 KEYS = (b"\0" * 16, b"\xff" * 16)
-TABLES = ("jobs", "iterations", "evaluations", "reevaluations")
+TABLES = ("jobs", "iterations", "evaluations", "reevaluations", "notifications")
 
 
 def rows(database_url: str) -> dict[str, int]:
@@ -38,7 +38,7 @@ def rows(database_url: str) -> dict[str, int]:
 
 def ended(store: SqlStore, done: CompletedIteration | None = None) -> Job:
     """A job that has succeeded, of one iteration."""
-    claim = begun(store, iterations=1)
+    claim = begun(store, notify_url="http://127.0.0.1:9/ended", iterations=1)
     store.commit(claim, done or completed(0), None)
     return store.job(claim.job.id)
 
@@ -79,6 +79,7 @@ def test_rows_of_a_long_job_go_by_pieces_that_can_be_gone_on_with(
         "iterations": 2,
         "evaluations": 8000,
         "reevaluations": 0,
+        "notifications": 0,
     }
     with pytest.raises(NotFound):
         store.iterations(claim.job.id)

@@ -21,7 +21,7 @@ from services.optimizer.store.engine import Clock, Database
 from services.optimizer.store.job_rows import to_job
 from services.optimizer.store.records import job_row, update_job
 from services.optimizer.store.rows import Row
-from services.optimizer.store.tables import EXISTING, evaluations, jobs, metadata
+from services.optimizer.store.tables import EXISTING, evaluations, jobs, metadata, notifications
 
 _PIECE: Final = 5000
 """Evaluations removed in one transaction."""
@@ -34,9 +34,9 @@ _DELETED: Final = select(jobs.c.id).where(jobs.c.deleted_at.is_not(None)).limit(
 _OF_JOBS: Final[tuple[Table, ...]] = tuple(
     table
     for table in reversed(metadata.sorted_tables)
-    if "job_id" in table.c and table.foreign_keys
+    if "job_id" in table.c and (table.foreign_keys or table is notifications)
 )
-"""Tables whose rows go with their job, those that refer to others first."""
+"""Tables whose rows go with their job, those that refer to others first. Not the audit log's."""
 
 
 class SqlDeletion:

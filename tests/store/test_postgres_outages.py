@@ -103,6 +103,18 @@ def test_a_crash_of_the_server_in_mid_run_changes_no_bit_of_a_history(
         assert history(store, job.id) == undisturbed
 
 
+@pytest.mark.parametrize(
+    ("required", "outcome"), [(True, pytest.fail.Exception), (False, pytest.skip.Exception)]
+)
+def test_a_missing_server_fails_these_tests_where_they_must_run(
+    required: bool, outcome: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tests.store.postgres_server.REQUIRED", required)
+    monkeypatch.setattr("tests.store.postgres_server.postgres_binaries", lambda: None)
+    with pytest.raises(outcome, match="PostgreSQL is not installed"):
+        server_binaries()
+
+
 def test_both_ends_notice_within_a_lease_that_the_other_has_gone(database: Database) -> None:
     with database.transaction(write=False) as connection:
 

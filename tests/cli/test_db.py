@@ -7,6 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 from cli.exit_codes import ExitCode
+from services.optimizer.jobs.job import Command
 from services.optimizer.store.revisions import head
 from services.optimizer.store.sql_store import open_store
 from tests.cli.conftest import Finished, Gaitswarm
@@ -73,6 +74,15 @@ def store_job_without_iterations(db: Path) -> None:
     with closing(open_store(str(db))) as store:
         store.create_job(spec())
     edit(f"sqlite:///{db}", "UPDATE jobs SET iterations = 3")
+
+
+def test_pruning_deletes_jobs_only_by_their_age(gaitswarm: Gaitswarm, db: Path) -> None:
+    with closing(open_store(str(db))) as store:
+        store.command(store.create_job(spec())[0].id, Command.CANCEL)
+    refused = gaitswarm("db", "prune", "--state", "cancelled", "--db", db)
+    assert refused.code == ExitCode.BAD_INPUT and "--older-than" in refused.err
+    assert "0 jobs" in gaitswarm("db", "prune", "--older-than", "1", "--db", db).err
+    assert "1 jobs" in gaitswarm("db", "prune", "--older-than", "0", "--db", db).err
 
 
 def test_pruning_says_what_it_removed(gaitswarm: Gaitswarm, finished: Finished) -> None:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import re
 import sqlite3
 from contextlib import closing
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 
 from services.optimizer.errors import NotFound, StoreUnavailable
-from services.optimizer.store.maintenance import check, prune
+from services.optimizer.jobs.job import Command, JobState
+from services.optimizer.store.maintenance import Pruned, check, prune
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, begun, completed
+from tests.store.examples import spec as walks
 from tests.store.test_opening import edit
 from tests.store.test_recordings import recording
 from tests.store.test_recordings import spec as fit_to
@@ -88,11 +91,11 @@ def test_recordings_that_nothing_refers_to_are_removed_a_day_after_they_came(
         "UPDATE recordings SET created_at = '2126-01-01 00:00:00' WHERE created_at > '2026-01-02'"
     )
     edit(database_url, later)
-    assert prune(database_url) == 1
+    assert prune(database_url) == Pruned((), 1)
     assert set(store.recordings([wanted, waiting])) == {wanted, waiting}
     with pytest.raises(NotFound):
         store.recordings([unused])
-    assert prune(database_url) == 0
+    assert prune(database_url) == Pruned((), 0)
 
 
 def test_space_that_rows_have_left_is_given_back(database: Path) -> None:
@@ -101,5 +104,32 @@ def test_space_that_rows_have_left_is_given_back(database: Path) -> None:
             store.add_recording(recording(first_tick=tick))
     edit(str(database), "UPDATE recordings SET created_at = '2026-01-01 00:00:00'")
     before = database.stat().st_size
-    assert prune(str(database)) == 60
+    assert prune(str(database)).recordings == 60
     assert database.stat().st_size < before / 2
+
+
+def test_jobs_that_ended_long_ago_are_removed_by_state_and_kept_ones_stay(
+    store: SqlStore, database_url: str
+) -> None:
+    cancelled, kept, waiting = (store.create_job(walks())[0].id for _ in range(3))
+    succeeded = store.create_job(walks(), idempotency_key="succeeded")[0].id
+    for job in (cancelled, kept, succeeded):
+        store.command(job, Command.CANCEL)
+    store.keep(kept, True)
+    later = "UPDATE jobs SET finished_at = '2026-01-01 00:00:00' WHERE state = 'cancelled'"
+    edit(database_url, later)
+    edit(database_url, "UPDATE jobs SET state = idempotency_key WHERE idempotency_key <> ''")
+    assert prune(database_url, older_than=timedelta(days=36_500)).jobs == ()
+    day = timedelta(days=1)
+    assert prune(database_url, older_than=day, states={JobState.CANCELLED}).jobs == (cancelled,)
+    assert prune(database_url, older_than=day).jobs == (succeeded,)
+    assert {job.id for job in store.jobs().items} == {kept, waiting}
+
+
+def test_rows_that_a_deleted_job_still_has_are_no_contradiction(
+    job_id: str, database_url: str
+) -> None:
+    edit(database_url, "DELETE FROM evaluations WHERE iteration = 0")
+    assert check(database_url) != []
+    edit(database_url, "UPDATE jobs SET deleted_at = '2026-01-01 00:00:00'")
+    assert check(database_url) == []

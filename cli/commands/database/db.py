@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -92,13 +92,39 @@ def restore(
     note(f"the database holds what {file} does")
 
 
-def prune(db: Db = None) -> None:
-    """Remove recorded walks that no job refers to, a day after they came, and free their space."""
+def prune(
+    older_than: Annotated[
+        float | None,
+        typer.Option(min=0.0, metavar="DAYS", help="Delete jobs that ended so long ago, too."),
+    ] = None,
+    state: Annotated[
+        Literal["succeeded", "failed", "cancelled"] | None,
+        typer.Option(help="With --older-than: only jobs that ended so [default: all]."),
+    ] = None,
+    db: Db = None,
+) -> None:
+    """Remove recorded walks that no job refers to, a day after they came, and free their space.
+
+    With --older-than also jobs, but for those that are kept and those with forks under way.
+    """
+    from datetime import timedelta
+
     from cli.output import note
+    from services.optimizer.errors import InvalidRequest
+    from services.optimizer.jobs.job import ENDED, JobState
     from services.optimizer.store import maintenance
 
-    removed = maintenance.prune(_database(db))
-    note(f"{removed} recorded walks are removed, and free space is given back")
+    if state is not None and older_than is None:
+        raise InvalidRequest("deletes nothing without --older-than", field="state")
+    removed = maintenance.prune(
+        _database(db),
+        older_than=None if older_than is None else timedelta(days=older_than),
+        states=ENDED if state is None else {JobState(state)},
+    )
+    note(
+        f"{len(removed.jobs)} jobs and {removed.recordings} recorded walks are removed, and free"
+        " space is given back"
+    )
 
 
 def _database(db: str | None) -> str:

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import closing
+from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Final
 
 from sqlalchemy import Connection, Select, Text, cast, delete, exists, func, or_, select
 
+from services.optimizer.jobs.job import ENDED, JobState
+from services.optimizer.store.deletion import SqlDeletion
 from services.optimizer.store.engine import Database, connect, database_time, parse_url
 from services.optimizer.store.revisions import check_revision
-from services.optimizer.store.tables import evaluations, iterations, jobs, metadata, recordings
+from services.optimizer.store.tables import (
+    EXISTING,
+    evaluations,
+    iterations,
+    jobs,
+    metadata,
+    recordings,
+)
 
 _MOST: Final = 20
 """Findings of one kind."""
@@ -21,6 +31,9 @@ _GRACE: Final = timedelta(days=1)
 """For so long a recorded walk waits for the job that is to refer to it."""
 
 _RECORDING: Final = re.compile(r"\b[0-9a-f]{32}\b")
+
+_OF_EXISTING: Final = iterations.c.job_id.in_(select(jobs.c.id).where(EXISTING))
+"""Rows of deleted jobs go piece by piece: nothing is wrong with those that are left."""
 
 Rows = Select[*tuple[Any, ...]]
 
@@ -46,24 +59,49 @@ def check(url: str) -> list[str]:
             return [finding for look in _LOOKS for finding in look(connection)]
 
 
-def prune(url: str) -> int:
-    """Remove recorded walks that no job refers to, and give free space back.
+@dataclass(frozen=True, slots=True)
+class Pruned:
+    """What was removed.
+
+    Attributes:
+        jobs: Ids of jobs that ended long ago.
+        recordings: How many recorded walks no job refers to any more.
+    """
+
+    jobs: tuple[str, ...]
+    recordings: int
+
+
+def prune(
+    url: str, *, older_than: timedelta | None = None, states: Collection[JobState] = ENDED
+) -> Pruned:
+    """Remove old jobs, and recorded walks that no job refers to; give free space back.
 
     Args:
         url: Of the database, as for `open_store`.
+        older_than: Only jobs that ended so long ago; None removes no job. Those that are kept, and
+            parents of forks that have not ended, stay in any case.
+        states: Only jobs that ended in one of these.
 
     Returns:
-        How many walks were removed.
+        What was removed.
 
     Raises:
         StoreUnavailable: The database cannot be written, or has another schema than the newest.
     """
     with closing(connect(parse_url(url), for_migration=True)) as database:
         check_revision(database)
+        deletion = SqlDeletion(database, database_time)
+        removed: tuple[str, ...] = ()
+        if older_than is not None:
+            with database.transaction(write=False) as connection:
+                moment = database_time(connection) - older_than
+            removed = deletion.delete_ended_before(moment, states)
+        deletion.purge_deleted()
         with database.transaction(write=True) as connection:
-            removed = _remove_unreferenced(connection)
+            recorded = _remove_unreferenced(connection)
         _vacuum(database)
-    return removed
+    return Pruned(removed, recorded)
 
 
 def _remove_unreferenced(connection: Connection) -> int:
@@ -113,6 +151,7 @@ def _counted_iterations(connection: Connection) -> Iterator[str]:
     query: Rows = (
         select(jobs.c.id, jobs.c.iterations, count)
         .select_from(jobs.outerjoin(iterations, committed))
+        .where(EXISTING)
         .group_by(jobs.c.id, jobs.c.iterations)
         .having(or_(count != jobs.c.iterations, func.coalesce(last, -1) != jobs.c.iterations - 1))
     )
@@ -125,6 +164,7 @@ def _counted_evaluations(connection: Connection) -> Iterator[str]:
     query: Rows = (
         select(jobs.c.id, jobs.c.evaluations, count)
         .select_from(jobs.outerjoin(evaluations, evaluations.c.job_id == jobs.c.id))
+        .where(EXISTING)
         .group_by(jobs.c.id, jobs.c.evaluations)
         .having(count != jobs.c.evaluations)
     )
@@ -134,7 +174,7 @@ def _counted_evaluations(connection: Connection) -> Iterator[str]:
 
 def _iterations_without_evaluations(connection: Connection) -> Iterator[str]:
     query = select(iterations.c.job_id, iterations.c.iteration).where(
-        iterations.c.committed_at.is_not(None), ~_evaluated()
+        iterations.c.committed_at.is_not(None), ~_evaluated(), _OF_EXISTING
     )
     for job, iteration in _first(connection, query):
         yield f"iteration {iteration} of job {job} is committed without evaluations"
@@ -142,7 +182,7 @@ def _iterations_without_evaluations(connection: Connection) -> Iterator[str]:
 
 def _evaluations_without_commit(connection: Connection) -> Iterator[str]:
     query = select(iterations.c.job_id, iterations.c.iteration).where(
-        iterations.c.committed_at.is_(None), _evaluated()
+        iterations.c.committed_at.is_(None), _evaluated(), _OF_EXISTING
     )
     for job, iteration in _first(connection, query):
         yield f"iteration {iteration} of job {job} has evaluations, but is not committed"
@@ -154,7 +194,7 @@ def _best_designs(connection: Connection) -> Iterator[str]:
         evaluations.c.iteration == jobs.c.best_iteration,
         evaluations.c.particle == jobs.c.best_particle,
     )
-    query = select(jobs.c.id).where(jobs.c.best_iteration.is_not(None), ~best)
+    query = select(jobs.c.id).where(jobs.c.best_iteration.is_not(None), ~best, EXISTING)
     for (job,) in _first(connection, query):
         yield f"the best design of job {job} is not among its evaluations"
 

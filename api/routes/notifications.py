@@ -20,5 +20,5 @@ router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["jobs"])
 )
 def list_notifications(job_id: JobId, service: Service) -> list[NotificationView]:
     """One for each time that the job ended, if it was submitted with a `Notify-URL`."""
-    found = service.store.notifications(job_id)
+    found = service.store.outbox.about(job_id)
     return [NotificationView.from_notification(notification) for notification in found]

@@ -77,6 +77,10 @@ class _MeasuredStore(_Measured):
     def tokens(self) -> Any:
         return _Measured(self._inner.tokens, self._metrics, "token_")
 
+    @property
+    def outbox(self) -> Any:
+        return _Measured(self._inner.outbox, self._metrics, "notification_")
+
     def claim(self, *args: Any, **kwargs: Any) -> Claim | None:
         claim: Claim | None = self._timed("claim", self._inner.claim)(*args, **kwargs)
         if claim is not None and claim.taken_from is not None:

@@ -106,12 +106,12 @@ class Notifier:
 
     def _send_next(self, client: httpx2.Client) -> bool:
         """Make one attempt, if any is due; whether there was one."""
-        due = self._store.take_notification(lease_seconds=_LEASE_SECONDS)
+        due = self._store.outbox.take(lease_seconds=_LEASE_SECONDS)
         if due is None:
             return False
         refused = refused_url(due.url, self._hosts)
         error = refused or self._post(client, due)
-        self._store.settle_notification(due, error, final=refused is not None)
+        self._store.outbox.settle(due, error, final=refused is not None)
         if error is not None:
             _log.warning("job %s: notification %s: %s", due.job_id, due.id, error)
         return True

@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Final
 
 from services.optimizer.errors import StoreUnavailable
+from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.job import Job
 from services.optimizer.store.base import Store
 
@@ -24,12 +25,13 @@ class Deletion:
 
     store: Store
 
-    def keep(self, job_id: str, kept: bool) -> Job:
+    def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
         """Protect a job from deletion, or release it.
 
         Args:
             job_id: id of the job.
             kept: whether it is protected.
+            actor: name of the token that the request came with, if any; for the audit log.
 
         Returns:
             The job as it is then.
@@ -37,9 +39,9 @@ class Deletion:
         Raises:
             NotFound: no job of that id.
         """
-        return self.store.keep(job_id, kept)
+        return self.store.keep(job_id, kept, actor=actor)
 
-    def delete(self, job_id: str) -> None:
+    def delete(self, job_id: str, *, actor: str = LOCAL) -> None:
         """Delete a job with all that it has committed.
 
         It is gone for everybody when this returns. `Store.purge_deleted`, which housekeeping calls,
@@ -47,12 +49,13 @@ class Deletion:
 
         Args:
             job_id: id of the job.
+            actor: name of the token that the request came with, if any; for the audit log.
 
         Raises:
             NotFound: no job of that id.
             Conflict: it has not ended and is not paused, or is kept; says what to do first.
         """
-        self.store.delete_job(job_id)
+        self.store.delete_job(job_id, actor=actor)
 
 
 class Housekeeping:

@@ -59,12 +59,12 @@ def test_the_end_of_a_job_is_told_once_and_signed(store: SqlStore, receiver: Rec
     job_id = cancelled(store, receiver.url)
     store.create_job(SPEC)
     with notifying(store, receiver):
-        eventually(lambda: store.notifications(job_id)[0].delivered_at is not None)
+        eventually(lambda: store.outbox.about(job_id)[0].delivered_at is not None)
     ((headers, body),) = receiver.received
     (told,) = receiver.documents()
     assert (told["type"], told["data"]["id"]) == ("job.cancelled", job_id)
     assert told["data"] | {"state": "cancelled", "iterations": 0, "error": None} == told["data"]
-    (stored,) = store.notifications(job_id)
+    (stored,) = store.outbox.about(job_id)
     assert (stored.id, stored.attempts, stored.error) == (headers["webhook-id"], 1, None)
     signed = f"{stored.id}.{headers['webhook-timestamp']}.".encode() + body
     expected = hmac.new(b"of the tests", signed, hashlib.sha256).digest()
@@ -81,12 +81,12 @@ def test_failed_and_succeeded_jobs_are_told_and_pauses_are_not(store: SqlStore) 
         claim = store.claim("runner", lease_seconds=30.0)
         assert claim is not None
         store.release(claim, state, error="of the test" if state is JobState.FAILED else None)
-    (failed,) = store.notifications(job.id)
+    (failed,) = store.outbox.about(job.id)
     assert failed.document["type"] == "job.failed"
     assert failed.document["data"]["error"] == "of the test"
     store.command(job.id, Command.RESUME)
     store.command(job.id, Command.CANCEL)
-    first, second = store.notifications(job.id)
+    first, second = store.outbox.about(job.id)
     assert first.id != second.id
     assert {first.document["type"], second.document["type"]} == {"job.failed", "job.cancelled"}
 
@@ -100,17 +100,17 @@ def test_what_is_not_taken_is_sent_again_with_the_same_id_and_no_redirection_is_
     receiver.statuses = [answer]
     job_id = cancelled(store, receiver.url)
     with notifying(store, receiver):
-        eventually(lambda: store.notifications(job_id)[0].attempts == 1)
-        (waiting,) = store.notifications(job_id)
+        eventually(lambda: store.outbox.about(job_id)[0].attempts == 1)
+        (waiting,) = store.outbox.about(job_id)
         status = 307 if isinstance(answer, str) else answer
         assert waiting.error == f"the receiver answered {status}"
         assert waiting.delivered_at is None and waiting.next_attempt_at is not None
         assert (waiting.next_attempt_at - clock.now).total_seconds() == pause_after(1)
         clock.advance(60.0)
-        eventually(lambda: store.notifications(job_id)[0].delivered_at is not None)
+        eventually(lambda: store.outbox.about(job_id)[0].delivered_at is not None)
     first, second = receiver.ids()
     assert first == second
-    assert store.notifications(job_id)[0].attempts == 2
+    assert store.outbox.about(job_id)[0].attempts == 2
     store.close()
 
 
@@ -126,12 +126,12 @@ def test_one_that_nobody_takes_is_given_up(database: Path) -> None:
     store = open_store(str(database), clock=clock)
     job_id = cancelled(store, "http://ci.example/")
     for _ in range(MOST_ATTEMPTS):
-        due = store.take_notification(lease_seconds=60.0)
+        due = store.outbox.take(lease_seconds=60.0)
         assert due is not None
-        store.settle_notification(due, "the receiver answered 500")
+        store.outbox.settle(due, "the receiver answered 500")
         clock.advance(3601.0)
-    assert store.take_notification(lease_seconds=60.0) is None
-    (given_up,) = store.notifications(job_id)
+    assert store.outbox.take(lease_seconds=60.0) is None
+    (given_up,) = store.outbox.about(job_id)
     assert (given_up.attempts, given_up.next_attempt_at) == (MOST_ATTEMPTS, None)
     assert given_up.delivered_at is None
     store.close()
@@ -143,10 +143,10 @@ def test_a_notification_is_one_senders_at_a_time_and_anothers_when_that_has_gone
     clock = Clock()
     store = open_store(str(database), clock=clock)
     cancelled(store, "http://ci.example/")
-    lost = store.take_notification(lease_seconds=60.0)
-    assert store.take_notification(lease_seconds=60.0) is None
+    lost = store.outbox.take(lease_seconds=60.0)
+    assert store.outbox.take(lease_seconds=60.0) is None
     clock.advance(61.0)
-    again = store.take_notification(lease_seconds=60.0)
+    again = store.outbox.take(lease_seconds=60.0)
     assert lost is not None and again is not None and lost.id == again.id
     store.close()
 
@@ -206,8 +206,8 @@ def test_unless_hosts_are_allowed_nobody_is_told() -> None:
 def test_a_host_that_is_allowed_no_more_is_not_told(store: SqlStore, receiver: Receiver) -> None:
     job_id = cancelled(store, receiver.url)
     with notifying(store, receiver, hosts=("ci.example",)):
-        eventually(lambda: store.notifications(job_id)[0].attempts == 1)
-    (given_up,) = store.notifications(job_id)
+        eventually(lambda: store.outbox.about(job_id)[0].attempts == 1)
+    (given_up,) = store.outbox.about(job_id)
     assert given_up.next_attempt_at is None and "not among the hosts" in str(given_up.error)
     assert receiver.received == []
 
@@ -251,9 +251,9 @@ def test_a_server_that_is_killed_between_end_and_delivery_tells_after_its_restar
         )
         try:
             if kill:
-                eventually(lambda: store.notifications(job_id)[0].attempts == 1)
+                eventually(lambda: store.outbox.about(job_id)[0].attempts == 1)
             else:
-                eventually(lambda: store.notifications(job_id)[0].delivered_at is not None)
+                eventually(lambda: store.outbox.about(job_id)[0].delivered_at is not None)
         finally:
             process.send_signal(signal.SIGKILL if kill else signal.SIGTERM)
             process.wait(timeout=60.0)

@@ -12,6 +12,10 @@ LOCAL: Final = "local"
 No token has this name."""
 
 
+RETENTION: Final = "retention"
+"""Whatever deletes jobs that ended long ago. No token has this name, either."""
+
+
 class AuditAction(StrEnum):
     """What was done."""
 
@@ -22,6 +26,8 @@ class AuditAction(StrEnum):
     EXTEND = "extend"
     CANCEL = "cancel"
     DELETE = "delete"
+    KEEP = "keep"
+    RELEASE = "release"
     ADD_RECORDING = "add_recording"
     CREATE_TOKEN = "create_token"  # noqa: S105
     REVOKE_TOKEN = "revoke_token"  # noqa: S105

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, Protocol
 from urllib.parse import urlsplit
 
 from services.optimizer.errors import InvalidRequest
@@ -44,6 +44,45 @@ class Notification:
     next_attempt_at: datetime | None = None
     delivered_at: datetime | None = None
     error: str | None = None
+
+
+class Outbox(Protocol):
+    """The port of the memory of notifications. Thread-safe; every method is one transaction.
+
+    A job that ends leaves one in the transaction that ends it, if it was submitted with a URL.
+    """
+
+    def take(self, *, lease_seconds: float) -> Notification | None:
+        """Take the notification that has been due for longest, for one attempt.
+
+        Args:
+            lease_seconds: for so long it is nobody else's; then it is due again [s].
+
+        Returns:
+            The notification; None if none is due.
+        """
+
+    def settle(self, taken: Notification, error: str | None, *, final: bool = False) -> None:
+        """Note what came of an attempt: it is delivered, due again later, or given up.
+
+        Args:
+            taken: as `take` gave it.
+            error: why it failed, for people; None if it was delivered.
+            final: whether it is given up at once.
+        """
+
+    def about(self, job_id: str) -> tuple[Notification, ...]:
+        """Read the notifications about a job.
+
+        Args:
+            job_id: of the job.
+
+        Returns:
+            The oldest first; none while the job has not ended, or if nobody is notified.
+
+        Raises:
+            NotFound: there is no such job.
+        """
 
 
 def pause_after(attempts: int) -> float | None:

@@ -8,7 +8,8 @@ from typing import Any
 from sqlalchemy import Connection, insert, select
 
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.audit import AuditAction, AuditEntry
+from services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
+from services.optimizer.jobs.job import Job
 from services.optimizer.store.reading import Page
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import audit
@@ -37,6 +38,22 @@ def note_change(
     connection.execute(
         insert(audit).values(at=now, actor=actor, action=action, job_id=job_id, details=details)
     )
+
+
+def note_submission(connection: Connection, now: datetime, job: Job) -> None:
+    """Add the entry of a new job.
+
+    Args:
+        connection: The transaction that makes the job.
+        now: The time of its submission.
+        job: With its owner, and where it comes from.
+    """
+    actor = job.owner or LOCAL
+    if job.lineage is None:
+        note_change(connection, now, actor, AuditAction.SUBMIT, job.id)
+        return
+    parent, at = job.lineage.parent, job.lineage.from_iteration
+    note_change(connection, now, actor, AuditAction.FORK, job.id, parent=parent, from_iteration=at)
 
 
 def audit_page(

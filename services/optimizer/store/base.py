@@ -19,7 +19,7 @@ from services.optimizer.jobs.job import (
     JobOrder,
     JobState,
 )
-from services.optimizer.jobs.notification import Notification
+from services.optimizer.jobs.notification import Outbox
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.reading import Changes, CommittedHistory, Page, Queue
@@ -40,6 +40,10 @@ class Store(CommittedHistory, Protocol):
     @property
     def tokens(self) -> Tokens:
         """Of those who ask over the network."""
+
+    @property
+    def outbox(self) -> Outbox:
+        """Of notifications that jobs leave when they end."""
 
     def create_job(
         self,
@@ -192,18 +196,19 @@ class Store(CommittedHistory, Protocol):
             Unreadable: The job's spec cannot be read.
         """
 
-    def keep(self, job_id: str, kept: bool) -> Job:
+    def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
         """Protect a job from deletion, or release it.
 
         Args:
             job_id: Of the job.
             kept: Whether it is protected.
+            actor: Whom the audit log is to name.
 
         Returns:
             The job as it is then.
         """
 
-    def delete_job(self, job_id: str) -> None:
+    def delete_job(self, job_id: str, *, actor: str = LOCAL) -> None:
         """Delete a job with all that it has committed.
 
         It is gone for everybody when this returns, and its idempotency key is free. Rows of a long
@@ -211,6 +216,7 @@ class Store(CommittedHistory, Protocol):
 
         Args:
             job_id: Of the job.
+            actor: Whom the audit log is to name.
 
         Raises:
             Conflict: It has not ended and is not paused, or is kept.
@@ -388,39 +394,6 @@ class Store(CommittedHistory, Protocol):
 
         Raises:
             InvalidRequest: `after` is no cursor of the audit log, or `limit` is less than 1.
-        """
-
-    def take_notification(self, *, lease_seconds: float) -> Notification | None:
-        """Take the notification that has been due for longest, for one attempt.
-
-        A job that ends leaves one in the transaction that ends it, if it was submitted with a URL.
-
-        Args:
-            lease_seconds: For so long it is nobody else's; then it is due again [s].
-
-        Returns:
-            The notification; None if none is due.
-        """
-
-    def settle_notification(
-        self, taken: Notification, error: str | None, *, final: bool = False
-    ) -> None:
-        """Note what came of an attempt: it is delivered, due again later, or given up.
-
-        Args:
-            taken: As `take_notification` gave it.
-            error: Why it failed, for people; None if it was delivered.
-            final: Whether it is given up at once.
-        """
-
-    def notifications(self, job_id: str) -> tuple[Notification, ...]:
-        """Read the notifications about a job.
-
-        Args:
-            job_id: Of the job.
-
-        Returns:
-            The oldest first; none while the job has not ended, or if nobody is notified.
         """
 
     def ping(self) -> None:

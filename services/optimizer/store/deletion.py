@@ -15,7 +15,9 @@ from typing import Final
 from sqlalchemy import Connection, Table, delete, exists, func, select, update
 
 from services.optimizer.errors import Conflict
+from services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
 from services.optimizer.jobs.job import DELETABLE, ENDED, Job, JobState
+from services.optimizer.store.audit import note_change
 from services.optimizer.store.changes import announce
 from services.optimizer.store.engine import Clock, Database
 from services.optimizer.store.job_rows import to_job
@@ -51,18 +53,22 @@ class SqlDeletion:
         self._database = database
         self._clock = clock
 
-    def keep(self, job_id: str, kept: bool) -> Job:
+    def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
         """Protect a job from deletion, or release it."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
+            action = AuditAction.KEEP if kept else AuditAction.RELEASE
+            note_change(connection, self._clock(connection), actor, action, job_id)
             return to_job(update_job(connection, row, {"kept": kept}))
 
-    def delete_job(self, job_id: str) -> None:
+    def delete_job(self, job_id: str, *, actor: str = LOCAL) -> None:
         """Mark a job, and remove its rows at once if they are few."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
             _require_deletable(row)
-            _mark_deleted(connection, [job_id], self._clock(connection))
+            now = self._clock(connection)
+            _mark_deleted(connection, [job_id], now)
+            note_change(connection, now, actor, AuditAction.DELETE, job_id)
             if row["evaluations"] <= _PIECE:
                 _remove_piece(connection, job_id=job_id)
 
@@ -74,7 +80,10 @@ class SqlDeletion:
         while True:
             with self._database.transaction(write=True) as connection:
                 found = _ended_before(connection, moment, states)
-                _mark_deleted(connection, found, self._clock(connection))
+                now = self._clock(connection)
+                _mark_deleted(connection, found, now)
+                for job_id in found:
+                    note_change(connection, now, RETENTION, AuditAction.DELETE, job_id)
             deleted += found
             if len(found) < _JOBS:
                 return tuple(deleted)

@@ -12,10 +12,23 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final, NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, Select, Text, case, cast, false, func, select
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Select,
+    Text,
+    case,
+    cast,
+    false,
+    func,
+    select,
+    tuple_,
+)
 
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import JobOrder, JobState
+from services.optimizer.jobs.job import Job, JobOrder, JobState
+from services.optimizer.store.job_rows import to_job
+from services.optimizer.store.reading import Page
 from services.optimizer.store.records import ID_ALPHABET, is_job_id
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import EXISTING, jobs
@@ -153,6 +166,34 @@ def among_jobs(state: JobState | None, parent: str | None) -> Among:
     if parent is not None:
         found.append(jobs.c.parent_id == parent if is_job_id(parent) else false())
     return tuple(found)
+
+
+def newest_jobs(connection: Connection, among: Among, after: str | None, limit: int) -> Page[Job]:
+    """Read the list as most ask for it: by one query, which reads no more than the page.
+
+    Args:
+        connection: An open transaction.
+        among: Only jobs for which these hold.
+        after: `next` of the page before.
+        limit: Most jobs on the page.
+
+    Returns:
+        The page, newest first.
+
+    Raises:
+        InvalidRequest: `after` is no cursor of this order.
+    """
+    newest = select(jobs).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
+    query = newest.where(*among).limit(limit + 1)
+    if after is not None:
+        created_at, job_id = from_cursor(after)
+        types = (jobs.c.created_at.type, jobs.c.id.type)
+        place = tuple_(created_at, job_id, types=types)
+        query = query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
+    rows = connection.execute(query).mappings().all()
+    found = tuple(to_job(row) for row in rows[:limit])
+    more = len(rows) > limit
+    return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
 
 
 class _Entry(NamedTuple):

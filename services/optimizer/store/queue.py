@@ -10,7 +10,7 @@ from sqlalchemy import Connection, func, select
 from services.optimizer.jobs.job import JobState
 from services.optimizer.store.job_list import spec_field
 from services.optimizer.store.reading import Queue
-from services.optimizer.store.tables import jobs
+from services.optimizer.store.tables import EXISTING, jobs
 
 _KINDS: Final = ("tuning", "certificate", "identification", "calibration", "tournament")
 
@@ -31,15 +31,15 @@ def count_jobs(connection: Connection, now: datetime) -> Queue:
         The counts. A job whose kind cannot be read counts as `unknown`.
     """
     by_state = dict.fromkeys(JobState, 0)
-    # Of the index alone: there may be very many jobs that have ended.
+    # Without their specs: there may be very many jobs that have ended.
     for state, count in connection.execute(
-        select(jobs.c.state, func.count()).group_by(jobs.c.state)
+        select(jobs.c.state, func.count()).where(EXISTING).group_by(jobs.c.state)
     ):
         by_state[JobState(state)] = count
     kind = spec_field(connection, "kind").label("kind")
     query = (
         select(jobs.c.state, kind, func.count())
-        .where(jobs.c.state.in_(_UNDER_WAY))
+        .where(jobs.c.state.in_(_UNDER_WAY), EXISTING)
         .group_by(jobs.c.state, kind)
     )
     under_way: dict[tuple[JobState, str], int] = {}
@@ -47,9 +47,9 @@ def count_jobs(connection: Connection, now: datetime) -> Queue:
         key = (JobState(state), found if found in _KINDS else "unknown")
         under_way[key] = under_way.get(key, 0) + count
     since = connection.execute(
-        select(func.min(jobs.c.updated_at)).where(jobs.c.state == JobState.QUEUED)
+        select(func.min(jobs.c.updated_at)).where(jobs.c.state == JobState.QUEUED, EXISTING)
     ).scalar_one()
     wait = 0.0 if since is None else max(0.0, (now - since).total_seconds())
     beginning = func.substr(func.coalesce(jobs.c.error, ""), 1, _BEGINNING)
-    errors = connection.execute(select(beginning).where(jobs.c.state == JobState.FAILED))
+    errors = connection.execute(select(beginning).where(jobs.c.state == JobState.FAILED, EXISTING))
     return Queue(by_state, under_way, wait, tuple(errors.scalars()))

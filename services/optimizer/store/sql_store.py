@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from datetime import datetime, timedelta
+from datetime import timedelta
 from typing import Any, Final
 
-from sqlalchemy import Connection, select, tuple_
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import InvalidRequest, Unreadable
@@ -25,10 +24,9 @@ from services.optimizer.jobs.job import (
     commanded,
     extended,
 )
-from services.optimizer.jobs.notification import Notification
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.audit import audit_page, note_change
+from services.optimizer.store.audit import audit_page, note_change, note_submission
 from services.optimizer.store.changes import SqlChanges
 from services.optimizer.store.claims import (
     claimable,
@@ -54,17 +52,15 @@ from services.optimizer.store.file_system import check_file_system
 from services.optimizer.store.history import SqlHistory, checked_limit
 from services.optimizer.store.in_use import admit
 from services.optimizer.store.job_list import (
-    Among,
     among_jobs,
     cursor_of,
-    from_cursor,
     job_rows,
+    newest_jobs,
     sort_jobs,
-    to_cursor,
 )
 from services.optimizer.store.job_rows import request_digest, storable, to_job
 from services.optimizer.store.migrate import create
-from services.optimizer.store.notifications import is_due, notifications_of, settle, take_due
+from services.optimizer.store.outbox import SqlOutbox
 from services.optimizer.store.queue import count_jobs
 from services.optimizer.store.reading import Page, Queue
 from services.optimizer.store.recordings import (
@@ -87,7 +83,6 @@ from services.optimizer.store.records import (
 )
 from services.optimizer.store.revisions import check_revision
 from services.optimizer.store.submissions import Submission, insert_job, repeated_job
-from services.optimizer.store.tables import jobs
 from services.optimizer.store.tokens import SqlTokens
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -131,6 +126,7 @@ class SqlStore(SqlDeletion, SqlHistory):
         SqlHistory.__init__(self, database)
         SqlDeletion.__init__(self, database, clock)
         self.tokens = SqlTokens(database, clock)
+        self.outbox = SqlOutbox(database, clock)
         self.changes = SqlChanges(database)
 
     # jobs, as their users see them
@@ -162,7 +158,7 @@ class SqlStore(SqlDeletion, SqlHistory):
                 if earlier is None:
                     now = self._clock(connection)
                     job = insert_job(connection, asked, now)
-                    _note_submission(connection, now, job)
+                    note_submission(connection, now, job)
                     return job, True
         except IntegrityError:
             # Another process has inserted the same key between our look and our insertion.
@@ -185,7 +181,7 @@ class SqlStore(SqlDeletion, SqlHistory):
             now = self._clock(connection)
             asked = Submission(spec.resolved(), provenance=first_record(provenance))
             job = insert_job(connection, asked, now)
-            _note_submission(connection, now, job)
+            note_submission(connection, now, job)
             return take_job(connection, job_row(connection, job.id), runner, lease_seconds, now)
 
     def job(self, job_id: str) -> Job:
@@ -208,7 +204,8 @@ class SqlStore(SqlDeletion, SqlHistory):
         limit = checked_limit(limit)
         among = among_jobs(state, parent)
         if not search and kind is None and order is JobOrder.CREATED:
-            return self._newest_jobs(among, after, limit)
+            with self._database.transaction(write=False) as connection:
+                return newest_jobs(connection, among, after, limit)
         with self._database.transaction(write=False) as connection:
             found = sort_jobs(
                 connection, among=among, kind=kind, search=search, order=order, after=after
@@ -217,21 +214,6 @@ class SqlStore(SqlDeletion, SqlHistory):
             rows = job_rows(connection, ids)
         following = cursor_of(rows[-1], order) if more else None
         return Page(tuple(map(to_job, rows)), following)
-
-    def _newest_jobs(self, among: Among, after: str | None, limit: int) -> Page[Job]:
-        """The list as most ask for it: one query, which reads no more than the page."""
-        newest = select(jobs).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
-        query = newest.where(*among).limit(limit + 1)
-        if after is not None:
-            created_at, job_id = from_cursor(after)
-            types = (jobs.c.created_at.type, jobs.c.id.type)
-            place = tuple_(created_at, job_id, types=types)
-            query = query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
-        with self._database.transaction(write=False) as connection:
-            rows = connection.execute(query).mappings().all()
-        found = tuple(to_job(row) for row in rows[:limit])
-        more = len(rows) > limit
-        return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
 
     def queue(self) -> Queue:
         """Count the jobs."""
@@ -399,28 +381,6 @@ class SqlStore(SqlDeletion, SqlHistory):
         with self._database.transaction(write=False) as connection:
             return audit_page(connection, job_id, after, limit)
 
-    def take_notification(self, *, lease_seconds: float) -> Notification | None:
-        """Take a notification that is due."""
-        # Looking first: most of the time there is none, and a look needs no lock.
-        with self._database.transaction(write=False) as connection:
-            if not is_due(connection, self._clock(connection)):
-                return None
-        with self._database.transaction(write=True) as connection:
-            return take_due(connection, self._clock(connection), lease_seconds)
-
-    def settle_notification(
-        self, taken: Notification, error: str | None, *, final: bool = False
-    ) -> None:
-        """Note what came of an attempt."""
-        with self._database.transaction(write=True) as connection:
-            settle(connection, taken, self._clock(connection), error, final=final)
-
-    def notifications(self, job_id: str) -> tuple[Notification, ...]:
-        """Read the notifications about a job."""
-        with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
-            return notifications_of(connection, job_id)
-
     def ping(self) -> None:
         """Ask the database for its schema revision."""
         check_revision(self._database)
@@ -433,15 +393,6 @@ class SqlStore(SqlDeletion, SqlHistory):
         """Close the pooled connections."""
         self.changes.close()
         self._database.close()
-
-
-def _note_submission(connection: Connection, now: datetime, job: Job) -> None:
-    actor = job.owner or LOCAL
-    if job.lineage is None:
-        note_change(connection, now, actor, AuditAction.SUBMIT, job.id)
-        return
-    parent, at = job.lineage.parent, job.lineage.from_iteration
-    note_change(connection, now, actor, AuditAction.FORK, job.id, parent=parent, from_iteration=at)
 
 
 def _check_key(key: str | None) -> None:

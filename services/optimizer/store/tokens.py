@@ -10,7 +10,7 @@ from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.access import Scope, Token, new_secret, secret_digest
 from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.audit import LOCAL, AuditAction
+from services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
 from services.optimizer.store.audit import note_change
 from services.optimizer.store.engine import Clock, Database
 from services.optimizer.store.rows import Row
@@ -48,9 +48,9 @@ class SqlTokens:
         """
         if not _NAME.fullmatch(name):
             raise InvalidRequest("must be 1 to 64 letters, digits, '_', '.' and '-'", field="name")
-        if name == LOCAL:
+        if name in (LOCAL, RETENTION):
             raise InvalidRequest(
-                f"{LOCAL!r} is how the audit log calls whoever asks without one; choose another",
+                f"{name!r} is what the audit log calls who has no token; choose another",
                 field="name",
             )
         try:

@@ -41,7 +41,13 @@ class Settings(BaseSettings):
         default=None, description="URL of a server that commands about jobs are sent to."
     )
     token: str | None = Field(
-        default=None, description="Token that is sent to servers.", repr=False
+        default=None,
+        description="Token that is sent to `server`, or where there is none to the one that is"
+        " named otherwise.",
+        repr=False,
+    )
+    token_over_http: bool = Field(
+        default=False, description="Whether a token may leave this machine over plain HTTP."
     )
     db: str | None = Field(
         default=None,
@@ -158,7 +164,7 @@ class Settings(BaseSettings):
     @property
     def tokens_required(self) -> bool:
         """Whether the server answers only those who send a token."""
-        return self.api_access == "token" or not _is_loopback(self.api_host)
+        return self.api_access == "token" or not is_loopback(self.api_host)
 
     @property
     def metrics_need_token(self) -> bool:
@@ -216,7 +222,12 @@ def default_database() -> Path:
         ) from error
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine and nothing else.
+
+    Args:
+        host: a name or an address.
+    """
     if host == "localhost":
         return True
     try:

@@ -83,18 +83,20 @@ def connect(
             or the server is busy, and the request may safely be repeated.
         headers: Sent with every request, such as what a proxy asks for.
         token: Of the server, where it asks for one. Default: that of the environment
-            (GAITSWARM_TOKEN).
+            (GAITSWARM_TOKEN), unless the environment names another server (GAITSWARM_SERVER).
 
     Returns:
         The server's jobs, as a context manager.
 
     Raises:
-        InvalidRequest: It is not a URL.
+        InvalidRequest: It is not a URL, or the token would go beyond this machine as plain text.
     """
     from gaitswarm.jobs.server.attempts import BACKOFF
+    from gaitswarm.jobs.server.credentials import with_token
     from gaitswarm.jobs.server.jobs import TIMEOUT, ServerJobs
+    from gaitswarm.settings import read_settings
 
-    sent = _with_token(headers, token)
+    sent = with_token(url, headers, token, read_settings())
     return ServerJobs(url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=sent)
 
 
@@ -114,19 +116,21 @@ def connect_async(
         backoff: As for `connect`.
         headers: Sent with every request.
         token: Of the server, where it asks for one. Default: that of the environment
-            (GAITSWARM_TOKEN).
+            (GAITSWARM_TOKEN), unless the environment names another server (GAITSWARM_SERVER).
 
     Returns:
         The server's jobs, as an asynchronous context manager.
 
     Raises:
-        InvalidRequest: It is not a URL.
+        InvalidRequest: It is not a URL, or the token would go beyond this machine as plain text.
     """
     from gaitswarm.jobs.server.async_jobs import AsyncServerJobs
     from gaitswarm.jobs.server.attempts import BACKOFF
+    from gaitswarm.jobs.server.credentials import with_token
     from gaitswarm.jobs.server.jobs import TIMEOUT
+    from gaitswarm.settings import read_settings
 
-    sent = _with_token(headers, token)
+    sent = with_token(url, headers, token, read_settings())
     return AsyncServerJobs(
         url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=sent
     )
@@ -203,17 +207,6 @@ def open_jobs(server: str | None, db: str | None, *, create: bool = False) -> Jo
         # Somebody waits in front of a terminal.
         return connect(settings.server, backoff=Backoff(first=0.25, longest=5.0, attempts=2))
     return open(db or None, create=create)
-
-
-def _with_token(headers: Mapping[str, str] | None, token: str | None) -> dict[str, str]:
-    """Headers with a token, unless they have an Authorization of their own."""
-    from gaitswarm.settings import read_settings
-
-    sent = dict(headers or {})
-    secret = token or read_settings().token
-    if secret and not any(name.lower() == "authorization" for name in sent):
-        sent["Authorization"] = f"Bearer {secret}"
-    return sent
 
 
 def _sqlite_file(url: str) -> Path | None:

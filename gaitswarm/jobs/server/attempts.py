@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from email.utils import parsedate_to_datetime
 from http import HTTPStatus
 from typing import Final, TypeVar
+from urllib.parse import urlsplit
 
 import httpx2
 from pydantic import ValidationError
@@ -292,7 +293,12 @@ def server_url(url: str) -> str:
     Raises:
         InvalidRequest: It is not a URL of HTTP.
     """
-    if not url.startswith(("http://", "https://")):
+    try:
+        parts = urlsplit(url)
+        valid = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
+    except ValueError:
+        valid = False
+    if not valid:
         raise InvalidRequest(f"{url!r} is not a URL like http://127.0.0.1:8000", field="server")
     return url.rstrip("/")
 

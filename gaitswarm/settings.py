@@ -169,7 +169,7 @@ class Settings(BaseSettings):
     @property
     def metrics_need_token(self) -> bool:
         """Whether a runner's metrics are only for those who send a token."""
-        return self.api_access == "token" or not _is_loopback(self.metrics_host)
+        return self.api_access == "token" or not is_loopback(self.metrics_host)
 
     @property
     def database(self) -> str:

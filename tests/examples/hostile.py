@@ -199,7 +199,7 @@ def _urdf_trees() -> Iterator[Body]:
         yield _of_urdf(f"name {name[:10]}", URDF.replace('name="body"', f'name="{name}"', 1))
     slashed = '<link name="../../etc/passwd"/>' + weld.format("w", "body", "../../etc/passwd")
     yield _of_urdf("path", URDF.replace(END, slashed + END), TAKEN)
-    for kind in ("prismatic", "floating", "planar", "continuous"):
+    for kind in ("prismatic", "floating", "planar"):
         yield _of_urdf(f"joints {kind}", URDF.replace('"revolute"', f'"{kind}"'))
     yield _of_urdf("no axis", URDF.replace('<axis xyz="', '<axis xyz="0 0 0" was="'))
     yield _of_urdf("no lengths", URDF.replace('<origin xyz="', '<origin xyz="0 0 0" was="'))

@@ -180,7 +180,8 @@ class WorkerOptions:
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Use this Ray cluster for all walks. [env: GAITSWARM_RAY_ADDRESS]",
+            help="Use this Ray cluster for all walks: HOST:PORT of its head, or auto on a node of"
+            " it. [env: GAITSWARM_RAY_ADDRESS]",
         ),
     ] = None
     cache: Annotated[

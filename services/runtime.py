@@ -12,6 +12,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from services.optimizer.deletion import Housekeeping
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.run.evaluator import Evaluator, Watched
@@ -40,8 +41,9 @@ def open_evaluator(
 
     Args:
         kind: Where walks run.
-        address: Of a Ray cluster. Without one, walks run in this process at once, and long jobs on
-            a cluster that is started for them and ends with this process.
+        address: Of a Ray cluster: `host:port` of its head, of which this machine becomes a node, or
+            `auto` where it is one. Without an address, walks run in this process at once, and long
+            jobs on a cluster that is started for them and ends with this process.
         cpus: Walks to compute at once on this machine; all of its cores by default.
         should_stop: Polled several times a second while a cluster is connected.
 
@@ -49,9 +51,16 @@ def open_evaluator(
         The workers; whoever opens them closes them.
 
     Raises:
+        InvalidRequest: The address is one of Ray Client (ray://).
         EvaluatorUnavailable: They cannot be reached; says what to do.
         EvaluationStopped: `should_stop` said so.
     """
+    if address is not None and "://" in address:
+        raise InvalidRequest(
+            f"{address!r} is no address of a cluster's head: Ray Client is not used, as it loses"
+            " its tasks with its connection; give HOST:6379, or auto on a machine that is a node",
+            field="ray_address",
+        )
     if kind == "in-process":
         return InProcessEvaluator(cpus)
     if address is None:
@@ -126,6 +135,7 @@ def open_runtime(
         What was opened.
 
     Raises:
+        InvalidRequest: As for `open_evaluator`.
         StoreUnavailable: The database cannot be opened.
         EvaluatorUnavailable: The workers cannot be reached.
         EvaluationStopped: `should_stop` said so.

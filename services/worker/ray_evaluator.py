@@ -4,34 +4,21 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Final
+from typing import Final
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from services.worker.dispatch import Dispatcher, Load, Work
+from services.worker.cluster.nodes import Nodes, OwnNode
+from services.worker.cluster.pump import Pump
+from services.worker.cluster.ray_nodes import ClusterNodes
+from services.worker.dispatch import Dispatcher, Load
 from services.worker.preparation import KernelBuilder, awaited
-from services.worker.ray_session import RaySession, open_ray
-from services.worker.tasks import Failure, TaskTotals, run_in_worker, warm_up
+from services.worker.ray_session import open_ray
+from services.worker.tasks import TaskTotals
 from sim import simulate
 from sim.outcome import Outcome
-
-_LOOK_AHEAD: Final = 2
-"""Tasks with Ray per slot: one that runs, and one that is at hand when it ends."""
-
-_GLANCE: Final = 0.02
-"""Seconds between looks for new work, while a slot is free."""
-
-_GLANCE_AHEAD: Final = 0.1
-"""The same while all slots are taken, and new work would only lie at hand."""
-
-_IDLE: Final = 0.5
-"""Seconds between looks at whether it is time to end."""
-
-PULSE_SECONDS: Final = 4.0
-"""Seconds between looks at whether the cluster's head is alive; three misses count as lost."""
 
 _PATIENCE: Final = 10.0
 """Seconds to wait for a connection that is to be closed, and may be busy being opened."""
@@ -132,8 +119,11 @@ class RayEvaluator:
         """Have the walks run by Ray's workers, on a new connection if the last was lost."""
         # Built here, the kernel lies in the cache when this machine's workers look for it.
         self._kernels.build(request.cases, should_stop)
-        dispatcher = awaited(self._living_link().opened, should_stop)
-        return dispatcher.evaluate(request, should_stop)
+        link = self._living_link()
+        dispatcher = awaited(link.opened, should_stop)
+        with link.nodes.result().wanted(request) as ready:
+            awaited(ready, should_stop)
+            return dispatcher.evaluate(request, should_stop)
 
     def close(self) -> None:
         """Disconnect; an embedded cluster ends."""
@@ -157,7 +147,8 @@ class _Link:
     An embedded cluster dies with the thread that started it, so one thread does it all. A process
     has one connection at a time: a second is opened when the one before has been closed.
 
-    opened: what takes the requests, or what kept it from being opened. warm: set when every slot's
+    opened: what takes the requests, or what kept it from being opened. nodes: to which these go,
+    known when it is open. warm: set when every slot's
     process has imported what walks need.
     """
 
@@ -165,6 +156,7 @@ class _Link:
         self, address: str | None, cpus: int | None, *, after: _Link | None = None
     ) -> None:
         self.opened: Future[Dispatcher] = Future()
+        self.nodes: Future[Nodes] = Future()
         self.warm = threading.Event()
         self._patience = _PATIENCE if address else _PATIENCE_EMBEDDED
         self._closing = threading.Event()
@@ -202,109 +194,17 @@ class _Link:
         except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
             self.opened.set_exception(error)
             return
+        is_embedded = session.directory is not None
+        nodes: Nodes = OwnNode(session.slots) if is_embedded else ClusterNodes(session)
         dispatcher = Dispatcher(session.slots, simulate.lanes)
+        self.nodes.set_result(nodes)
         self.opened.set_result(dispatcher)
         self._end()
         try:
-            _Pump(session, dispatcher, self.warm).run()
+            Pump(session, dispatcher, nodes, self.warm).run()
         except Exception as error:  # noqa: BLE001 - whatever Ray raises when it is going down
             _log.info("Ray was lost: %s", error)
             dispatcher.close(f"Ray was lost: {error}")
         finally:
+            nodes.close("the connection to Ray was closed")
             session.close()
-
-
-class _Pump:
-    """Keeps Ray supplied with tasks, and collects what comes back."""
-
-    def __init__(self, session: RaySession, dispatcher: Dispatcher, warm: threading.Event) -> None:
-        self._ray = session.ray
-        self._dispatcher = dispatcher
-        self._warm = warm
-        # Ray's own retries would run a task again behind our accounts.
-        options = {"num_cpus": 1, "max_retries": 0}
-        self._walk = session.ray.remote(**options)(run_in_worker)
-        self._warm_up = session.ray.remote(**options)(warm_up)
-        self._most = session.slots * _LOOK_AHEAD
-        self._flying: dict[Any, Work] = {}
-        self._cancelled: set[Any] = set()
-        self._session = session
-        self._misses = 0
-        self._next_pulse = time.monotonic() + PULSE_SECONDS
-
-    def run(self) -> None:
-        """Until the dispatcher is closed. Raises whatever Ray raises when it is lost."""
-        # Processes start and import while the caller still does other things.
-        starting = [self._warm_up.remote() for _ in range(self._dispatcher.slots)]
-        while not self._dispatcher.closed:
-            self._send()
-            self._collect()
-            self._cancel_dropped()
-            self._feel_pulse()
-            if not self._warm.is_set():
-                self._note_warmth(starting)
-
-    def _note_warmth(self, starting: list[Any]) -> None:
-        done, _ = self._ray.wait(starting, num_returns=len(starting), timeout=0.0)
-        if len(done) == len(starting):
-            self._warm.set()
-
-    def _send(self) -> None:
-        while len(self._flying) < self._most:
-            work = self._dispatcher.take(timeout=0.0 if self._flying else _IDLE)
-            if work is None:
-                break
-            self._flying[self._walk.remote(work.task)] = work
-        if len(self._flying) < self._dispatcher.slots:
-            copy = self._dispatcher.copy()
-            if copy is not None:
-                self._flying[self._walk.remote(copy.task)] = copy
-
-    def _collect(self) -> None:
-        if not self._flying:
-            return
-        patience = _IDLE
-        if len(self._flying) < self._most:
-            all_run = len(self._flying) >= self._dispatcher.slots
-            patience = _GLANCE_AHEAD if all_run else _GLANCE
-        done, _ = self._ray.wait(list(self._flying), num_returns=1, timeout=patience)
-        for reference in done:
-            self._cancelled.discard(reference)
-            self._settle(reference, self._flying.pop(reference))
-
-    def _cancel_dropped(self) -> None:
-        """What nobody waits for any more, or another worker was quicker with, takes no slot."""
-        for reference, work in self._flying.items():
-            if not work.batch.awaits(work.chunk) and reference not in self._cancelled:
-                self._cancelled.add(reference)
-                self._ray.cancel(reference, force=False)
-
-    def _feel_pulse(self) -> None:
-        if time.monotonic() < self._next_pulse:
-            return
-        self._next_pulse = time.monotonic() + PULSE_SECONDS
-        self._misses = 0 if self._session.head_answers() else self._misses + 1
-        if self._misses >= 3:
-            raise EvaluatorUnavailable("the head of the cluster does not answer")
-        if not self._misses:
-            # Nodes come and go.
-            self._dispatcher.slots = self._session.count_slots()
-            self._most = self._dispatcher.slots * _LOOK_AHEAD
-
-    def _settle(self, reference: Any, work: Work) -> None:
-        exceptions = self._ray.exceptions
-        try:
-            result = self._ray.get(reference)
-        except exceptions.TaskCancelledError:
-            self._dispatcher.again(work, suspect=False)
-        except exceptions.RayTaskError as error:
-            self._dispatcher.fail(work, RuntimeError(f"a worker cannot run walks: {error}"))
-        except (exceptions.WorkerCrashedError, exceptions.OutOfMemoryError):
-            self._dispatcher.again(work)
-        except (exceptions.NodeDiedError, exceptions.LocalRayletDiedError):
-            self._dispatcher.again(work, suspect=False)
-        else:
-            if isinstance(result, Failure):
-                self._dispatcher.fail(work, result.error)
-            else:
-                self._dispatcher.complete(work, result)

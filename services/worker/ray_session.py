@@ -19,6 +19,7 @@ from typing import Any, Final
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.worker.in_process import available_cpus
+from services.worker.joining import JoinedNode, runs_here
 
 _OBJECT_STORE_BYTES: Final = 80 * 1024 * 1024
 """Ray's minimum is 75 MiB; designs and results take kilobytes."""
@@ -35,7 +36,7 @@ _BEFORE_IMPORT: Final = {
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
 }
 
-_WORKER_ENVIRONMENT: Final = {
+WORKER_ENVIRONMENT: Final = {
     # The slots are the parallelism.
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -51,33 +52,58 @@ class RaySession:
 
     Attributes:
         ray: The module, imported by `open_ray`.
-        slots: CPUs of the cluster.
-        head: Where its control service listens, None where a proxy stands between.
+        slots: CPUs of the cluster, when it was opened.
+        head: Where its control service listens.
         directory: Files of an embedded cluster.
+        node: This process's own node of a cluster, where no other one runs on this machine.
     """
 
     ray: ModuleType
     slots: int
-    head: tuple[str, int] | None
+    head: tuple[str, int]
     directory: Path | None = None
-
-    def count_slots(self) -> int:
-        """CPUs that the cluster has now; nodes come and go."""
-        if self.directory is None:
-            self.slots = max(int(self.ray.cluster_resources().get("CPU", 0)), 1)
-        return self.slots
+    node: JoinedNode | None = None
 
     def head_answers(self) -> bool:
         """Whether the control service takes connections.
 
         Ray itself waits a minute for it and then ends the process, without a word to us.
         """
-        return self.head is None or _listens(*self.head)
+        return listens(*self.head)
+
+    def only_on(self, node_id: str) -> Any:
+        """How a task is scheduled on one node, and fails if that is gone.
+
+        Args:
+            node_id: Ray's.
+
+        Returns:
+            For the option `scheduling_strategy`.
+        """
+        from ray.util import scheduling_strategies  # noqa: PLC0415 - as in `open_ray`
+
+        return scheduling_strategies.NodeAffinitySchedulingStrategy(node_id, soft=False)
+
+    def near_head(self) -> Any:
+        """How an actor is scheduled on the head while there is one, as it outlives other nodes.
+
+        Returns:
+            For the option `scheduling_strategy`.
+        """
+        from ray.util import scheduling_strategies  # noqa: PLC0415 - as in `open_ray`
+
+        heads = [n for n in self.ray.nodes() if "node:__internal_head__" in n["Resources"]]
+        if not heads:
+            return "DEFAULT"
+        head = str(heads[0]["NodeID"])
+        return scheduling_strategies.NodeAffinitySchedulingStrategy(head, soft=True)
 
     def close(self) -> None:
         """Disconnect; an embedded cluster ends, and its files are removed. Idempotent."""
         with suppress(Exception):
             self.ray.shutdown()
+        if self.node is not None:
+            self.node.close()
         if self.directory is not None:
             shutil.rmtree(self.directory, ignore_errors=True)
 
@@ -89,7 +115,9 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
     process's signals stay as they are, here and when the session is closed.
 
     Args:
-        address: None to embed; `auto`, `host:port` or `ray://host:port` to connect.
+        address: None to embed. `host:port` of a cluster's head; this process becomes a node of the
+            cluster, without CPUs, unless one runs on this machine. `auto` for the cluster that
+            has a node here.
         cpus: Slots of an embedded cluster; all of this machine's by default.
 
     Returns:
@@ -118,21 +146,26 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
 
 
 def _connect(ray: ModuleType, address: str) -> RaySession:
-    host, _, port = address.removeprefix("ray://").rpartition(":")
-    if port.isdecimal() and not _listens(host.strip("[]"), int(port)):
+    host, _, port = address.rpartition(":")
+    if port.isdecimal() and not listens(host.strip("[]"), int(port)):
         # Ray would try for minutes, and so long nobody could see what is wrong.
         raise EvaluatorUnavailable(f"no Ray cluster listens at {address!r}; is it up?")
+    node = None
+    if port.isdecimal() and not runs_here(int(port)):
+        node = JoinedNode(address)
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
         slots = int(ray.cluster_resources().get("CPU", 0))
     except Exception as error:
         with suppress(Exception):
             ray.shutdown()
+        if node is not None:
+            node.close()
         raise EvaluatorUnavailable(
             f"no Ray cluster answers at {address!r}: {_first_line(error)}; check the address, and"
             " that RAY_AUTH_TOKEN is the cluster's"
         ) from error
-    return RaySession(ray, max(slots, 1), None if address.startswith("ray://") else _head(ray))
+    return RaySession(ray, max(slots, 1), _head(ray), node=node)
 
 
 def _embed(ray: ModuleType, cpus: int) -> RaySession:
@@ -150,7 +183,7 @@ def _embed(ray: ModuleType, cpus: int) -> RaySession:
     }
     try:
         # Workers inherit the environment that the cluster was started in.
-        with _environment(_WORKER_ENVIRONMENT | _import_path() | _token()):
+        with _environment(WORKER_ENVIRONMENT | _import_path() | _token()):
             ray.init(**options)
     except Exception as error:
         with suppress(Exception):
@@ -168,9 +201,16 @@ def _head(ray: ModuleType) -> tuple[str, int]:
     return host.strip("[]"), int(port)
 
 
-def _listens(host: str, port: int) -> bool:
+def listens(host: str, port: int, *, timeout: float = 2.0) -> bool:
+    """Whether anything takes connections at an address.
+
+    Args:
+        host: Name or address of a machine.
+        port: TCP port.
+        timeout: How long an answer may take [s].
+    """
     try:
-        with socket.create_connection((host, port), timeout=2.0):
+        with socket.create_connection((host, port), timeout=timeout):
             return True
     except OSError:
         return False

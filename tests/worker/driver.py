@@ -31,7 +31,7 @@ def main(ending: str) -> None:
         for process in descendants(os.getpid()):
             if "gcs_server" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
-        with patch("services.worker.ray_evaluator.PULSE_SECONDS", 0.3):
+        with patch("services.worker.cluster.pump.PULSE_SECONDS", 0.3):
             sys.stdout.write(f"{until_lost(evaluator)}\n")
         sys.stdout.write(f"{told_to_stop_while_reopening(evaluator)}\n")
         assert bits(evaluator.evaluate(request(2), never)) == walked

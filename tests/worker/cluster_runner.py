@@ -1,0 +1,131 @@
+"""A runner on a cluster, in a process of its own."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from io import StringIO
+from unittest.mock import patch
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from services.worker.cluster import nodes, pump, ray_nodes
+from services.worker.ray_evaluator import RayEvaluator
+from sim.case import Walk
+from sim.kernel.walk import Precision
+from sim.outcome import Objective, Outcome
+from sim.robot import RobotSource
+from tests.worker.requests import bits, never
+
+Bits = list[tuple[bytes, bytes]]
+
+_evaluator: RayEvaluator
+_log = StringIO()
+
+
+@dataclass(frozen=True, slots=True)
+class Sleep:
+    """A case that takes a minute and comes to nothing, in place of a walk."""
+
+    walk: Walk
+    name = "sleep"
+    duration = 1000.0
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        return self.walk.robots
+
+    @property
+    def precision(self) -> Precision:
+        return self.walk.precision
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        return self.walk.objectives
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        until = time.monotonic() + 60.0
+        while time.monotonic() < until:
+            time.sleep(0.01)  # at most so long a cancellation waits, as between steps of a search
+        raise AssertionError("it was not cancelled")
+
+
+def connect(address: str, patience: float = nodes.PATIENCE_SECONDS) -> None:
+    """patience: seconds to wait for a node."""
+    global _evaluator  # noqa: PLW0603 - the state of this process
+    ray_nodes.PATIENCE_SECONDS = pump.PATIENCE_SECONDS = patience  # type: ignore[misc]
+    # Ray lets workers import from where a driver was started, here a checkout.
+    os.chdir("/")
+    logging.getLogger("services").addHandler(logging.StreamHandler(_log))
+    _evaluator = RayEvaluator(address)
+    _evaluator.wait_until_open(never)
+
+
+def connect_from_elsewhere(address: str) -> None:
+    """As from a machine that is no node of the cluster."""
+    with patch("services.worker.ray_session.runs_here", lambda _port: False):
+        connect(address)
+
+
+def nodes_of_cluster() -> list[int]:
+    """CPUs of each node that is alive."""
+    import ray
+
+    return [int(n["Resources"].get("CPU", 0)) for n in ray.nodes() if n["Alive"]]
+
+
+def evaluate(request: EvaluationRequest) -> Bits:
+    return bits(_evaluator.evaluate(request, never))
+
+
+def why_not(request: EvaluationRequest) -> str:
+    """What is said of a request that cannot be walked now."""
+    try:
+        evaluate(request)
+    except EvaluatorUnavailable as error:
+        return str(error)
+    return "it was walked"
+
+
+def begin_and_stop(request: EvaluationRequest, seconds: float) -> str:
+    """Let a request go after some seconds."""
+    stop = threading.Event()
+    threading.Timer(seconds, stop.set).start()
+    try:
+        _evaluator.evaluate(request, stop.is_set)
+    except EvaluationStopped:
+        return "stopped"
+    return "not stopped"
+
+
+def slots() -> int:
+    return _evaluator.slots
+
+
+def least_slots(request: EvaluationRequest, seconds: float) -> int:
+    """The fewest slots that this runner had while it walked for some seconds."""
+    seen: list[int] = []
+    until = time.monotonic() + seconds
+
+    def look() -> bool:
+        seen.append(_evaluator.slots)
+        return time.monotonic() > until
+
+    with suppress(EvaluationStopped):
+        _evaluator.evaluate(request, look)
+    return min(seen)
+
+
+def logged() -> str:
+    return _log.getvalue()
+
+
+def disconnect() -> None:
+    _evaluator.close()

@@ -1,0 +1,84 @@
+"""Cases are put into the object store once a job, and read from there once a process."""
+
+from __future__ import annotations
+
+import pickle
+from types import ModuleType, SimpleNamespace
+from typing import Any, cast
+from unittest.mock import Mock, patch
+
+import pytest
+
+from services.worker.cluster.shared_cases import CaseShelf, run_sent, sent
+from services.worker.cutting import Part
+from services.worker.tasks import Answer, Task
+from sim.case import Case
+from tests.worker.requests import bits, request, walked_at_once
+
+WANTED = request(4)
+PARTS = (Part(1, 0, 2), Part(0, 1, 4))
+
+
+class Store:
+    """Ray's object store, as far as it is used."""
+
+    def __init__(self) -> None:
+        self.kept: list[bytes] = []
+        self.get = Mock(side_effect=lambda place: pickle.loads(self.kept[place]))  # noqa: S301
+
+    def put(self, value: object) -> int:
+        self.kept.append(pickle.dumps(value))
+        return len(self.kept) - 1
+
+
+@pytest.fixture
+def store() -> Store:
+    return Store()
+
+
+@pytest.fixture
+def shelf(store: Store) -> CaseShelf:
+    return CaseShelf(cast(ModuleType, store))
+
+
+def copied(cases: tuple[Case, ...]) -> tuple[Case, ...]:
+    """Equal ones, as the next iteration makes them."""
+    copies: tuple[Case, ...] = pickle.loads(pickle.dumps(cases))  # noqa: S301
+    return copies
+
+
+def test_cases_of_all_iterations_of_a_job_are_put_once(store: Store, shelf: CaseShelf) -> None:
+    places = {shelf.shared(cases).place for cases in (WANTED.cases, WANTED.cases, WANTED.cases[:])}
+    places |= {shelf.shared(copied(WANTED.cases)).place}
+    assert len(places) == len(store.kept) == 1
+    shelf.shared(WANTED.cases[:1])
+    assert len(store.kept) == 2
+
+
+def test_after_a_loss_they_are_put_anew(store: Store, shelf: CaseShelf) -> None:
+    before = shelf.shared(WANTED.cases)
+    shelf.forget()
+    after = shelf.shared(WANTED.cases)
+    assert len(store.kept) == 2
+    assert before.place != after.place
+
+
+def test_a_task_is_sent_without_cases_and_a_process_reads_them_once(
+    store: Store, shelf: CaseShelf
+) -> None:
+    chosen = [part.case for part in PARTS]
+    task = Task.of(WANTED.cases, WANTED.designs, PARTS, WANTED.provenance)
+    shared = shelf.shared(WANTED.cases[:])
+    carried = sent(task, chosen, shared)
+    assert carried.task.cases == ()
+    ray: Any = SimpleNamespace(get=store.get)
+    with patch.dict("sys.modules", ray=ray):
+        first, second = run_sent(carried), run_sent(carried)
+    assert store.get.call_count == 1
+    assert isinstance(first, Answer) and isinstance(second, Answer)
+    assert first.outcomes is not None and second.outcomes is not None
+    assert bits(first.outcomes) == bits(second.outcomes)
+    whole = walked_at_once(WANTED)
+    for part, outcome in zip(PARTS, first.outcomes, strict=True):
+        rows = whole[part.case].objectives[part.start : part.stop]
+        assert outcome.objectives.tobytes() == rows.tobytes()

@@ -67,8 +67,9 @@ class Pump:
             # Processes start and import while the caller still does other things.
             starting = [self._warm_up.remote() for _ in range(self._dispatcher.slots)]
         while not self._dispatcher.closed:
-            self._tend()
             self._send()
+            # After that, nodes with room have it because there is no more work.
+            self._tend()
             self._collect()
             self._cancel_dropped()
             self._feel_pulse()

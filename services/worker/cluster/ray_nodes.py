@@ -31,6 +31,9 @@ _PROBES: Final = 16
 _FIRST_LOOK_SECONDS: Final = 0.1
 """Until the next look while a new node is probed."""
 
+_LARGEST_DEMAND: Final = 64
+"""Further slots that an autoscaler is asked for at once, at most."""
+
 _KEPT: Final = 64
 """What a node is known to be prepared for, beyond what is wanted."""
 
@@ -84,7 +87,9 @@ class ClusterNodes:
         self._here = Introduction.of(introducer()())
         self._introduce = session.ray.remote(num_cpus=0, max_retries=0)(introducer())
         self._prepare = session.ray.remote(num_cpus=0, max_retries=0)(prepare_node)
-        self._demand: Any = None
+        self._any_cpu = session.ray.remote(num_cpus=1, max_retries=0)(introducer())
+        self._demand: list[Any] = []
+        self._next_demand = 0.0
         self._needs: dict[Wanted, Any] = {}
         self._nodes: dict[str, Node] = {}
         self._probes = ThreadPoolExecutor(_PROBES, thread_name_prefix="ray-probe")
@@ -297,10 +302,20 @@ class ClusterNodes:
                 ready.set_exception(error)
 
     def _show_demand(self, wanted: tuple[Wanted, ...]) -> None:
-        """A task that waits for a CPU, by which an autoscaler sees that there is none."""
-        if wanted and not self._nodes and self._demand is None:
-            self._demand = self._introduce.options(num_cpus=1).remote()
-        elif self._nodes and self._demand is not None:
-            with suppress(self._ray.exceptions.RayError):
-                self._ray.cancel(self._demand)
-            self._demand = None
+        """Tasks that any node may run, by which an autoscaler sees that more slots would be used.
+
+        It leaves out those that are sent to one node.
+        """
+        if self._demand:
+            _, self._demand = self._ray.wait(
+                self._demand, num_returns=len(self._demand), timeout=0.0
+            )
+        if not wanted or any(node.room > 0.0 for node in self._nodes.values()):
+            for reference in self._demand:
+                with suppress(self._ray.exceptions.RayError):
+                    self._ray.cancel(reference)
+            self._demand = []
+        elif time.monotonic() >= self._next_demand:
+            self._next_demand = time.monotonic() + LOOK_SECONDS
+            lacking = min(max(self.slots, 1), _LARGEST_DEMAND) - len(self._demand)
+            self._demand += [self._any_cpu.remote() for _ in range(lacking)]

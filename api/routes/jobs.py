@@ -303,9 +303,9 @@ def cancel_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     summary="Protect a job from deletion",
     responses=problems(403, 404, 422),
 )
-def keep_job(job_id: JobId, service: Service) -> JobView:
+def keep_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     """A job that is kept cannot be deleted, and stays however long ago it ended."""
-    return _in_full(service, service.keep(job_id, kept=True))
+    return _in_full(service, service.keep(job_id, kept=True, actor=actor))
 
 
 @router.delete(
@@ -315,9 +315,9 @@ def keep_job(job_id: JobId, service: Service) -> JobView:
     summary="Let a job be deleted again",
     responses=problems(403, 404, 422),
 )
-def release_job(job_id: JobId, service: Service) -> JobView:
+def release_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     """A server with a time of retention deletes it when it ended longer ago than that."""
-    return _in_full(service, service.keep(job_id, kept=False))
+    return _in_full(service, service.keep(job_id, kept=False, actor=actor))
 
 
 @router.delete(
@@ -329,7 +329,7 @@ def release_job(job_id: JobId, service: Service) -> JobView:
     response_description="The job is gone.",
     responses=problems(403, 404, 409, 422),
 )
-def delete_job(job_id: JobId, service: Service) -> None:
+def delete_job(job_id: JobId, service: Service, actor: Actor) -> None:
     """Delete a job with its iterations and evaluations; nothing brings them back.
 
     Forks of it have copies of what they took over, certificates of its designs are jobs of their
@@ -337,7 +337,7 @@ def delete_job(job_id: JobId, service: Service) -> None:
     event `deleted`. 409 for a job that has not ended and is not paused, which can be cancelled
     first, and for one that is kept.
     """
-    service.delete(job_id)
+    service.delete(job_id, actor=actor)
 
 
 def _in_full(service: JobService, job: Job) -> JobView:

@@ -40,6 +40,24 @@ def test_what_is_done_to_a_job_is_noted_with_who_and_when(store: SqlStore, clock
     assert [e.at for e in store.audit().items[::-1]] == [begun_at] + [clock.now] * 4
 
 
+def test_deletions_are_noted_and_stay_so_when_the_job_is_gone(
+    store: SqlStore, clock: Clock
+) -> None:
+    job, old = (store.create_job(spec())[0].id for _ in range(2))
+    for one in (job, old):
+        store.command(one, Command.CANCEL)
+    store.keep(job, True, actor="ann")
+    store.keep(job, False)
+    store.delete_job(job, actor="ann")
+    clock.advance(60.0)
+    assert store.delete_ended_before(clock.now) == (old,)
+    assert [entry[:2] for entry in noted(store, job_id=job)][2:] == [
+        *(("ann", "keep"), ("local", "release"), ("ann", "delete")),
+    ]
+    assert noted(store, job_id=old)[-1] == ("retention", "delete", old, {})
+    assert store.queue().jobs[JobState.CANCELLED] == 0
+
+
 def test_a_request_that_is_repeated_is_noted_once(store: SqlStore) -> None:
     store.create_job(spec(), idempotency_key="k", owner="ci")
     store.create_job(spec(), idempotency_key="k", owner="ci")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -23,13 +23,15 @@ from gaitswarm.views.verification import (
     HistoryVerificationView,
     VerificationRequest,
 )
-from services.optimizer.analysis.verification import HistoryCheck, check_history
 from services.optimizer.errors import NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.estimate import duration
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.service import JobService
+
+if TYPE_CHECKING:
+    from services.optimizer.analysis.verification import HistoryCheck
 
 SHOWN: Final = 100
 """Differences that are listed."""
@@ -59,6 +61,9 @@ def run_verification(
         Conflict: Walks are asked for of a job whose spec cannot be read.
         EvaluatorUnavailable: Walks cannot be run here.
     """
+    # It brings in the database.
+    from services.optimizer.analysis.verification import check_history
+
     job = service.job(job_id)
     seed = secrets.randbelow(1 << 32) if request.seed is None else request.seed
     history = check_history(service.store, job, head=request.head)

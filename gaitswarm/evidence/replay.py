@@ -13,7 +13,6 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.run.evaluator import EvaluationRequest
-from services.runtime import open_evaluator
 from sim.identification.recorded_walk import Recordings
 from sim.mujoco.engines import ENGINE
 from sim.outcome import Outcome, Status
@@ -76,6 +75,8 @@ def simulated_differences(
     Raises:
         SimulationInputError: A design cannot be simulated.
     """
+    from services.runtime import open_evaluator
+
     found: list[DifferenceView] = []
     with closing(open_evaluator("in-process")) as evaluator:
         for spec, columns in tables:

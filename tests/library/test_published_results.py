@@ -60,8 +60,8 @@ def test_optima_a_and_b_are_among_the_best_twentieth_of_random_designs() -> None
     }
     walked = gaitswarm.simulate(designs)
     failed = walked.statuses != Status.OK
-    for row, (preference, weights) in zip((-2, -1), list(PREFERENCES.items())[:2], strict=True):
-        fitness = judge(walked.objectives, failed, weights).fitness
+    for preference, row in ((PREFERENCES["A"], -2), (PREFERENCES["B"], -1)):
+        fitness = judge(walked.objectives, failed, preference).fitness
         better = int((fitness[:RANDOM_DESIGNS] < fitness[row]).sum())
         assert better / RANDOM_DESIGNS <= 0.05, preference
 

@@ -78,6 +78,9 @@ def simulated_differences(
     from services.runtime import open_evaluator
 
     found: list[DifferenceView] = []
+    # What only reads need not wait for a database's packages.
+    from services.runtime import open_evaluator
+
     with closing(open_evaluator("in-process")) as evaluator:
         for spec, columns in tables:
             request = EvaluationRequest(

@@ -170,9 +170,7 @@ class JobSummaryView(View):
         description="Name of the token that it was submitted with; null for none.",
         examples=["ci"],
     )
-    kept: bool = Field(
-        default=False, description="Whether it is protected from deletion, however old it is."
-    )
+    kept: bool = Field(default=False, description="Whether it is protected from deletion.")
     created_at: datetime = Field(description="When it was submitted, UTC.")
     updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from datetime import datetime
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from services.optimizer.access import Tokens
@@ -11,7 +10,6 @@ from services.optimizer.jobs.audit import LOCAL, AuditEntry
 from services.optimizer.jobs.fork import Fork
 from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import (
-    ENDED,
     QUARANTINE_AFTER,
     Claim,
     Command,
@@ -22,11 +20,12 @@ from services.optimizer.jobs.job import (
 from services.optimizer.jobs.notification import Outbox
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.deletions import Deletions
 from services.optimizer.store.reading import Changes, CommittedHistory, Page, Queue
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
-class Store(CommittedHistory, Protocol):
+class Store(CommittedHistory, Deletions, Protocol):
     """Thread-safe. Every method is one transaction: it happens wholly or not at all.
 
     Methods that take an id raise NotFound for an unknown one. Methods that take a claim raise
@@ -194,56 +193,6 @@ class Store(CommittedHistory, Protocol):
             InvalidRequest: The budget is spent already, or a job of this kind and method cannot
                 have it.
             Unreadable: The job's spec cannot be read.
-        """
-
-    def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
-        """Protect a job from deletion, or release it.
-
-        Args:
-            job_id: Of the job.
-            kept: Whether it is protected.
-            actor: Whom the audit log is to name.
-
-        Returns:
-            The job as it is then.
-        """
-
-    def delete_job(self, job_id: str, *, actor: str = LOCAL) -> None:
-        """Delete a job with all that it has committed.
-
-        It is gone for everybody when this returns, and its idempotency key is free. Rows of a long
-        job are removed by `purge_deleted`. Forks have copies of theirs, and stay.
-
-        Args:
-            job_id: Of the job.
-            actor: Whom the audit log is to name.
-
-        Raises:
-            Conflict: It has not ended and is not paused, or is kept.
-        """
-
-    def delete_ended_before(
-        self, moment: datetime, states: Collection[JobState] = ENDED
-    ) -> tuple[str, ...]:
-        """Delete jobs that ended long ago, as `delete_job` does.
-
-        Those that are kept stay, and parents of forks that have not ended.
-
-        Args:
-            moment: Jobs that ended before this time, aware, are deleted.
-            states: In which they ended.
-
-        Returns:
-            Their ids.
-        """
-
-    def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
-        """Remove what is left of deleted jobs, in many short transactions.
-
-        It may be called by several processes at once, and is gone on with by any later call.
-
-        Args:
-            should_stop: Asked between transactions; the rest is left when it says so.
         """
 
     def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:

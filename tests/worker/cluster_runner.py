@@ -60,7 +60,8 @@ class Sleep:
 def connect(address: str, patience: float = nodes.PATIENCE_SECONDS) -> None:
     """patience: seconds to wait for a node."""
     global _evaluator  # noqa: PLW0603 - the state of this process
-    ray_nodes.PATIENCE_SECONDS = pump.PATIENCE_SECONDS = patience  # type: ignore[misc]
+    for module in (ray_nodes, pump):
+        vars(module)["PATIENCE_SECONDS"] = patience
     # Ray lets workers import from where a driver was started, here a checkout.
     os.chdir("/")
     logging.getLogger("services").addHandler(logging.StreamHandler(_log))
@@ -78,7 +79,7 @@ def nodes_of_cluster() -> list[int]:
     """CPUs of each node that is alive."""
     import ray
 
-    return [int(n["Resources"].get("CPU", 0)) for n in ray.nodes() if n["Alive"]]
+    return [int(n["Resources"].get("CPU", 0)) for n in ray.nodes() if n["Alive"]]  # type: ignore[no-untyped-call]
 
 
 def evaluate(request: EvaluationRequest) -> Bits:

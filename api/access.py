@@ -8,88 +8,108 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Annotated, Final
 
 from anyio.to_thread import run_sync
-from fastapi import Depends, Request
+from fastapi import Depends, Request, Response
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from api.dependencies import ExistingJob
-from api.problems import problem, unauthorized
+from api.dependencies import ExistingJob, ServerSettings
+from api.problems import problem, too_many_requests, unauthorized
+from api.rates import RequestRate, address_of, is_local
 from gaitswarm.views import PREFIX
 from services.optimizer.access import Scope as TokenScope
 from services.optimizer.access import Token, Tokens
 from services.optimizer.errors import Forbidden, StoreUnavailable
 from services.optimizer.jobs.audit import LOCAL
+from services.optimizer.jobs.quota import Quota
 
 COOKIE: Final = "gaitswarm-token"
 """Of browsers, which cannot send a header with a link or an event stream."""
 
-_OPEN: Final = frozenset(f"{PREFIX}/{name}" for name in ("healthz", "readyz", "session"))
-"""For load balancers, and for whoever has yet to say who they are."""
+_PROBES: Final = frozenset(f"{PREFIX}/{name}" for name in ("healthz", "readyz"))
+"""For load balancers, which must not wait behind a flood of others' requests."""
+
+_SESSION: Final = f"{PREFIX}/session"
+"""For whoever has yet to say who they are."""
+
+_UNKNOWN: Final = (
+    "the token is unknown or was revoked; `gaitswarm token create NAME` makes a new one"
+)
+_NONE: Final = (
+    "this server asks for a token: send `Authorization: Bearer TOKEN`, or set GAITSWARM_TOKEN; its"
+    " owner makes one with `gaitswarm token create NAME`"
+)
 
 REMEMBERED_SECONDS: Final = 5.0
 _MOST_REMEMBERED: Final = 1024
 
 
 class AccessMiddleware:
-    """Finds the token of every request under /v1, and refuses those without one.
+    """Finds the token of every request under /v1, and refuses those without one, and too many.
 
     `request.state.token` is what it found: None where none is required and none was given. A token
     that is not valid is refused, whether one is required or not. Tokens are remembered for a few
     seconds, so that one that was revoked is refused after these.
+
+    Requests are counted by their token; those whose token is not remembered by their address,
+    before anything is looked up. Where no token is required, those of this machine are not counted.
     """
 
-    def __init__(self, app: ASGIApp, tokens: Callable[[], Tokens], *, required: bool) -> None:
+    def __init__(
+        self, app: ASGIApp, tokens: Callable[[], Tokens], rate: RequestRate, *, required: bool
+    ) -> None:
         """Take on the memory of tokens.
 
         Args:
             app: answers what is not refused.
             tokens: gives the memory; called only for a request with a token.
+            rate: how often each asker may ask.
             required: whether requests without a token are refused.
         """
         self.app = app
         self.required = required
         self._tokens = tokens
+        self._rate = rate
         self._remembered: dict[str, tuple[float, Token]] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One ASGI exchange."""
         path = scope.get("path", "").removeprefix(scope.get("root_path", ""))
-        if scope["type"] != "http" or not path.startswith(f"{PREFIX}/") or path in _OPEN:
+        if scope["type"] != "http" or not path.startswith(f"{PREFIX}/") or path in _PROBES:
             await self.app(scope, receive, send)
             return
-        secret = secret_of(Headers(scope=scope))
-        token = None
-        if secret is not None:
-            try:
-                token = await self._find(secret)
-            except StoreUnavailable as error:
-                response = problem(scope["path"], 503, "unavailable", str(error))
-                await response(scope, receive, send)
-                return
-        if token is None and (secret is not None or self.required):
-            detail = (
-                "the token is unknown or was revoked; `gaitswarm token create NAME` makes a new one"
-                if secret is not None
-                else "this server asks for a token: send `Authorization: Bearer TOKEN`, or set"
-                " GAITSWARM_TOKEN; its owner makes one with `gaitswarm token create NAME`"
-            )
-            response = unauthorized(scope["path"], detail)
-            await response(scope, receive, send)
-            return
-        scope.setdefault("state", {})["token"] = token
-        await self.app(scope, receive, send)
+        try:
+            response = await self._refusal(scope, path)
+        except StoreUnavailable as error:
+            response = problem(scope["path"], 503, "unavailable", str(error))
+        await (response or self.app)(scope, receive, send)
 
-    async def _find(self, secret: str) -> Token | None:
-        now = time.monotonic()
-        until, remembered = self._remembered.get(secret, (now, None))
-        if until > now:
-            return remembered
+    async def _refusal(self, scope: Scope, path: str) -> Response | None:
+        """The answer to a request that is not let through; the others know who asks then."""
+        secret, address = secret_of(Headers(scope=scope)), address_of(scope)
+        until, known = self._remembered.get(secret or "", (0.0, None))
+        # Others at the same address may be guessing: whoever had a token is not counted with them.
+        asker = address if known is None else f"token {known.name}"
+        if self.required or secret is not None or not is_local(address):
+            seconds = self._rate.seconds_to_wait(asker)
+            if seconds > 0.0:
+                return too_many_requests(scope["path"], seconds)
+        token = known if until > time.monotonic() else None
+        if path != _SESSION:
+            if token is None and secret is not None:
+                token = await self._look_up(secret)
+            if token is None and (secret is not None or self.required):
+                return unauthorized(scope["path"], _NONE if secret is None else _UNKNOWN)
+        asker = address if token is None else f"token {token.name}"
+        scope.setdefault("state", {}).update(token=token, asker=asker)
+        return None
+
+    async def _look_up(self, secret: str) -> Token | None:
         token = await run_sync(self._tokens().find, secret)
         self._remembered.pop(secret, None)
         if token is not None:
             if len(self._remembered) >= _MOST_REMEMBERED:
                 self._remembered.clear()
-            self._remembered[secret] = (now + REMEMBERED_SECONDS, token)
+            self._remembered[secret] = (time.monotonic() + REMEMBERED_SECONDS, token)
         return token
 
 
@@ -176,6 +196,24 @@ async def may_administer(token: Asking) -> None:
 
 
 Owner = Annotated[str | None, Depends(may_submit)]
+
+
+async def quota_of(token: Asking, settings: ServerSettings) -> Quota | None:
+    """What the unfinished jobs of an owner may come to.
+
+    Args:
+        token: of the request; one of scope `admin` may do more.
+        settings: with the limits.
+
+    Returns:
+        The limits; None for none.
+    """
+    if token is not None and token.scope is TokenScope.ADMIN:
+        return None
+    return Quota(settings.api_max_unfinished_jobs, settings.api_max_unfinished_seconds)
+
+
+OwnersQuota = Annotated[Quota | None, Depends(quota_of)]
 
 
 def may_command(job: ExistingJob, token: Asking) -> None:

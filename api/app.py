@@ -16,6 +16,7 @@ from api.dependencies import Component, lifespan
 from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
 from api.middleware import (
     BodyLimitMiddleware,
+    HeaderLimitMiddleware,
     RequestIdMiddleware,
     SecurityHeadersMiddleware,
 )
@@ -23,6 +24,7 @@ from api.monitoring import MetricsMiddleware, add_metrics
 from api.origin import HostMiddleware, SameOriginMiddleware, names_of_server
 from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
+from api.rates import RequestRate
 from api.routes import (
     analysis,
     audit,
@@ -123,11 +125,15 @@ def create_app(
         GZipMiddleware, minimum_size=1024, compresslevel=6, exclude_content_types=_UNCOMPRESSED
     )
     app.add_middleware(
-        AccessMiddleware, tokens=lambda: service.store.tokens, required=settings.tokens_required
+        AccessMiddleware,
+        tokens=lambda: service.store.tokens,
+        rate=RequestRate(settings.api_request_rate, settings.api_request_burst),
+        required=settings.tokens_required,
     )
     allowed = settings.api_allowed_hosts
     app.add_middleware(SameOriginMiddleware, allowed=allowed)
     app.add_middleware(HostMiddleware, names=names_of_server(settings.api_host, allowed))
+    app.add_middleware(HeaderLimitMiddleware, max_bytes=settings.api_max_header_bytes)
     app.add_middleware(RequestIdMiddleware)
     app.add_middleware(MetricsMiddleware, metrics=metrics)
     # The outermost: an answer to a bug has the headers too.

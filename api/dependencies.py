@@ -13,6 +13,7 @@ from anyio.to_thread import run_sync
 from fastapi import Depends, FastAPI, Path, Query, Request
 from pydantic import Field
 
+from api.rates import OpenStreams
 from api.topics import Topics
 from gaitswarm.settings import Settings
 from services.monitoring.metrics import Metrics
@@ -80,7 +81,8 @@ class State(TypedDict):
 
     validations: threads that validate bodies. draining: set by the server on the first signal to
     end; it still answers then. stopping: set when it begins to stop; event streams end then.
-    topics: jobs that these streams follow. components: parts of the process beside the database.
+    topics: jobs that these streams follow. streams: that are open, by asker. components: parts of
+    the process beside the database.
     metrics: of this process.
     """
 
@@ -89,6 +91,7 @@ class State(TypedDict):
     slots: SimulationSlots
     validations: anyio.CapacityLimiter
     draining: asyncio.Event
+    streams: OpenStreams
     stopping: asyncio.Event
     topics: Topics
     components: Sequence[Component]
@@ -127,6 +130,7 @@ def lifespan(
             stopping=stopping,
             topics=topics,
             components=components,
+            streams=OpenStreams(settings.api_max_streams),
             metrics=metrics,
         )
         waking.cancel()
@@ -159,6 +163,22 @@ async def slots(request: Request) -> SimulationSlots:
         request: under way.
     """
     return cast(SimulationSlots, request.state.slots)
+
+
+async def counted_stream(request: Request) -> AsyncIterator[None]:
+    """A stream of whoever asks, until its answer has ended.
+
+    Args:
+        request: under way.
+
+    Yields:
+        Nothing.
+
+    Raises:
+        TooManyRequests: the asker has as many open as may be.
+    """
+    with cast(OpenStreams, request.state.streams).one_of(request.state.asker):
+        yield
 
 
 async def stopping(request: Request) -> asyncio.Event:

@@ -59,9 +59,11 @@ _MEANING: Final = {
     401: "A token is asked for, or the one that was sent is not valid.",
     403: "The token does not allow this, or a page of another origin asks for it.",
     404: "No such job, or nothing of that kind in it yet.",
-    409: "The job's state does not allow it, or the idempotency key belongs to another request.",
+    409: "The job's state does not allow it, the idempotency key belongs to another request, or its"
+    " owner has too many unfinished jobs.",
     413: "The body is too large.",
     422: "A field is not valid; `errors` names it.",
+    429: "Too many requests with this token or from this address; `Retry-After` says when.",
     500: "A bug on the server; the log names the cause under the request id.",
     503: "The database or the simulator cannot answer now; try again later.",
 }
@@ -88,7 +90,8 @@ def problems(*statuses: int, asks: bool = True) -> Responses:
 
     Args:
         statuses: its HTTP statuses of problems; 500 and 503 go without saying.
-        asks: whether the route asks for a token where the server does, which can be 401.
+        asks: whether the route asks for a token where the server does, which can be 401; how often
+            it is asked is limited then, which can be 429.
 
     Returns:
         The route's `responses`.
@@ -97,7 +100,7 @@ def problems(*statuses: int, asks: bool = True) -> Responses:
     content = {MEDIA_TYPE: {"schema": {"$ref": f"{_SCHEMAS}{ProblemView.__name__}"}}}
     return {
         status: {"description": _MEANING[status], "content": content}
-        for status in (*statuses, *((401,) if asks else ()), 500, 503)
+        for status in (*statuses, *((401, 429) if asks else ()), 500, 503)
     }
 
 

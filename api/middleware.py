@@ -14,7 +14,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from api.problems import internal_error, problem
+from api.problems import MOST_HEADERS, headers_too_large, internal_error, problem
 from services.optimizer.errors import GaitswarmError
 from services.optimizer.log_context import log_context
 
@@ -73,6 +73,28 @@ def _expected(error: Exception) -> GaitswarmError | None:
     """What was raised on purpose; Starlette wraps what it can no longer answer."""
     found = error if isinstance(error, GaitswarmError) else error.__cause__
     return found if isinstance(found, GaitswarmError) else None
+
+
+class HeaderLimitMiddleware:
+    """Refuses requests with very many or very long headers, or a very long path, with a problem.
+
+    Heads that do not come in one piece are refused before, by `api.connections`.
+    """
+
+    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+        self.app = app
+        self.max_bytes = max_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One ASGI exchange."""
+        answer = self.app
+        if scope["type"] == "http":
+            headers = scope["headers"]
+            size = len(scope.get("raw_path") or b"") + len(scope["query_string"])
+            size += sum(len(name) + len(value) for name, value in headers)
+            if len(headers) > MOST_HEADERS or size > self.max_bytes:
+                answer = headers_too_large(self.max_bytes)
+        await answer(scope, receive, send)
 
 
 class BodyLimitMiddleware:

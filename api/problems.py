@@ -11,9 +11,14 @@
 | NotFound; no such route                       | 404    | not-found             |
 | Conflict, LeaseLost                           | 409    | conflict              |
 | IdempotencyConflict                           | 409    | idempotency-conflict  |
+| QuotaExceeded                                 | 409    | quota-exceeded        |
 | Unreadable                                    | 409    | unreadable            |
+| a request that takes too long to come         | 408    | too-slow              |
 | a body over the limit                         | 413    | body-too-large        |
 | a name of the server that is not its own      | 421    | unknown-host          |
+| a head over the limits                        | 431    | headers-too-large     |
+| what is no request of HTTP                    | 400    | malformed-request     |
+| TooManyRequests; too many by token or address | 429    | too-many-requests     |
 | StoreUnavailable, EvaluatorUnavailable,       | 503    | unavailable           |
 | SimulationError, too many simulations         |        |                       |
 | /v1/readyz of a server that was told to end   | 503    | draining              |
@@ -23,6 +28,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any, Final, cast
@@ -42,7 +48,9 @@ from services.optimizer.errors import (
     InvalidRequest,
     LeaseLost,
     NotFound,
+    QuotaExceeded,
     StoreUnavailable,
+    TooManyRequests,
     Unauthorized,
     Unreadable,
 )
@@ -75,9 +83,14 @@ _TITLES: Final = {
     "method-not-allowed": "The method is not allowed here",
     "conflict": "The present state does not allow it",
     "idempotency-conflict": "The idempotency key was used for another request",
+    "quota-exceeded": "The owner has too much under way",
     "unreadable": "This version cannot read the job",
+    "malformed-request": "This is no request",
+    "too-slow": "The request took too long to come",
+    "headers-too-large": "The head of the request is too large",
     "body-too-large": "The body is too large",
     "unknown-host": "The server does not go by this name",
+    "too-many-requests": "Whoever asks does so too often",
     "unavailable": "The service cannot do it now",
     "draining": "The server is ending",
     "internal-error": "Something went wrong on the server",
@@ -89,6 +102,7 @@ _KINDS: Final[tuple[tuple[type[Exception], HTTPStatus, str], ...]] = (
     (Unauthorized, HTTPStatus.UNAUTHORIZED, "unauthorized"),
     (Forbidden, HTTPStatus.FORBIDDEN, "forbidden"),
     (IdempotencyConflict, HTTPStatus.CONFLICT, "idempotency-conflict"),
+    (QuotaExceeded, HTTPStatus.CONFLICT, "quota-exceeded"),
     (Unreadable, HTTPStatus.CONFLICT, "unreadable"),
     (Conflict, HTTPStatus.CONFLICT, "conflict"),
     (LeaseLost, HTTPStatus.CONFLICT, "conflict"),
@@ -179,6 +193,45 @@ def unavailable(
     return problem(request_path, status, kind, detail, errors=errors, headers=_RETRY)
 
 
+def too_many_requests(request_path: str, seconds: float, detail: str | None = None) -> Response:
+    """Answer whoever asks too often.
+
+    Args:
+        request_path: path that was asked for.
+        seconds: after which it is worth asking again [s].
+        detail: what went wrong and what to do about it; None: too many requests.
+
+    Returns:
+        The response, which says in `Retry-After` when to come back.
+    """
+    wait = max(1, math.ceil(seconds))
+    text = (
+        detail or f"there are too many requests with this token or from this address; wait {wait} s"
+    )
+    headers = {"Retry-After": str(wait)}
+    return problem(request_path, 429, "too-many-requests", text, headers=headers)
+
+
+MOST_HEADERS: Final = 100
+"""Of a request; browsers and proxies send some twenty."""
+
+
+def headers_too_large(most_bytes: int) -> Response:
+    """Answer a request whose head is too large, of which nothing is quoted.
+
+    Args:
+        most_bytes: that it may have [B].
+
+    Returns:
+        The response.
+    """
+    detail = (
+        f"the head of the request has more than {MOST_HEADERS} headers or {most_bytes} bytes; send"
+        " fewer, and what is long in the body"
+    )
+    return problem("/", 431, "headers-too-large", detail)
+
+
 def internal_error(request_path: str, request_id: str) -> Response:
     """Answer a bug: nothing of the inside is shown, but how to report it is.
 
@@ -211,13 +264,15 @@ def add_problem_handlers(app: FastAPI) -> None:
 
 
 async def _on_domain_error(request: Request, error: Exception) -> Response:
+    if isinstance(error, TooManyRequests):
+        return too_many_requests(request.url.path, error.retry_after, str(error))
     found = next((row for row in _KINDS if isinstance(error, row[0])), None)
     if found is None:
         raise error
     _, status, name = found
     detail = str(error)
     errors = []
-    if isinstance(error, InvalidRequest):
+    if isinstance(error, InvalidRequest | QuotaExceeded):
         message = detail.removeprefix(f"{error.field}: ")
         errors = [_short(FieldErrorView(field=error.field, message=message))]
     elif isinstance(error, SimulationInputError):

@@ -72,6 +72,7 @@ def exit_code(error: BaseException) -> ExitCode | None:
         (errors.Forbidden, ExitCode.FORBIDDEN),
         (errors.EvaluatorUnavailable, ExitCode.UNAVAILABLE),
         (errors.StoreUnavailable, ExitCode.UNAVAILABLE),
+        (errors.TooManyRequests, ExitCode.UNAVAILABLE),
         (SimulationError, ExitCode.UNAVAILABLE),
     )
     if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:

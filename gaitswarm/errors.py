@@ -5,6 +5,7 @@ GaitswarmError              everything that gaitswarm raises on purpose
 ├── NotFound                no job, iteration, recording or result of that id
 ├── Conflict                not possible in the job's present state
 │   ├── ProvenanceChanged   its numbers would depend on something else than those it has
+│   ├── QuotaExceeded       the server lets whoever asks have no more unfinished jobs
 │   ├── Unreadable          this version cannot read what is stored of the job; it stays as it is
 │   └── IdempotencyConflict the key was used before for another job
 ├── Forbidden               the server does not let whoever asks do that
@@ -12,6 +13,7 @@ GaitswarmError              everything that gaitswarm raises on purpose
 ├── JobEnded                the job that was waited for did not succeed; `job` says why
 ├── LeaseLost               another process, or a cancellation, has taken the job
 └── Unavailable             not possible now, whatever was asked; try again later
+    ├── TooManyRequests     the server is asked too often by whoever asks
     ├── EvaluatorUnavailable    the workers or the compiler cannot be used
     └── StoreUnavailable        the database or the server cannot be reached
 
@@ -35,7 +37,9 @@ from services.optimizer.errors import (
     LeaseLost,
     NotFound,
     ProvenanceChanged,
+    QuotaExceeded,
     StoreUnavailable,
+    TooManyRequests,
     Unauthorized,
     Unavailable,
     Unreadable,
@@ -126,7 +130,9 @@ __all__ = [
     "LeaseLost",
     "NotFound",
     "ProvenanceChanged",
+    "QuotaExceeded",
     "StoreUnavailable",
+    "TooManyRequests",
     "Unauthorized",
     "Unavailable",
     "Unreadable",

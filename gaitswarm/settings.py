@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from ipaddress import ip_address
+from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from services.optimizer.errors import InvalidRequest, StoreUnavailable
@@ -19,6 +19,13 @@ LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidat
 
 
 HostName = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+(:[0-9]{1,5})?$")]
+
+
+def _network(text: str) -> str:
+    return str(ip_network(text, strict=False)) if "/" in text else str(ip_address(text))
+
+
+Network = Annotated[str, AfterValidator(_network)]
 
 
 def _parts(value: object) -> object:
@@ -156,6 +163,49 @@ class Settings(BaseSettings):
         default=1e10,
         gt=0.0,
         description="Longest job that is taken, all walks of all designs added [s].",
+    )
+    api_request_rate: float = Field(
+        default=100.0,
+        gt=0.0,
+        description="Requests with one token, or from one address, that are answered a second.",
+    )
+    api_request_burst: int = Field(
+        default=1000, ge=1, description="Of these requests, those that may come at once."
+    )
+    api_max_streams: int = Field(
+        default=256, ge=1, description="Event streams that one token or address may have open."
+    )
+    api_max_unfinished_jobs: int = Field(
+        default=10_000, ge=1, description="Jobs of one owner that may be queued, running or paused."
+    )
+    api_max_unfinished_seconds: float = Field(
+        default=1e11,
+        gt=0.0,
+        description="Simulated time that these jobs may come to, all walks of all designs added"
+        " [s].",
+    )
+    api_max_connections: int = Field(
+        default=512, ge=1, description="Connections that may be open; more are told to come later."
+    )
+    api_max_client_connections: int = Field(
+        default=256, ge=1, description="The same for one address, but of a trusted proxy."
+    )
+    api_max_header_bytes: int = Field(
+        default=32_768, ge=1024, le=1 << 20, description="Largest head of a request [B]."
+    )
+    api_head_seconds: float = Field(
+        default=10.0, gt=0.0, description="How long a client may take to send a request's head [s]."
+    )
+    api_body_seconds: float = Field(
+        default=60.0, gt=0.0, description="How long a client may take to send a request's body [s]."
+    )
+    api_idle_seconds: int = Field(
+        default=15, ge=1, description="How long a connection stays open between requests [s]."
+    )
+    api_trusted_proxies: Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_parts)] = Field(
+        default=("127.0.0.1", "::1"),
+        description="Addresses or networks of proxies, whose word is taken for who asks and by"
+        " which scheme.",
     )
     api_shutdown_seconds: int = Field(
         default=5, ge=1, le=600, description="How long open requests may finish on shutdown [s]."

@@ -7,7 +7,7 @@ from collections.abc import AsyncGenerator, AsyncIterable
 from typing import Annotated, Final
 
 import anyio
-from fastapi import APIRouter, Header, Query
+from fastapi import APIRouter, Depends, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from api.dependencies import (
@@ -19,6 +19,7 @@ from api.dependencies import (
     ServerSettings,
     Service,
     Stopping,
+    counted_stream,
 )
 from api.documentation import problems
 from api.topics import Topic
@@ -52,6 +53,7 @@ _LONGEST_WAIT: Final = 60.0
 
 @router.get(
     "/events",
+    dependencies=[Depends(counted_stream)],
     operation_id="stream_events",
     summary="Follow a job",
     response_class=EventSourceResponse,

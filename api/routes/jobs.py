@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
-from api.access import Actor, Owner, may_command
+from api.access import Actor, Owner, OwnersQuota, may_command
 from api.bodies import validated
 from api.dependencies import JobId, JobIdText, ServerSettings, Service, Slots
 from api.documentation import problems
@@ -96,6 +96,7 @@ def submit_job(
     service: Service,
     response: Response,
     owner: Owner,
+    quota: OwnersQuota,
     sent: Annotated[Any, Depends(request_document)],
     notify: NotifyUrl,
     idempotency_key: IdempotencyKey = None,
@@ -107,7 +108,12 @@ def submit_job(
     presets have changed since; a body that asks for another job answers 409.
     """
     job, new = service.submit(
-        spec, idempotency_key=idempotency_key, request=sent, owner=owner, notify_url=notify
+        spec,
+        idempotency_key=idempotency_key,
+        request=sent,
+        owner=owner,
+        notify_url=notify,
+        quota=quota,
     )
     if not new:
         response.status_code = status.HTTP_200_OK
@@ -135,6 +141,7 @@ def fork_job(
     service: Service,
     response: Response,
     owner: Owner,
+    quota: OwnersQuota,
     sent: Annotated[Any, Depends(request_document)],
     notify: NotifyUrl,
     idempotency_key: IdempotencyKey = None,
@@ -154,6 +161,7 @@ def fork_job(
         sent=sent,
         owner=owner,
         notify_url=notify,
+        quota=quota,
     )
     if not new:
         response.status_code = status.HTTP_200_OK
@@ -245,6 +253,7 @@ def resume_job(
     job_id: JobId,
     service: Service,
     actor: Actor,
+    quota: OwnersQuota,
     resumption: Annotated[ResumeRequest | None, Body()] = None,
 ) -> JobView:
     """Queue a paused or failed job again; it goes on bit for bit as if it had never stopped.
@@ -255,7 +264,7 @@ def resume_job(
     or has ended.
     """
     accept = resumption is not None and resumption.accept_changes
-    job = service.command(job_id, Command.RESUME, accept_changes=accept, actor=actor)
+    job = service.command(job_id, Command.RESUME, accept_changes=accept, actor=actor, quota=quota)
     return _in_full(service, job)
 
 
@@ -268,7 +277,11 @@ def resume_job(
     responses=problems(400, 403, 404, 409, 413, 422),
 )
 def extend_job(
-    extension: ExtensionRequest, job_id: JobId, service: Service, actor: Actor
+    extension: ExtensionRequest,
+    job_id: JobId,
+    service: Service,
+    actor: Actor,
+    quota: OwnersQuota,
 ) -> JobView:
     """A job that has succeeded is queued again and goes on from its last iteration; any other goes
     on as it would, up to the new budget.
@@ -278,7 +291,8 @@ def extend_job(
     iterations that is extended to 50 is another than one of 50 from its beginning, but the same
     every time. 409 if the job was cancelled.
     """
-    return _in_full(service, service.extend(job_id, extension.iterations, actor=actor))
+    job = service.extend(job_id, extension.iterations, actor=actor, quota=quota)
+    return _in_full(service, job)
 
 
 @router.post(

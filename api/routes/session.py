@@ -45,7 +45,7 @@ class SessionView(View):
     "/session",
     operation_id="get_session",
     summary="See who is asking",
-    responses=problems(asks=False),
+    responses=problems(429, asks=False),
 )
 def get_session(request: Request, service: Service, settings: ServerSettings) -> SessionView:
     """Answers with or without a token, so that a page can tell whether it has to ask for one."""
@@ -59,10 +59,14 @@ def get_session(request: Request, service: Service, settings: ServerSettings) ->
     operation_id="begin_session",
     summary="Ask with a token from now on",
     response_description="The answer sets a cookie that scripts cannot read.",
-    responses=problems(400, 401, 413, 422, asks=False),
+    responses=problems(400, 401, 413, 422, 429, asks=False),
 )
 def begin_session(
-    asked: SessionRequest, service: Service, settings: ServerSettings, response: Response
+    request: Request,
+    asked: SessionRequest,
+    service: Service,
+    settings: ServerSettings,
+    response: Response,
 ) -> SessionView:
     """For browsers, which cannot send a header with a link; programs send `Authorization`."""
     token = service.store.tokens.find(asked.token)
@@ -71,7 +75,14 @@ def begin_session(
             "the token is unknown or was revoked; `gaitswarm token create NAME` makes a new one"
         )
     response.set_cookie(
-        COOKIE, asked.token, max_age=_SECONDS, path="/", httponly=True, samesite="strict"
+        COOKIE,
+        asked.token,
+        max_age=_SECONDS,
+        path="/",
+        httponly=True,
+        samesite="strict",
+        # By HTTPS, which a proxy may bring: then the cookie is not to go without it either.
+        secure=request.url.scheme == "https",
     )
     return _view(token, required=settings.tokens_required)
 
@@ -81,7 +92,7 @@ def begin_session(
     operation_id="end_session",
     summary="Forget the token",
     status_code=status.HTTP_204_NO_CONTENT,
-    responses=problems(asks=False),
+    responses=problems(429, asks=False),
 )
 def end_session(response: Response) -> None:
     """The browser forgets the cookie; the token stays valid."""

@@ -7,12 +7,14 @@ GaitswarmError
 │   ├── BudgetChanged       the job was extended since it was claimed
 │   ├── ProvenanceChanged   its numbers would depend on something else than those it has
 │   ├── IdempotencyConflict the key was used before with another body
+│   ├── QuotaExceeded       its owner has as many jobs as they may have; names the field
 │   └── Unreadable          this version cannot read what is stored; it stays as it is
 ├── Forbidden               not for whoever asks (HTTP 403)
 │   └── Unauthorized        the server knows nobody of that token, or asks for one (HTTP 401)
 ├── LeaseLost               another runner, or a cancellation, has taken the job
 ├── KilledWorker            a task ends the workers that run it
 └── Unavailable             not possible now, whatever was asked; try again later (HTTP 503)
+    ├── TooManyRequests     whoever asks does so too often; says when to try again (HTTP 429)
     ├── EvaluatorUnavailable    the workers cannot be reached
     └── StoreUnavailable        the database or server cannot be reached, or has another schema
 """
@@ -55,6 +57,17 @@ class IdempotencyConflict(Conflict):
     """The idempotency key was used before for another request."""
 
 
+class QuotaExceeded(Conflict):
+    """The unfinished jobs of an owner would be more than they may be.
+
+    field: field of the request that makes it too much, "" when it is the request as a whole.
+    """
+
+    def __init__(self, message: str, *, field: str = "") -> None:
+        self.field = field
+        super().__init__(f"{field}: {message}" if field else message)
+
+
 class Unreadable(Conflict):
     """This version cannot read what is stored: it was written by another one, or damaged."""
 
@@ -84,6 +97,17 @@ class KilledWorker(GaitswarmError):
 
 class Unavailable(GaitswarmError):
     """Not possible now, whatever was asked."""
+
+
+class TooManyRequests(Unavailable):
+    """Whoever asks does so too often, or has too much open.
+
+    retry_after: time after which it is worth trying again [s].
+    """
+
+    def __init__(self, message: str, *, retry_after: float = 1.0) -> None:
+        self.retry_after = retry_after
+        super().__init__(message)
 
 
 class EvaluatorUnavailable(Unavailable):

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 
 from services.optimizer.analysis.fork import Parent, check_begun, forked
-from services.optimizer.analysis.history import read_history
 from services.optimizer.analysis.questions import Questions
 from services.optimizer.analysis.start import started
 from services.optimizer.deletion import Deletion
-from services.optimizer.errors import InvalidRequest, ProvenanceChanged
+from services.optimizer.errors import ProvenanceChanged
 from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.estimate import Estimate, MeasuredRates, duration, estimate
+from services.optimizer.jobs.estimate import Estimate, MeasuredRates, checked_length, estimate
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.iteration import Evaluation, Iteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from services.optimizer.run.runner import runner_name
@@ -29,9 +29,6 @@ from sim.identification.recorded_walk import RecordedWalk
 
 _EARLIER: Final = 50
 """Newest jobs among which one like a new job is looked for."""
-
-_MOST_WALKS: Final = 1_000_000
-"""Walks of an iteration: their objectives, 48 B each, are in memory together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +58,7 @@ class JobService(Questions, Deletion):
         request: Any = None,
         owner: str | None = None,
         notify_url: str | None = None,
+        quota: Quota | None = None,
     ) -> tuple[Job, bool]:
         """Check that the job can be simulated and queue it.
 
@@ -73,6 +71,7 @@ class JobService(Questions, Deletion):
                 that were given to the spec.
             owner: Name of the token that the request came with, if any.
             notify_url: Where its end is told, if anywhere; checked.
+            quota: What the owner's unfinished jobs may come to; None for no limit.
 
         Returns:
             The job, and whether it is new.
@@ -80,8 +79,9 @@ class JobService(Questions, Deletion):
         Raises:
             InvalidRequest: It cannot be simulated; names the field.
             IdempotencyConflict: The key was used before, for another job.
+            QuotaExceeded: The owner has too much under way.
         """
-        self._check(spec)
+        seconds = self._check(spec)
         if request is None:
             request = spec.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
@@ -91,6 +91,8 @@ class JobService(Questions, Deletion):
             request=request,
             owner=owner,
             notify_url=notify_url,
+            seconds=seconds,
+            quota=quota,
         )
 
     def fork(
@@ -102,6 +104,7 @@ class JobService(Questions, Deletion):
         sent: Any = None,
         owner: str | None = None,
         notify_url: str | None = None,
+        quota: Quota | None = None,
     ) -> tuple[Job, bool]:
         """Queue a job that begins with iterations of another one.
 
@@ -113,6 +116,7 @@ class JobService(Questions, Deletion):
                 were given to the request.
             owner: name of the token that the request came with, if any.
             notify_url: where its end is told, if anywhere; checked.
+            quota: what the owner's unfinished jobs may come to; None for no limit.
 
         Returns:
             The fork, whose `lineage` says what it took over, and whether it is new.
@@ -124,6 +128,7 @@ class JobService(Questions, Deletion):
                 accepted.
             Conflict: its search cannot be taken over, or it has no design to start from.
             IdempotencyConflict: the key was used before, for another job.
+            QuotaExceeded: the owner has too much under way.
         """
         job = self.job(job_id)
         check_begun(job, request.from_iteration)
@@ -137,7 +142,7 @@ class JobService(Questions, Deletion):
             last.link.digest,
         )
         spec, fork = forked(parent, request, self.provenance)
-        self._check(spec)
+        seconds = self._check(spec)
         if sent is None:
             sent = request.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
@@ -148,6 +153,8 @@ class JobService(Questions, Deletion):
             fork=fork,
             owner=owner,
             notify_url=notify_url,
+            seconds=seconds,
+            quota=quota,
         )
 
     def submit_embedded(self, spec: Spec) -> Claim:
@@ -273,6 +280,7 @@ class JobService(Questions, Deletion):
         *,
         accept_changes: bool = False,
         actor: str = LOCAL,
+        quota: Quota | None = None,
     ) -> Job:
         """Pause, resume or cancel a job.
 
@@ -282,6 +290,7 @@ class JobService(Questions, Deletion):
             accept_changes: for a job that is resumed, whether whoever takes it up may go on
                 although what its numbers depend on has changed.
             actor: name of the token that the request came with, if any; for the audit log.
+            quota: what the unfinished jobs of the job's owner may come to; None for no limit.
 
         Returns:
             The job as it is then.
@@ -289,8 +298,11 @@ class JobService(Questions, Deletion):
         Raises:
             NotFound: no job of that id.
             Conflict: not possible in its state; says what is.
+            QuotaExceeded: it had ended, and its owner has too much under way.
         """
-        return self.store.command(job_id, command, accept_changes=accept_changes, actor=actor)
+        return self.store.command(
+            job_id, command, accept_changes=accept_changes, actor=actor, quota=quota
+        )
 
     def check_unchanged(self, job: Job) -> None:
         """Check that a job's next numbers, computed here, depend on what those that it has do.
@@ -305,13 +317,21 @@ class JobService(Questions, Deletion):
         if refused is not None:
             raise ProvenanceChanged(f"job {job.id} cannot go on: {refused}")
 
-    def extend(self, job_id: str, iterations: int, *, actor: str = LOCAL) -> Job:
+    def extend(
+        self,
+        job_id: str,
+        iterations: int,
+        *,
+        actor: str = LOCAL,
+        quota: Quota | None = None,
+    ) -> Job:
         """Give a job another budget.
 
         Args:
             job_id: id of the job.
             iterations: of the budget, in all.
             actor: name of the token that the request came with, if any; for the audit log.
+            quota: what the unfinished jobs of the job's owner may come to; None for no limit.
 
         Returns:
             The job as it is then; queued if it had succeeded.
@@ -320,37 +340,25 @@ class JobService(Questions, Deletion):
             NotFound: no job of that id.
             Conflict: it was cancelled.
             InvalidRequest: the budget is spent already, or too large.
+            QuotaExceeded: its owner would have too much under way.
         """
         job = self.job(job_id)
-        if job.readable:
-            self._check_length(job.spec.with_budget(iterations))
-        return self.store.extend(job_id, iterations, actor=actor)
+        again = job.spec.with_budget(iterations) if job.readable else None
+        seconds = None if again is None else self._check_length(again)
+        return self.store.extend(job_id, iterations, actor=actor, seconds=seconds, quota=quota)
 
-    def _check(self, spec: Spec) -> None:
-        """Raises InvalidRequest."""
+    def _check(self, spec: Spec) -> float | None:
+        """Simulated time of all walks [s]. Raises InvalidRequest."""
         spec.check_can_be_simulated()
         spec.check_recordings(self.recording)
-        self._check_length(spec)
+        return self._check_length(spec)
 
-    def _check_length(self, spec: Spec) -> None:
+    def _check_length(self, spec: Spec) -> float | None:
+        """Simulated time of all walks [s], None where nothing limits it. Raises InvalidRequest."""
         if math.isinf(self.longest_job):
-            return
+            return None
         cases = spec.cases(self.store.recordings(spec.recording_ids))
-        at_once = len(cases) * spec.optimizer.particles
-        if at_once > _MOST_WALKS:
-            raise InvalidRequest(
-                f"an iteration has {at_once} walks, more than the {_MOST_WALKS} that are kept at"
-                " once; give it fewer particles, scenarios or worlds",
-                field="optimizer",
-            )
-        seconds = spec.budget * duration(spec, cases)
-        if seconds > self.longest_job:
-            raise InvalidRequest(
-                f"all walks of the job last {seconds:.3g} s together, more than the"
-                f" {self.longest_job:.3g} s that a job may have here; give it fewer iterations, or"
-                " fewer or shorter scenarios",
-                field="iterations",
-            )
+        return checked_length(spec, cases, self.longest_job)
 
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100
@@ -398,23 +406,3 @@ class JobService(Questions, Deletion):
             NotFound: no job of that id.
         """
         return self.store.best(job_id)
-
-    def history(
-        self, job_id: str, *, after: int | None = None
-    ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
-        """Read every committed iteration with its particles.
-
-        Read by pieces as it is consumed: however long it takes, no transaction stays open, and
-        what is committed meanwhile comes too.
-
-        Args:
-            job_id: id of the job.
-            after: only iterations with a greater index; None for all.
-
-        Returns:
-            Iterations and their particles, in order.
-
-        Raises:
-            NotFound: no job of that id; at the first item.
-        """
-        return read_history(self.store, job_id, after=after)

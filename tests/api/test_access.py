@@ -15,6 +15,7 @@ from gaitswarm.settings import Settings
 from services.optimizer.access import Scope
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Serve
 from tests.examples.servers import Server
@@ -230,3 +231,50 @@ def test_the_document_says_that_a_token_may_be_needed(client: httpx2.Client) -> 
     assert document["security"] == [{"token": []}, {}]
     assert "401" in document["paths"]["/v1/jobs"]["get"]["responses"]
     assert "401" not in document["paths"]["/v1/healthz"]["get"]["responses"]
+
+
+def test_a_token_to_submit_has_a_quota_and_one_of_all_rights_has_none(
+    serve: Serve, bearer: Bearer, spec: JobSpec
+) -> None:
+    client = serve(api_access="token", api_max_unfinished_jobs=1).client
+    document = spec.model_dump(mode="json")
+    headers = bearer(Scope.SUBMIT)
+    own = client.post("/v1/jobs", json=document, headers=headers).json()["id"]
+    refused = client.post("/v1/jobs", json=document, headers=headers)
+    assert refused.status_code == 409
+    assert refused.json()["type"] == "urn:gaitswarm:problem:quota-exceeded"
+    assert "cancel one" in refused.json()["detail"]
+    admin = bearer(Scope.ADMIN)
+    for _ in range(2):
+        assert client.post("/v1/jobs", json=document, headers=admin).status_code == 202
+    client.post(f"/v1/jobs/{own}/cancel", headers=headers)
+    assert client.post("/v1/jobs", json=document, headers=headers).status_code == 202
+
+
+def test_what_a_quota_refuses_is_named_by_its_field(
+    serve: Serve, service: JobService, spec: JobSpec
+) -> None:
+    limited = JobService(service.store, longest_job=1e9)
+    server = serve(limited, api_max_unfinished_seconds=10.0)
+    refused = server.client.post("/v1/jobs", json=spec.model_dump(mode="json"))
+    assert refused.status_code == 409
+    (error,) = refused.json()["errors"]
+    assert error["field"] == "iterations" and "may walk 10 s" in error["message"]
+    with (
+        gaitswarm.connect(server.url) as jobs,
+        pytest.raises(gaitswarm.QuotaExceeded, match=r"^iterations: the unfinished"),
+    ):
+        jobs.submit(spec)
+
+
+def test_a_cookie_that_came_by_https_goes_no_other_way(serve: Serve, bearer: Bearer) -> None:
+    server = serve(api_access="token")
+    secret = bearer(Scope.READ)["Authorization"].removeprefix("Bearer ")
+
+    def cookie(**headers: str) -> str:
+        begun = server.client.post("/v1/session", json={"token": secret}, headers=headers)
+        return str(begun.headers["Set-Cookie"]).lower()
+
+    # The server's own machine is a proxy that is believed, unless another one is named.
+    assert "secure" in cookie(**{"X-Forwarded-Proto": "https"})
+    assert "secure" not in cookie()

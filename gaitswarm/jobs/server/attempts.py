@@ -1,7 +1,8 @@
 """When a call is sent again, and what its failure means. No I/O here; both clients lean on it.
 
 Sent again are calls that do no harm twice, those that only read or have an idempotency key: when
-the connection could not be made or broke, and on 503, after the time that the server asks for.
+the connection could not be made or broke, and on 503, after the time that the server asks for. On
+429, which says that nothing was done, any call is.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ from gaitswarm.errors import (
     IdempotencyConflict,
     InvalidRequest,
     NotFound,
+    QuotaExceeded,
     StoreUnavailable,
+    TooManyRequests,
     Unauthorized,
     Unreadable,
 )
@@ -86,7 +89,8 @@ class Attempts:
         Raises:
             StoreUnavailable: There is to be no further attempt.
         """
-        seconds = self._next(0.0) if isinstance(error, _TRANSIENT) else None
+        again = self._repeatable and isinstance(error, _TRANSIENT)
+        seconds = self._next(0.0, repeatable=again)
         if seconds is None:
             raise unreachable(self._url, error) from error
         return seconds
@@ -105,14 +109,16 @@ class Attempts:
         """
         seconds = None
         if response.status_code == HTTPStatus.SERVICE_UNAVAILABLE:
-            seconds = self._next(_retry_after(response))
+            seconds = self._next(_retry_after(response), repeatable=self._repeatable)
+        elif response.status_code == HTTPStatus.TOO_MANY_REQUESTS:
+            seconds = self._next(_retry_after(response), repeatable=True)
         if seconds is None:
             raise error_of(response)
         return seconds
 
-    def _next(self, at_least: float) -> float | None:
+    def _next(self, at_least: float, *, repeatable: bool) -> float | None:
         self._failures += 1
-        delay = self._backoff.delay(self._failures) if self._repeatable else None
+        delay = self._backoff.delay(self._failures) if repeatable else None
         # A server that asks for more patience than there is gets no further attempt.
         if delay is None or at_least > self._backoff.longest:
             return None
@@ -255,16 +261,21 @@ def error_of(response: httpx2.Response) -> GaitswarmError:
         problem = ProblemView.model_validate_json(response.content)
     except ValidationError:
         return StoreUnavailable(f"server answered {response.status_code} without saying why")
-    special = _CONFLICTS.get(problem.type.rpartition(":")[2])
+    kind_of_problem = problem.type.rpartition(":")[2]
+    field = problem.errors[0].field if problem.errors else ""
+    if kind_of_problem == "quota-exceeded":
+        return QuotaExceeded(problem.detail.removeprefix(f"{field}: "), field=field)
+    special = _CONFLICTS.get(kind_of_problem)
     if special is not None:
         return special(problem.detail)
+    if problem.status == HTTPStatus.TOO_MANY_REQUESTS:
+        return TooManyRequests(problem.detail, retry_after=_retry_after(response))
     kind = _ERRORS.get(problem.status)
     if kind is not None:
         return kind(problem.detail)
     # What the client got wrong is bad input; anything else is for the server's owner.
     if problem.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
         return StoreUnavailable(problem.detail)
-    field = problem.errors[0].field if problem.errors else ""
     return InvalidRequest(problem.detail.removeprefix(f"{field}: "), field=field)
 
 

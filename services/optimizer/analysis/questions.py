@@ -18,11 +18,11 @@ from services.optimizer.analysis.fits.identifiability import (
     check_comparable,
     identifiability,
 )
-from services.optimizer.analysis.history import PIECE, read_columns
+from services.optimizer.analysis.history import PIECE, read_columns, read_history
 from services.optimizer.analysis.history_cache import HistoryCache
 from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
 from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Reevaluation
+from services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.store.base import Store
@@ -67,6 +67,26 @@ class Questions:
             Whole iterations, in order.
         """
         return read_columns(self.store, job, rows=rows)
+
+    def history(
+        self, job_id: str, *, after: int | None = None
+    ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
+        """Read every committed iteration with its particles.
+
+        Read by pieces as it is consumed: however long it takes, no transaction stays open, and
+        what is committed meanwhile comes too.
+
+        Args:
+            job_id: id of the job.
+            after: only iterations with a greater index; None for all.
+
+        Returns:
+            Iterations and their particles, in order.
+
+        Raises:
+            NotFound: no job of that id; at the first item.
+        """
+        return read_history(self.store, job_id, after=after)
 
     def asked(self, job: Job, iterations: int | None = None) -> tuple[NDArray[np.float64], ...]:
         """Read what the search asked for.

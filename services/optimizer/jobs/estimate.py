@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
@@ -35,6 +36,9 @@ _LONGEST_WALK: Final = 5.0
 """Length of the walk that is measured [s]; a very short one would tell how long tables take."""
 
 _REMEMBERED: Final = 64
+
+_MOST_WALKS: Final = 1_000_000
+"""Walks of an iteration: their objectives, 48 B each, are in memory together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +112,37 @@ def duration(spec: Spec, cases: Sequence[Case]) -> float:
         else case.duration
         for case in cases
     )
+
+
+def checked_length(spec: Spec, cases: Sequence[Case], longest: float) -> float:
+    """Refuse a job whose walks are too many at once, or last too long.
+
+    Args:
+        spec: of the job.
+        cases: those of the spec.
+        longest: simulated time of all walks of all designs that it may have [s].
+
+    Returns:
+        The time that it has [s].
+
+    Raises:
+        InvalidRequest: it is too much; names the field.
+    """
+    at_once = len(cases) * spec.optimizer.particles
+    if at_once > _MOST_WALKS:
+        raise InvalidRequest(
+            f"an iteration has {at_once} walks, more than the {_MOST_WALKS} that are kept at"
+            " once; give it fewer particles, scenarios or worlds",
+            field="optimizer",
+        )
+    seconds = spec.budget * duration(spec, cases)
+    if seconds > longest:
+        raise InvalidRequest(
+            f"all walks of the job last {seconds:.3g} s together, more than the {longest:.3g} s"
+            " that a job may have here; give it fewer iterations, or fewer or shorter scenarios",
+            field="iterations",
+        )
+    return seconds
 
 
 class MeasuredRates:

@@ -19,6 +19,7 @@ from services.optimizer.jobs.job import (
 )
 from services.optimizer.jobs.notification import Outbox
 from services.optimizer.jobs.provenance import JobProvenance
+from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.deletions import Deletions
 from services.optimizer.store.reading import Changes, CommittedHistory, Page, Queue
@@ -54,6 +55,8 @@ class Store(CommittedHistory, Deletions, Protocol):
         fork: Fork | None = None,
         owner: str | None = None,
         notify_url: str | None = None,
+        seconds: float | None = None,
+        quota: Quota | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job of the resolved spec, or find the one that the same key made before.
 
@@ -68,12 +71,15 @@ class Store(CommittedHistory, Deletions, Protocol):
                 stays when its parent goes; None for a job of its own.
             owner: Name of the token that it comes with, if any.
             notify_url: Where its end is told, if anywhere; checked.
+            seconds: Simulated time of all its walks [s]; None where nobody has asked.
+            quota: What the owner's unfinished jobs may come to with it; None for no limit.
 
         Returns:
             The job, and whether it is new.
 
         Raises:
             Conflict: The job that is forked is gone.
+            QuotaExceeded: The owner has too much under way.
             InvalidRequest: The key is empty, too long or not printable.
             IdempotencyConflict: The key was used for a request that is neither this one nor
                 resolves to the same spec.
@@ -154,6 +160,7 @@ class Store(CommittedHistory, Deletions, Protocol):
         *,
         accept_changes: bool = False,
         actor: str = LOCAL,
+        quota: Quota | None = None,
     ) -> Job:
         """Apply a command of a user; see `commanded` for what is possible.
 
@@ -165,16 +172,27 @@ class Store(CommittedHistory, Deletions, Protocol):
             accept_changes: Of a job that is queued again, whether it may go on although what its
                 numbers depend on has changed; until it is claimed.
             actor: Whom the audit log is to name.
+            quota: What the unfinished jobs of its owner may come to, if it has ended and is queued
+                again; None for no limit.
 
         Returns:
             The job as it is then.
 
         Raises:
             Conflict: Its state does not allow it.
+            QuotaExceeded: Its owner has too much under way.
             Unreadable: It would be queued, but cannot be read.
         """
 
-    def extend(self, job_id: str, iterations: int, *, actor: str = LOCAL) -> Job:
+    def extend(
+        self,
+        job_id: str,
+        iterations: int,
+        *,
+        actor: str = LOCAL,
+        seconds: float | None = None,
+        quota: Quota | None = None,
+    ) -> Job:
         """Give a job another budget; see `extended` for what it may be.
 
         What is committed stays, as does the iteration under way; what is asked after it is asked
@@ -184,12 +202,15 @@ class Store(CommittedHistory, Deletions, Protocol):
             job_id: Of the job.
             iterations: The budget, in all.
             actor: Whom the audit log is to name.
+            seconds: Simulated time of all its walks then [s]; None where nobody has asked.
+            quota: What the unfinished jobs of its owner may come to then; None for no limit.
 
         Returns:
             The job as it is then.
 
         Raises:
             Conflict: The job was cancelled.
+            QuotaExceeded: Its owner would have too much under way.
             InvalidRequest: The budget is spent already, or a job of this kind and method cannot
                 have it.
             Unreadable: The job's spec cannot be read.

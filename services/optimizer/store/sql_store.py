@@ -25,6 +25,7 @@ from services.optimizer.jobs.job import (
     extended,
 )
 from services.optimizer.jobs.provenance import JobProvenance, first_record
+from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.audit import audit_page, note_change, note_submission
 from services.optimizer.store.changes import SqlChanges
@@ -82,7 +83,7 @@ from services.optimizer.store.records import (
     update_job,
 )
 from services.optimizer.store.revisions import check_revision
-from services.optimizer.store.submissions import Submission, insert_job, repeated_job
+from services.optimizer.store.submissions import Submission, check_quota, insert_job, repeated_job
 from services.optimizer.store.tokens import SqlTokens
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -141,6 +142,8 @@ class SqlStore(SqlDeletion, SqlHistory):
         fork: Fork | None = None,
         owner: str | None = None,
         notify_url: str | None = None,
+        seconds: float | None = None,
+        quota: Quota | None = None,
     ) -> tuple[Job, bool]:
         """Insert a queued job, or find the one that the same key made before."""
         _check_key(idempotency_key)
@@ -150,12 +153,20 @@ class SqlStore(SqlDeletion, SqlHistory):
             digest = request_digest(sent)
         records = first_record(provenance)
         asked = Submission(
-            spec.resolved(), idempotency_key, digest, records, fork, owner, notify_url
+            spec.resolved(),
+            idempotency_key,
+            digest,
+            records,
+            fork,
+            owner,
+            notify_url,
+            seconds,
         )
         try:
             with self._database.transaction(write=True) as connection:
                 earlier = repeated_job(connection, asked)
                 if earlier is None:
+                    check_quota(connection, owner, quota, new_jobs=1, new_seconds=seconds or 0.0)
                     now = self._clock(connection)
                     job = insert_job(connection, asked, now)
                     note_submission(connection, now, job)
@@ -227,17 +238,22 @@ class SqlStore(SqlDeletion, SqlHistory):
         *,
         accept_changes: bool = False,
         actor: str = LOCAL,
+        quota: Quota | None = None,
     ) -> Job:
         """Apply a command of a user, or refuse it."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
             now = self._clock(connection)
-            state = commanded(JobState(row["state"]), command)
+            before = JobState(row["state"])
+            state = commanded(before, command)
             if state is JobState.PAUSING and not lease_is_live(row, now):
                 # Its runner has gone, so nobody would ever complete the pause.
                 state = JobState.PAUSED
             if state is JobState.QUEUED:
                 require_readable(row)
+            if before.terminal and not state.terminal:
+                seconds = row["simulated_seconds"] or 0.0
+                check_quota(connection, row["owner"], quota, new_jobs=1, new_seconds=seconds)
             changes = entering(state, now)
             details = {}
             if command is Command.RESUME:
@@ -248,7 +264,15 @@ class SqlStore(SqlDeletion, SqlHistory):
             note_change(connection, now, actor, AuditAction(command), job_id, **details)
             return to_job(update_job(connection, row, changes))
 
-    def extend(self, job_id: str, iterations: int, *, actor: str = LOCAL) -> Job:
+    def extend(
+        self,
+        job_id: str,
+        iterations: int,
+        *,
+        actor: str = LOCAL,
+        seconds: float | None = None,
+        quota: Quota | None = None,
+    ) -> Job:
         """Change the budget of a job, and queue it again if it had ended."""
         with self._database.transaction(write=True) as connection:
             row = job_row(connection, job_id, lock=True)
@@ -257,11 +281,19 @@ class SqlStore(SqlDeletion, SqlHistory):
             job = to_job(row)
             after = extended(state, job.spent, iterations)
             check_budget(job.spec, iterations)
+            # One that has ended is not among the unfinished ones: all of it is added.
+            ended = state.terminal
+            planned = row["simulated_seconds"] if seconds is None else seconds
+            known = 0.0 if ended else row["simulated_seconds"] or 0.0
+            added = (planned or 0.0) - known
+            again = int(ended and not after.terminal)
+            check_quota(connection, row["owner"], quota, new_jobs=again, new_seconds=added)
             # Whoever runs the job notices when it commits; until then nothing changes for it.
             now = self._clock(connection)
             changes = entering(after, now) if after is not state else {}
+            changes |= {"budget": iterations, "simulated_seconds": planned}
             note_change(connection, now, actor, AuditAction.EXTEND, job_id, iterations=iterations)
-            return to_job(update_job(connection, row, changes | {"budget": iterations}))
+            return to_job(update_job(connection, row, changes))
 
     # recorded walks
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, Table, bindparam, insert, literal, select, update
+from sqlalchemy import Connection, Table, bindparam, func, insert, literal, select, update
 
 from services.optimizer.errors import Conflict, IdempotencyConflict, NotFound
 from services.optimizer.jobs.chain import ask_digest
@@ -18,6 +18,7 @@ from services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from services.optimizer.jobs.iteration import best_particle
 from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.provenance import ProvenanceRecords
+from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.chain import chain_taken
 from services.optimizer.store.job_rows import (
@@ -45,6 +46,7 @@ class Submission:
         fork: How it is forked from another job; None for a job of its own.
         owner: Name of the token that it comes with, if any.
         notify_url: Where its end is told, if anywhere.
+        seconds: Simulated time of all its walks [s]; None where nobody has asked.
     """
 
     spec: Spec
@@ -54,6 +56,7 @@ class Submission:
     fork: Fork | None = None
     owner: str | None = None
     notify_url: str | None = None
+    seconds: float | None = None
 
     @property
     def lineage(self) -> Lineage | None:
@@ -119,6 +122,7 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
         "lineage": lineage_document(asked.lineage),
         "owner": asked.owner,
         "notify_url": asked.notify_url,
+        "simulated_seconds": asked.seconds,
         "idempotency_key": asked.key,
         "request_digest": asked.digest,
         "created_at": now,
@@ -141,6 +145,41 @@ def _require_parent(connection: Connection, parent: str) -> None:
         job_row(connection, parent, lock=True)
     except NotFound as error:
         raise Conflict(f"job {parent} that was to be forked was deleted") from error
+
+
+def check_quota(
+    connection: Connection,
+    owner: str | None,
+    quota: Quota | None,
+    *,
+    new_jobs: int,
+    new_seconds: float,
+) -> None:
+    """Refuse what would be more than an owner may have unfinished.
+
+    Two that ask at once take turns, so that they cannot both have the last place.
+
+    Args:
+        connection: An open transaction that may write.
+        owner: Of the jobs; None for all that have no owner.
+        quota: What there may be; None for no limit.
+        new_jobs: That are to be added.
+        new_seconds: Simulated time that is to be added [s].
+
+    Raises:
+        QuotaExceeded: It would be too much.
+    """
+    if quota is None:
+        return
+    if connection.dialect.name == "postgresql":
+        turn = func.hashtext(f"quota of {owner}")
+        connection.execute(select(func.pg_advisory_xact_lock(turn)))
+    query = select(func.count(), func.coalesce(func.sum(jobs.c.simulated_seconds), 0.0)).where(
+        jobs.c.state.in_([state for state in JobState if not state.terminal]),
+        jobs.c.owner.is_(None) if owner is None else jobs.c.owner == owner,
+    )
+    count, seconds = connection.execute(query).one()
+    quota.check(count, seconds, new_jobs=new_jobs, new_seconds=new_seconds)
 
 
 def _take_history(

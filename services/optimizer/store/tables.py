@@ -187,6 +187,8 @@ jobs: Final = Table(
     Column("deleted_at", UtcDateTime),
     # Whether it stays, however long ago it ended; NULL is false.
     Column("kept", Boolean),
+    # Of all walks of all designs of its budget [s]; NULL where nobody has asked.
+    Column("simulated_seconds", Double),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

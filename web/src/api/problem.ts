@@ -22,7 +22,7 @@ export class ApiProblem extends Error {
 
   /** Whether asking again later may help. */
   get temporary(): boolean {
-    return this.status === 0 || this.status >= 500
+    return this.status === 0 || this.status === 429 || this.status >= 500
   }
 }
 

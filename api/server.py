@@ -11,7 +11,10 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
+from api.connections import ConnectionLimits, limited_protocol
+
 _BACKLOG = 512
+_USUAL = ConnectionLimits()
 
 Drain = Callable[[threading.Event], None]
 """Called in a thread before the server stops; its event is set when it is to return at once."""
@@ -31,6 +34,7 @@ class ApiServer:
         port: int,
         shutdown_seconds: int = 5,
         drain: Drain = lambda _: None,
+        limits: ConnectionLimits = _USUAL,
         log_level: str = "warning",
     ) -> None:
         """Begin to listen.
@@ -42,6 +46,7 @@ class ApiServer:
             shutdown_seconds: how long open requests may finish when the server stops [s].
             drain: called in a thread when the server is told to end. Requests are answered until it
                 returns.
+            limits: of connections, and whose word is taken for who asks.
             log_level: of uvicorn's own messages.
 
         Raises:
@@ -55,6 +60,11 @@ class ApiServer:
             log_level=log_level,
             timeout_graceful_shutdown=shutdown_seconds,
             server_header=False,
+            http=limited_protocol(limits),  # type: ignore[arg-type] # as uvicorn calls it
+            ws="none",
+            h11_max_incomplete_event_size=limits.header_bytes,
+            timeout_keep_alive=limits.idle_seconds,
+            forwarded_allow_ips=list(limits.trusted_proxies),
         )
         self._server = _Server(config, drain)
         ipv6 = ":" in host

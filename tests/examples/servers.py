@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from api import dependencies
 from api.app import create_app
+from api.connections import ConnectionLimits
 from api.server import ApiServer
 from gaitswarm.settings import Settings
 from services.monitoring.metrics import Metrics
@@ -79,6 +80,7 @@ class Server(Served):
             port=0,
             shutdown_seconds=values.api_shutdown_seconds,
             drain=drain,
+            limits=ConnectionLimits.of(values),
             log_level="critical",
         )
         self._thread = threading.Thread(target=self._server.run)

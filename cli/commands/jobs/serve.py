@@ -62,6 +62,7 @@ def serve(
         from dataclasses import asdict
 
         from api.app import create_app
+        from api.connections import ConnectionLimits
         from api.page import is_built
         from api.server import ApiServer
         from cli.logs import log_to_stderr
@@ -87,6 +88,7 @@ def serve(
                     port=settings.api_port,
                     shutdown_seconds=settings.api_shutdown_seconds,
                     drain=lambda at_once: _drain(beside, settings, at_once),
+                    limits=ConnectionLimits.of(settings),
                 )
             except OSError as error:
                 raise EvaluatorUnavailable(

@@ -12,6 +12,7 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
+from api.links import add_links
 from api.middleware import security_policy
 from api.problems import MEDIA_TYPE
 from gaitswarm.views import ParticlesHeaderView, ProblemView
@@ -135,6 +136,7 @@ def add_documentation(app: FastAPI) -> None:
         document["components"]["securitySchemes"] = {"token": _BEARER}
         # Or none: a server that listens to its own machine alone asks for no token.
         document["security"] = [{"token": []}, {}]
+        add_links(document)
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]

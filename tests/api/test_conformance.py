@@ -9,33 +9,16 @@ from typing import Any, cast
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, Phase, settings
-from schemathesis.checks import not_a_server_error
 from schemathesis.core.parameters import ParameterLocation
 from schemathesis.generation.meta import CoveragePhaseData
 from schemathesis.schemas import APIOperation
-from schemathesis.specs.openapi.checks import (
-    content_type_conformance,
-    response_headers_conformance,
-    response_schema_conformance,
-    status_code_conformance,
-    unsupported_method,
-)
 
 from api.app import create_app
 from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
+from tests.api.conformance import CHECKS, Found, schema_of, sequences, served
 from tests.examples.servers import Server
-
-CHECKS = [
-    not_a_server_error,
-    content_type_conformance,
-    response_headers_conformance,
-    response_schema_conformance,
-    status_code_conformance,
-    unsupported_method,
-]
-
 
 # The parameters of a test are needed before there is a server: the document is the same without.
 _APP = create_app(cast(JobService, None), settings=Settings())
@@ -130,3 +113,15 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 )
 def test_every_answer_is_as_documented(case: schemathesis.Case[Any], url: str) -> None:
     case.call_and_validate(base_url=url, checks=CHECKS)
+
+
+@pytest.mark.slow
+def test_sequences_along_the_links_of_the_document_are_answered_as_documented() -> None:
+    """The short version of `python -m tests.api.conformance`."""
+    found = Found()
+    with served() as (server, ids):
+        sequences(schema_of(server, ids), server.url, found, 60)
+    assert found.failures == {}
+    assert found.cases >= 60
+    # Some have followed a job that they had submitted, or found.
+    assert {200, 202, 409} <= {status for _, status in found.answers}

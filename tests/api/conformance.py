@@ -1,0 +1,284 @@
+"""`python -m tests.api.conformance --cases 10000`: a server keeps to its own OpenAPI document.
+
+Every operation is sent values good and bad, made by schemathesis from the document, and sequences
+of operations follow the document's links. Nothing may be a 5xx, undocumented, or a traceback in
+the log.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, cast
+from zlib import crc32
+
+import hypothesis
+import schemathesis
+from hypothesis import HealthCheck, Phase, strategies
+from schemathesis.checks import not_a_server_error
+from schemathesis.core.failures import FailureGroup
+from schemathesis.generation.stateful.state_machine import APIStateMachine
+from schemathesis.schemas import BaseSchema
+from schemathesis.specs.openapi.checks import (
+    content_type_conformance,
+    response_headers_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+    unsupported_method,
+)
+
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.search.swarm.pso import PsoSettings
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore, open_store
+from services.runtime import open_evaluator, run_embedded
+from sim.scenario import Scenario
+from tests.certificate.examples import small
+from tests.examples.servers import Server
+from tests.examples.walks import SHORT_WALK
+from tests.tournament.examples import entrant, submitted
+
+Case = schemathesis.Case[Any]
+
+CHECKS: Final = [
+    not_a_server_error,
+    content_type_conformance,
+    response_headers_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+    unsupported_method,
+]
+
+_STEPS: Final = 12
+"""Requests of a sequence."""
+
+_OF_SEQUENCES: Final = 0.3
+"""Share of all cases."""
+
+
+@dataclass
+class Found:
+    """What came of a campaign.
+
+    Attributes:
+        answers: how many there were, by operation and status.
+        failures: how often each check failed on which operation, with the first request that did.
+        tracebacks: that the server logged.
+        seconds: that all requests took together [s].
+    """
+
+    answers: Counter[tuple[str, int]] = field(default_factory=Counter)
+    failures: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    tracebacks: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def cases(self) -> int:
+        """Requests that were sent."""
+        return self.answers.total()
+
+    def send(self, case: Case, url: str) -> schemathesis.Response:
+        """Send a case, and remember what is wrong with its answer."""
+        begun = time.perf_counter()
+        response = case.call(base_url=url)
+        self.seconds += time.perf_counter() - begun
+        self.look_at(case, response)
+        return response
+
+    def look_at(self, case: Case, response: schemathesis.Response) -> None:
+        """Remember an answer, and what is wrong with it."""
+        label = case.operation.label
+        self.answers[label, response.status_code] += 1
+        try:
+            case.validate_response(response, checks=CHECKS)
+        except FailureGroup as group:
+            for failure in group.exceptions:
+                said = f"{case.as_curl_command()}\n{response.status_code} {response.text[:500]}"
+                known = self.failures.setdefault((label, type(failure).__name__), [])
+                known.append(f"{failure}\n{said}" if not known else "")
+
+
+@contextmanager
+def served() -> Iterator[tuple[Server, dict[str, list[str]]]]:
+    """A server that lets nobody walk for long, with finished jobs of three kinds.
+
+    Yields:
+        The server, and ids of what it has, by parameter of a path.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        store = open_store(str(Path(folder) / "jobs.db"))
+        service = JobService(store, longest_job=1e10)
+        server = Server(
+            service,
+            api_max_simulated_seconds=3.0,
+            api_max_logged_seconds=2.0,
+            api_max_sampled_seconds=30.0,
+        )
+        try:
+            yield server, {"job_id": _jobs(store, service)}
+        finally:
+            server.close()
+            store.close()
+
+
+def _jobs(store: SqlStore, service: JobService) -> list[str]:
+    tuning = JobSpec(
+        controller="pi",
+        scenarios=(Scenario(**SHORT_WALK),),
+        optimizer=PsoSettings(particles=4),
+        iterations=3,
+    )
+    found = [service.submit(spec)[0].id for spec in (tuning, small())]
+    evaluator = open_evaluator("in-process", cpus=2)
+    try:
+        for job_id in found:
+            run_embedded(store, evaluator, job_id)
+    finally:
+        evaluator.close()
+    return [*found, submitted(service, entrant("pso", "pso"), [1e-4, 0.2]).id]
+
+
+def schema_of(server: Server, ids: dict[str, list[str]]) -> BaseSchema:
+    """The document of a server; half of all paths name something that there is."""
+    document = server.client.get("/openapi.json").json()
+    # Streams end with their jobs only, and are tested apart.
+    schema = schemathesis.openapi.from_dict(document).exclude(operation_id="stream_events")
+
+    @schema.hook
+    def map_path_parameters(
+        _: schemathesis.HookContext, path_parameters: dict[str, Any] | None
+    ) -> dict[str, Any] | None:
+        for name, known in ids.items():
+            drawn = crc32(repr((path_parameters or {}).get(name)).encode()) % (2 * len(known))
+            if path_parameters and name in path_parameters and drawn < len(known):
+                path_parameters[name] = known[drawn]
+        return path_parameters
+
+    return schema
+
+
+def single_requests(schema: BaseSchema, url: str, found: Found, each: int) -> None:
+    """Send every operation so many requests, half of them with something wrong.
+
+    Args:
+        schema: of the server.
+        url: of the server.
+        found: takes on what comes of it.
+        each: requests of an operation.
+    """
+    modes = (schemathesis.GenerationMode.POSITIVE, schemathesis.GenerationMode.NEGATIVE)
+    for result in schema.get_all_operations():
+        operation = result.ok()
+
+        def send(case: Case) -> None:
+            found.send(case, url)
+
+        wanted = strategies.one_of(*(operation.as_strategy(generation_mode=m) for m in modes))
+        _repeated(send, wanted, each)
+
+
+def _repeated(
+    send: Callable[[Case], None], wanted: strategies.SearchStrategy[Case], times: int
+) -> None:
+    hypothesis.settings(_SETTINGS, max_examples=times)(hypothesis.given(wanted)(send))()
+
+
+_SETTINGS: Final = hypothesis.settings(
+    derandomize=True,
+    deadline=None,
+    database=None,
+    phases=[Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+
+
+def sequences(schema: BaseSchema, url: str, found: Found, cases: int) -> None:
+    """Send sequences of requests along the links of the document.
+
+    Args:
+        schema: of the server.
+        url: of the server.
+        found: takes on what comes of it.
+        cases: requests in all, at least.
+    """
+
+    class Sequence(schema.as_state_machine()):  # type: ignore[misc]
+        def get_call_kwargs(self, case: Case) -> dict[str, Any]:
+            return {"base_url": url}
+
+        def validate_response(self, response: Any, case: Case, **_: Any) -> None:
+            found.look_at(case, response)
+
+    machine = cast(type[APIStateMachine], Sequence)
+    end = found.cases + cases
+    while found.cases < end:
+        count = max(1, (end - found.cases) // _STEPS)
+        machine.run(
+            settings=hypothesis.settings(
+                _SETTINGS, max_examples=count, stateful_step_count=_STEPS, derandomize=False
+            )
+        )
+
+
+class _Tracebacks(logging.Handler):
+    """Gathers what the server's log has of exceptions that nobody expected."""
+
+    def __init__(self, found: Found) -> None:
+        super().__init__(logging.ERROR)
+        self._found = found
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.exc_info:
+            self._found.tracebacks.append(self.format(record))
+
+
+def campaign(cases: int) -> Found:
+    """Send a server of its own at least so many requests.
+
+    Args:
+        cases: in all.
+    """
+    found = Found()
+    log = logging.getLogger("gaitswarm")
+    handler = _Tracebacks(found)
+    log.addHandler(handler)
+    try:
+        with served() as (server, ids):
+            schema = schema_of(server, ids)
+            operations = sum(1 for _ in schema.get_all_operations())
+            each = max(1, round((1.0 - _OF_SEQUENCES) * cases / operations))
+            single_requests(schema, server.url, found, each)
+            sequences(schema, server.url, found, max(1, cases - found.cases))
+    finally:
+        log.removeHandler(handler)
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a campaign and print what came of it; 1 if anything is not as documented."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=10_000)
+    begun = time.perf_counter()
+    found = campaign(parser.parse_args(arguments).cases)
+    elapsed = time.perf_counter() - begun
+    statuses = Counter[int]()
+    for (label, status), count in sorted(found.answers.items()):
+        statuses[status] += count
+        print(f"{label:60} {status} {count}")  # noqa: T201
+    print(f"{found.cases} cases in {elapsed:.0f} s: {dict(sorted(statuses.items()))}")  # noqa: T201
+    for (label, check), (first, *more) in found.failures.items():
+        print(f"\n{label}: {check}, {1 + len(more)} times\n{first}")  # noqa: T201
+    for text in found.tracebacks:
+        print(f"\n{text}")  # noqa: T201
+    return 1 if found.failures or found.tracebacks else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 from sim.controllers.fixed_point import CONTROL_PERIOD
 
 Floats = NDArray[np.float64]
+
+_BLOCK: Final = 2048
+"""Ticks that are filtered together: their sums stay in the processor's cache, however long a walk
+is."""
 
 FirWindow = Literal["moving_average", "hamming"]
 """`hamming` is the default of Matlab's fir1: a windowed sinc."""
@@ -53,14 +57,18 @@ def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") 
     gains = fir_gains(fir_ms, window)
     taps, ticks = len(gains), len(angles)
     padded = np.concatenate([np.repeat(angles[:1], taps - 1, axis=0), angles])
+    sums = np.zeros_like(angles) if window == "hamming" else padded[:ticks].copy()
+    for begin in range(0, ticks, _BLOCK):
+        end = min(begin + _BLOCK, ticks)
+        block = sums[begin:end]
+        if window == "hamming":
+            for delay, gain in enumerate(gains):
+                block += padded[begin + delay : end + delay] * gain
+        else:
+            # Tick by tick from the oldest on: a running sum would be faster still, but rounds
+            # otherwise.
+            for delay in range(1, taps):
+                block += padded[begin + delay : end + delay]
     if window == "moving_average":
-        # Summed tick by tick from the oldest on: a running sum would be faster still, but rounds
-        # otherwise.
-        summed = padded[:ticks].copy()
-        for delay in range(1, taps):
-            summed += padded[delay : delay + ticks]
-        return np.asarray(summed / taps)
-    filtered = np.zeros_like(angles)
-    for delay, gain in enumerate(gains):
-        filtered += padded[delay : delay + ticks] * gain
-    return filtered
+        sums /= taps
+    return sums

@@ -24,16 +24,18 @@ from services.optimizer.service import JobService
 T = TypeVar("T")
 
 
-class SimulationSlots:
-    """Lets only so many walks on request compute at the same time. Of one event loop."""
+class ComputingSlots:
+    """Lets only so many requests of a kind compute at the same time. Of one event loop."""
 
-    def __init__(self, workers: int, queue: int) -> None:
+    def __init__(self, what: str, workers: int, queue: int) -> None:
         """Start without any at work.
 
         Args:
+            what: they compute, for messages.
             workers: how many compute at the same time, each in a thread.
             queue: how many more may wait.
         """
+        self._what = what
         self._limiter = anyio.CapacityLimiter(workers)
         self._queue = queue
 
@@ -49,12 +51,29 @@ class SimulationSlots:
         Raises:
             EvaluatorUnavailable: too many are waiting already.
         """
+        self._check_queue()
+        return await run_sync(work, limiter=self._limiter)
+
+    @asynccontextmanager
+    async def one(self) -> AsyncIterator[None]:
+        """Have a slot while the block runs, which may compute in any one thread.
+
+        Yields:
+            Nothing.
+
+        Raises:
+            EvaluatorUnavailable: too many are waiting already.
+        """
+        self._check_queue()
+        async with self._limiter:
+            yield
+
+    def _check_queue(self) -> None:
         waiting = self._limiter.statistics().tasks_waiting
         if self._limiter.available_tokens == 0 and waiting >= self._queue:
             raise EvaluatorUnavailable(
-                "too many simulations are waiting; try again in a few seconds"
+                f"too many {self._what} are waiting; try again in a few seconds"
             )
-        return await run_sync(work, limiter=self._limiter)
 
 
 _VALIDATIONS: Final = 2
@@ -79,16 +98,17 @@ class Component:
 class State(TypedDict):
     """`request.state` of every request: what the lifespan of the application yields.
 
-    validations: threads that validate bodies. draining: set by the server on the first signal to
-    end; it still answers then. stopping: set when it begins to stop; event streams end then.
-    topics: jobs that these streams follow. streams: that are open, by asker. components: parts of
-    the process beside the database.
+    slots: for walks. analyses: for what reads whole histories. validations: threads that validate
+    bodies. draining: set by the server on the first signal to end; it still answers then. stopping:
+    set when it begins to stop; event streams end then. topics: jobs that these streams follow.
+    streams: that are open, by asker. components: parts of the process beside the database.
     metrics: of this process.
     """
 
     service: JobService
     settings: Settings
-    slots: SimulationSlots
+    slots: ComputingSlots
+    analyses: ComputingSlots
     validations: anyio.CapacityLimiter
     draining: asyncio.Event
     streams: OpenStreams
@@ -118,13 +138,15 @@ def lifespan(
 
     @asynccontextmanager
     async def run(_app: FastAPI) -> AsyncIterator[State]:
-        slots = SimulationSlots(settings.api_simulation_workers, settings.api_simulation_queue)
         topics, stopping = Topics(), asyncio.Event()
         waking = asyncio.create_task(topics.end_with(stopping))
+        workers, queue = settings.api_simulation_workers, settings.api_simulation_queue
+        analysts, waiting = settings.api_analysis_workers, settings.api_analysis_queue
         yield State(
             service=service,
             settings=settings,
-            slots=slots,
+            slots=ComputingSlots("simulations", workers, queue),
+            analyses=ComputingSlots("analyses", analysts, waiting),
             validations=anyio.CapacityLimiter(_VALIDATIONS),
             draining=asyncio.Event(),
             stopping=stopping,
@@ -156,13 +178,13 @@ async def settings(request: Request) -> Settings:
     return cast(Settings, request.state.settings)
 
 
-async def slots(request: Request) -> SimulationSlots:
+async def slots(request: Request) -> ComputingSlots:
     """The application's room for walks on request.
 
     Args:
         request: under way.
     """
-    return cast(SimulationSlots, request.state.slots)
+    return cast(ComputingSlots, request.state.slots)
 
 
 async def counted_stream(request: Request) -> AsyncIterator[None]:
@@ -179,6 +201,16 @@ async def counted_stream(request: Request) -> AsyncIterator[None]:
     """
     with cast(OpenStreams, request.state.streams).one_of(request.state.asker):
         yield
+
+
+async def _analysing(request: Request) -> AsyncIterator[None]:
+    """A slot for a question about whole histories, until the answer is there."""
+    async with cast(ComputingSlots, request.state.analyses).one():
+        yield
+
+
+Analysing = Depends(_analysing, scope="function")
+"""Of routes that read and judge whole histories in Python, whose threads take turns."""
 
 
 async def stopping(request: Request) -> asyncio.Event:
@@ -210,7 +242,7 @@ async def metrics(request: Request) -> Metrics:
 
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, Depends(settings)]
-Slots = Annotated[SimulationSlots, Depends(slots)]
+Slots = Annotated[ComputingSlots, Depends(slots)]
 Stopping = Annotated[asyncio.Event, Depends(stopping)]
 FollowedJobs = Annotated[Topics, Depends(topics)]
 ServerMetrics = Annotated[Metrics, Depends(metrics)]

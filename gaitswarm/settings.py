@@ -148,6 +148,17 @@ class Settings(BaseSettings):
     api_simulation_queue: int = Field(
         default=16, ge=0, description="Further ones that may wait; more are told to come later."
     )
+    api_analysis_workers: int = Field(
+        default=2, ge=1, le=64, description="Questions about whole histories computed at a time."
+    )
+    api_analysis_queue: int = Field(
+        default=64, ge=0, description="Further ones that may wait; more are told to come later."
+    )
+    api_max_fork_seconds: float = Field(
+        default=20.0,
+        gt=0.0,
+        description="How long bringing a search to where it was may take, for a fork [s].",
+    )
     api_max_simulated_seconds: float = Field(
         default=300.0, gt=0.0, description="Longest walk of one request, all scenarios added [s]."
     )

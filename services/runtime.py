@@ -104,6 +104,7 @@ def open_runtime(
     longest_job: float = math.inf,
     keeps_house: bool = False,
     retention_days: float | None = None,
+    longest_fork: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
     metrics: Metrics | None = None,
     tracing: Tracing | None = None,
@@ -125,6 +126,7 @@ def open_runtime(
         longest_job: Simulated time of all walks of all designs that a new job may have [s].
         keeps_house: Whether rows of deleted jobs are removed, and jobs that ended long ago.
         retention_days: After so long they did [d]; None: none is deleted.
+        longest_fork: Time that bringing a search to where it was may take, for a fork [s].
         should_stop: As for `open_evaluator`.
         metrics: Are told what store, runner and workers do; None: nobody asks.
         tracing: Is told of the jobs that are run, and closed; None: nobody follows them.
@@ -157,7 +159,7 @@ def open_runtime(
             notifier = Notifier(store, webhook_hosts, webhook_secret)
             stack.callback(notifier.stop)
             notifier.start()
-        service = JobService(store, longest_job=longest_job)
+        service = JobService(store, longest_job=longest_job, longest_fork=longest_fork)
         if keeps_house:
             keeper = Housekeeping(store, retention_days)
             keeper.start()

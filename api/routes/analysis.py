@@ -11,6 +11,7 @@ from api.bodies import validated
 from api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
+    Analysing,
     ExistingJob,
     JobId,
     ServerSettings,
@@ -52,6 +53,7 @@ router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
 
 @router.get(
     "/distribution",
+    dependencies=[Analysing],
     operation_id="get_distribution",
     summary="See how designs are spread",
     response_model=DistributionView,
@@ -70,6 +72,7 @@ def get_distribution(
 
 @router.get(
     "/particles",
+    dependencies=[Analysing],
     operation_id="get_particles",
     summary="Take every design as numbers",
     response_class=Response,
@@ -116,6 +119,7 @@ def get_particles(
 
 @router.post(
     "/ranking",
+    dependencies=[Analysing],
     operation_id="rank_designs",
     summary="Judge by another preference",
     response_model=RankingView,
@@ -132,6 +136,7 @@ def rank_designs(request: RankingRequest, job: ExistingJob, service: Service) ->
 
 @router.get(
     "/scenarios",
+    dependencies=[Analysing],
     operation_id="get_scenario_families",
     summary="See which scenarios matter",
     response_model=ScenarioFamiliesView,
@@ -153,6 +158,7 @@ def get_scenario_families(
 
 @router.get(
     "/front",
+    dependencies=[Analysing],
     operation_id="get_front",
     summary="See what designs trade",
     response_model=FrontView,
@@ -182,6 +188,7 @@ def get_front(
 
 @router.get(
     "/preference-for",
+    dependencies=[Analysing],
     operation_id="get_preference_for",
     summary="Find the preference of a design",
     responses=problems(404, 409, 422),

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from api.dependencies import ExistingJob, JobIdText, Service
+from api.dependencies import Analysing, ExistingJob, JobIdText, Service
 from api.documentation import problems
 from gaitswarm.requests.targets import run_targets
 from gaitswarm.views import PREFIX
@@ -19,6 +19,7 @@ router = APIRouter(prefix=PREFIX)
 @router.get(
     "/jobs/{job_id}/targets",
     tags=["analysis"],
+    dependencies=[Analysing],
     operation_id="get_targets",
     summary="See how near a calibration comes to its targets",
     responses=problems(404, 409, 422),

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from api.dependencies import ExistingJob, Service
+from api.dependencies import Analysing, ExistingJob, Service
 from api.documentation import problems
 from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.views import PREFIX
@@ -19,6 +19,7 @@ router = APIRouter(prefix=PREFIX)
 @router.get(
     "/jobs/{job_id}/certificate",
     tags=["analysis"],
+    dependencies=[Analysing],
     operation_id="get_certificate",
     summary="See what a design comes to in many worlds",
     responses=problems(404, 409, 422),

@@ -11,6 +11,7 @@ from fastapi.responses import StreamingResponse
 from api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
+    Analysing,
     ExistingJob,
     JobId,
     ServerSettings,
@@ -161,6 +162,7 @@ def _check_length(settings: Settings, seconds: float) -> None:
 
 @router.get(
     "/evidence",
+    dependencies=[Analysing],
     operation_id="get_evidence",
     summary="Download evidence",
     response_class=Response,

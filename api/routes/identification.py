@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Path, Query, Response, status
 
 from api.access import Actor, may_submit
 from api.bodies import validated
-from api.dependencies import ExistingJob, JobIdText, Service
+from api.dependencies import Analysing, ExistingJob, JobIdText, Service
 from api.documentation import problems
 from gaitswarm.views import PREFIX
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
@@ -62,6 +62,7 @@ def get_recording(
 @router.get(
     "/jobs/{job_id}/parameters",
     tags=["analysis"],
+    dependencies=[Analysing],
     operation_id="get_parameters",
     summary="See which parameters can be trusted",
     responses=problems(404, 409, 422),

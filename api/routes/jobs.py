@@ -9,7 +9,7 @@ from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, 
 
 from api.access import Actor, Owner, OwnersQuota, may_command
 from api.bodies import validated
-from api.dependencies import JobId, JobIdText, ServerSettings, Service, Slots
+from api.dependencies import Analysing, JobId, JobIdText, ServerSettings, Service, Slots
 from api.documentation import problems
 from gaitswarm.views import (
     PREFIX,
@@ -123,6 +123,7 @@ def submit_job(
 
 @router.post(
     "/jobs/{job_id}/fork",
+    dependencies=[Analysing],
     operation_id="fork_job",
     summary="Fork a job",
     status_code=status.HTTP_202_ACCEPTED,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Query
 
-from api.dependencies import JobId, JobIdText, Service
+from api.dependencies import Analysing, JobId, JobIdText, Service
 from api.documentation import problems
 from gaitswarm.requests.tournament import run_problem, run_standings, run_tournaments
 from gaitswarm.views import PREFIX
@@ -21,6 +21,7 @@ router = APIRouter(prefix=f"{PREFIX}/tournaments", tags=["tournaments"])
 
 @router.get(
     "",
+    dependencies=[Analysing],
     operation_id="list_tournaments",
     summary="List tournaments",
     responses=problems(),
@@ -36,6 +37,7 @@ def list_tournaments(service: Service) -> TournamentsView:
 
 @router.get(
     "/{job_id}",
+    dependencies=[Analysing],
     operation_id="get_standings",
     summary="See what a tournament comes to",
     responses=problems(404, 409, 422),
@@ -58,6 +60,7 @@ def get_standings(
 
 @router.get(
     "/{job_id}/problems/{problem}",
+    dependencies=[Analysing],
     operation_id="get_problem_runs",
     summary="See all runs on a problem",
     responses=problems(404, 409, 422),

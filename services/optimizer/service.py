@@ -40,10 +40,12 @@ class JobService(Questions, Deletion):
         provenance: spec -> provenance of what is computed from here for it.
         longest_job: simulated time of all walks of all designs that a job may have [s]; if it is
             finite, the walks of an iteration are limited as well.
+        longest_fork: time that bringing a search to where it was may take, for a fork [s].
     """
 
     provenance: Callable[[Spec], JobProvenance] = job_provenance
     longest_job: float = math.inf
+    longest_fork: float = math.inf
     _rates: MeasuredRates = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -126,7 +128,8 @@ class JobService(Questions, Deletion):
             InvalidRequest: it makes no sense or cannot be simulated; names the field.
             ProvenanceChanged: it would go on with numbers of another provenance, and that is not
                 accepted.
-            Conflict: its search cannot be taken over, or it has no design to start from.
+            Conflict: its search cannot be taken over, or not in time, or it has no design to
+                start from.
             IdempotencyConflict: the key was used before, for another job.
             QuotaExceeded: the owner has too much under way.
         """
@@ -141,7 +144,7 @@ class JobService(Questions, Deletion):
             lambda: self.asked(job, request.from_iteration),
             last.link.digest,
         )
-        spec, fork = forked(parent, request, self.provenance)
+        spec, fork = forked(parent, request, self.provenance, longest=self.longest_fork)
         seconds = self._check(spec)
         if sent is None:
             sent = request.model_dump(mode="json", exclude_unset=True)

@@ -80,6 +80,23 @@ def test_a_fork_with_the_same_settings_goes_on_bit_for_bit_as_its_parent(
     assert forked.progress.best_fitness == store.job(job.id).progress.best_fitness
 
 
+@pytest.mark.parametrize("method", ["pso", "nelder-mead"])
+def test_a_search_that_takes_too_long_to_bring_to_where_it_was_is_not_waited_for(
+    store: SqlStore, method: str
+) -> None:
+    job = parent(store, optimizer={"name": method, "particles": PARTICLES})
+    hasty = JobService(store, longest_fork=0.0)
+    request = ForkRequest(from_iteration=3)
+    with pytest.raises(
+        Conflict, match=r"longer than the 0 s .* iteration \d of 3\); fork it earlier"
+    ):
+        hasty.fork(job.id, request)
+    assert [listed.id for listed in store.jobs().items] == [job.id]
+    # A fork that starts from designs has nothing to bring anywhere.
+    another = ForkRequest.model_validate({"from_iteration": 3, "optimizer": "cma-es"})
+    assert hasty.fork(job.id, another)[0].lineage is not None
+
+
 def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(store: SqlStore) -> None:
     job = parent(store)
     forked = fork(store, job, 2)

@@ -14,6 +14,8 @@ designs, too, as judged by that preference.
 from __future__ import annotations
 
 import json
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -122,7 +124,11 @@ def check_begun(job: Job, iterations: int) -> None:
 
 
 def forked(
-    parent: Parent, request: ForkRequest, provenance: Callable[[AnySpec], JobProvenance]
+    parent: Parent,
+    request: ForkRequest,
+    provenance: Callable[[AnySpec], JobProvenance],
+    *,
+    longest: float = math.inf,
 ) -> tuple[AnySpec, Fork]:
     """Decide how a job is forked.
 
@@ -130,6 +136,7 @@ def forked(
         parent: The job that is forked.
         request: What is asked for.
         provenance: Spec -> provenance of what is computed here for it.
+        longest: Time that bringing its search to where it was may take [s].
 
     Returns:
         Spec of the fork, and how it is stored.
@@ -138,7 +145,7 @@ def forked(
         InvalidRequest: It makes no sense; names the field.
         ProvenanceChanged: The fork would go on with numbers of another provenance, and that is not
             accepted.
-        Conflict: Its search cannot be brought to where it was.
+        Conflict: Its search cannot be brought to where it was, or not in that time.
     """
     before = parent.job.spec
     spec = forked_spec(before, request)
@@ -156,7 +163,15 @@ def forked(
     reason = _why_not(before, changed)
     if not reason:
         try:
-            state = _search_state(parent, spec, fitness if changed else None)
+            until = time.monotonic() + longest
+            state = _search_state(parent, spec, fitness if changed else None, until)
+        except TimeoutError as error:
+            raise Conflict(
+                f"to bring the search of job {parent.job.id} to where it was takes longer than the"
+                f" {longest:g} s that it may take here ({error}); fork it earlier, or where its"
+                " database is, with `gaitswarm fork`. With another optimizer the fork starts from"
+                " the best designs"
+            ) from error
         except ValueError as error:
             if not changed:
                 raise Conflict(
@@ -197,20 +212,24 @@ def _why_not(parent: AnySpec, changed: Sequence[str]) -> str:
     return ""
 
 
-def _search_state(parent: Parent, spec: AnySpec, anew: Floats | None) -> dict[str, Any]:
+def _search_state(
+    parent: Parent, spec: AnySpec, anew: Floats | None, until: float
+) -> dict[str, Any]:
     """The optimizer's dump after the last ask that is taken over.
 
-    anew: (r,) fitness by another preference; None: by the parent's. Raises ValueError.
+    anew: (r,) fitness by another preference; None: by the parent's. until: as of `retraced`. Raises
+    ValueError, TimeoutError.
     """
     asked, told = parent.asked(), parent.told(parent.job.spec, parent.columns.fitness)
+    budgets = budgets_of(parent.job)
     if anew is None:
-        return _dumped(retraced(spec, budgets_of(parent.job), asked, told))
+        return _dumped(retraced(spec, budgets, asked, told, until=until))
     told_anew = parent.told(spec, anew)
     try:
         # Whatever the method is, if it would have asked for the same, it is where it would be.
-        return _dumped(retraced(spec, budgets_of(parent.job), asked, told_anew))
+        return _dumped(retraced(spec, budgets, asked, told_anew, until=until))
     except ValueError:
-        search = retraced(spec, budgets_of(parent.job), asked, told)
+        search = retraced(spec, budgets, asked, told, until=until)
     name = spec.optimizer.name
     if isinstance(search, Rejudging):
         search.rejudge(list(zip(asked[:-1], told_anew[:-1], strict=True)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +16,12 @@ Floats = NDArray[np.float64]
 
 
 def retraced(
-    spec: Spec, budgets: Sequence[int], asked: Sequence[Floats], told: Sequence[Floats]
+    spec: Spec,
+    budgets: Sequence[int],
+    asked: Sequence[Floats],
+    told: Sequence[Floats],
+    *,
+    until: float = math.inf,
 ) -> Optimizer:
     """Take a search along a path, up to its last ask, which is not answered.
 
@@ -24,19 +31,24 @@ def retraced(
             method may ask for other designs under another budget.
         asked: (n, d) positions of every iteration, at least one.
         told: What it was told of every iteration, see `Spec.told`; that of the last is left out.
+        until: When `time.monotonic` is past this, it is given up [s].
 
     Returns:
         The search, which has asked for the last of these positions.
 
     Raises:
         ValueError: It would have asked for others; names the first such iteration.
+        TimeoutError: It takes too long; says how far it came.
     """
     searches = [create_optimizer(spec.model_copy(update={"iterations": n})) for n in budgets]
     search = searches.pop(0)
     for index, positions in enumerate(asked):
         if index:
             search.tell(told[index - 1])
-        state = search.dump()
+        if time.monotonic() > until:
+            raise TimeoutError(f"it came to iteration {index} of {len(asked)}")
+        # Of some methods as long as all that they were told.
+        state = search.dump() if searches else {}
         while not _asks_for(search, positions):
             if not searches:
                 raise ValueError(f"its search would ask for other designs in iteration {index}")

@@ -25,6 +25,10 @@ _FIELDS: Final = (
 HEIGHT_LOSS: Final = _FIELDS.index("height_loss")
 """Index of f6, which preferences weigh by its absolute value."""
 
+_PIECE: Final = 4096
+"""Walks judged at a time: lists of a whole history would stop a server's other threads for as long
+as it takes to make them and to look for garbage among them."""
+
 # At an exponent of ten, five factors of a million are still within a double; beyond, a utility is
 # infinite, as that of a failed walk.
 Bias = Annotated[float, Field(ge=0.0, le=1e6)]
@@ -139,12 +143,15 @@ def log_utilities(
     Returns:
         (...), +inf where a walk failed, or where an objective with a weight is not finite.
     """
-    flat = objectives.reshape(-1, objectives.shape[-1])
-    values = [
-        math.inf if bad else _log_product(row, preference)
-        for row, bad in zip(flat.tolist(), failed.reshape(-1).tolist(), strict=True)
-    ]
-    return np.array(values, dtype=np.float64).reshape(failed.shape)
+    flat, lost = objectives.reshape(-1, objectives.shape[-1]), failed.reshape(-1)
+    values = np.empty(len(flat))
+    for begin in range(0, len(flat), _PIECE):
+        piece = slice(begin, begin + _PIECE)
+        values[piece] = [
+            math.inf if bad else _log_product(row, preference)
+            for row, bad in zip(flat[piece].tolist(), lost[piece].tolist(), strict=True)
+        ]
+    return values.reshape(failed.shape)
 
 
 def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:

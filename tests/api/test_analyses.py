@@ -1,0 +1,83 @@
+"""Questions about whole histories: so many at a time, and nobody else waits for them."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx2
+import pytest
+from fastapi.routing import APIRoute
+
+from api.dependencies import Analysing
+from services.optimizer.jobs.columns import EvaluationColumns
+from services.optimizer.jobs.job import Job
+from services.optimizer.service import JobService
+from tests.api.conftest import Commit, Serve
+
+WHOLE_HISTORIES = {
+    *("get_distribution", "get_particles", "rank_designs", "get_scenario_families", "get_front"),
+    *("get_preference_for", "get_certificate", "get_targets", "get_parameters"),
+    *("list_tournaments", "get_standings", "get_problem_runs", "get_evidence", "fork_job"),
+}
+
+
+class Waiting(JobService):
+    """Answers questions about whole histories when it is let to."""
+
+    begun = threading.Event()
+    go_on = threading.Event()
+
+    def columns(self, job: Job) -> EvaluationColumns:
+        self.begun.set()
+        assert self.go_on.wait(20.0)
+        return super().columns(job)
+
+
+@pytest.mark.parametrize("question", ["distribution", "front", "evidence"])
+def test_of_many_questions_some_wait_and_more_are_told_to_come_later(
+    serve: Serve, service: JobService, job: Job, commit: Commit, question: str
+) -> None:
+    commit(job, 2)
+    waiting = Waiting(service.store)
+    waiting.begun.clear()
+    waiting.go_on.clear()
+    server = serve(waiting, api_analysis_workers=1, api_analysis_queue=1)
+    path = f"{server.url}/v1/jobs/{job.id}/{question}"
+
+    def ask() -> int:
+        return httpx2.get(path, timeout=20.0).status_code
+
+    with ThreadPoolExecutor(2) as threads:
+        first = threads.submit(ask)
+        assert waiting.begun.wait(20.0)
+        second = threads.submit(ask)
+        try:
+            refused = None
+            for _ in range(200):
+                # Until the second one has come to wait, this one takes its place.
+                try:
+                    refused = httpx2.get(path, timeout=0.2)
+                    break
+                except httpx2.ReadTimeout:
+                    continue
+            assert refused is not None
+            assert refused.status_code == 503
+            assert "too many analyses" in refused.json()["detail"]
+            assert refused.headers["Retry-After"]
+            # Others are answered at once: no thread of theirs, and no event loop, is taken.
+            for other in ("/v1/healthz", "/v1/jobs", f"/v1/jobs/{job.id}"):
+                assert server.client.get(other).status_code == 200
+        finally:
+            waiting.go_on.set()
+        assert first.result() == 200
+        assert second.result() in (200, 503)
+
+
+def test_these_are_the_questions_that_are_counted(serve: Serve) -> None:
+    counted = {
+        route.operation_id
+        for route in serve().app.routes
+        if isinstance(route, APIRoute) and Analysing in route.dependencies
+    }
+    assert counted == WHOLE_HISTORIES

@@ -7,7 +7,6 @@ from typing import Any
 
 import httpx2
 import pytest
-from fastapi.routing import APIRoute
 
 import gaitswarm
 from api.access import COOKIE, may_command, may_submit
@@ -18,14 +17,14 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Serve
-from tests.examples.servers import Server
+from tests.examples.servers import Server, operations
 
 Bearer = Callable[[Scope], dict[str, str]]
 
 QUESTIONS = {
     *("rank_designs", "controller_surface", "estimate_job", "simulate", "estimate_robustness"),
     *("find_robust_preferences", "write_firmware", "summarize_firmware"),
-    *("replay", "begin_session", "end_session"),
+    *("replay", "verify_history", "begin_session", "end_session"),
 }
 """Operations that are no GET, and yet change nothing that is stored."""
 
@@ -141,8 +140,8 @@ def test_a_job_that_nobody_may_see_is_not_told_from_one_that_is_not_there(
 
 def test_every_operation_that_changes_something_asks_who_may(serve: Serve) -> None:
     server: Server = serve()
-    for route in server.app.routes:
-        if not isinstance(route, APIRoute) or not (route.methods or set()) - {"GET", "HEAD"}:
+    for route in operations(server.app):
+        if not (route.methods or set()) - {"GET", "HEAD"}:
             continue
         asked = {dependency.call for dependency in route.dependant.dependencies}
         assert bool(asked & {may_submit, may_command}) is (route.operation_id not in QUESTIONS), (

@@ -7,13 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import httpx2
 import pytest
-from fastapi.routing import APIRoute
 
 from api.dependencies import Analysing
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 from tests.api.conftest import Commit, Serve
+from tests.examples.servers import operations
 
 WHOLE_HISTORIES = {
     *("get_distribution", "get_particles", "rank_designs", "get_scenario_families", "get_front"),
@@ -75,9 +75,6 @@ def test_of_many_questions_some_wait_and_more_are_told_to_come_later(
 
 
 def test_these_are_the_questions_that_are_counted(serve: Serve) -> None:
-    counted = {
-        route.operation_id
-        for route in serve().app.routes
-        if isinstance(route, APIRoute) and Analysing in route.dependencies
-    }
+    app = serve().app
+    counted = {route.operation_id for route in operations(app) if Analysing in route.dependencies}
     assert counted == WHOLE_HISTORIES

@@ -12,6 +12,8 @@ from typing import Any, cast
 
 import httpx2
 import numpy as np
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
 from numpy.typing import NDArray
 
 from api import dependencies
@@ -131,6 +133,19 @@ class ServerProcess(Served):
             self.process.kill()
             self._drain.join()
             output(self.process.stderr).close()
+
+
+def operations(app: FastAPI) -> list[APIRoute]:
+    """All operations under /v1, with what each depends on."""
+    found = [
+        route
+        for included in app.routes
+        for route in getattr(included, "original_router", app).routes
+        if isinstance(route, APIRoute)
+    ]
+    documented = [method for item in app.openapi()["paths"].values() for method in item]
+    assert len(found) == len(documented)
+    return found
 
 
 def unframed(content: bytes) -> tuple[dict[str, Any], NDArray[np.float32]]:

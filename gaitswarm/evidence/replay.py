@@ -75,8 +75,6 @@ def simulated_differences(
     Raises:
         SimulationInputError: A design cannot be simulated.
     """
-    from services.runtime import open_evaluator
-
     found: list[DifferenceView] = []
     # What only reads need not wait for a database's packages.
     from services.runtime import open_evaluator

@@ -21,7 +21,7 @@ class AuditEntryView(View):
         " the machine itself.",
         examples=["ci"],
     )
-    action: AuditAction = Field(description="What was done.", examples=["cancel"])
+    action: AuditAction = Field(description="What they did.", examples=["cancel"])
     job_id: str | None = Field(
         description="To which job; null for what is about none. The job may be gone since.",
         examples=["k2q7zr5dm9xw"],

@@ -1,0 +1,105 @@
+"""A campaign of random faults against a real deployment on this machine.
+
+    python -m benchmarks.faults --faults 300 --seed 1 [--database postgresql] [--evaluator ray]
+        [--kinds kill-api,kill-runner] [--away 600] [--minutes 30] [--report FILE.md] [--json]
+
+It reports three numbers that should be zero: iterations that were lost, histories that differ from
+those of the same jobs alone, and steps that a person would have had to take. Exit code 1 if one is
+not. As root, the database has a small disk and a network of its own; without, kinds that need these
+are left out, and named.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import signal
+import statistics
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from benchmarks.faults.campaign import Result, run
+from benchmarks.faults.deployment import Deployment
+from benchmarks.faults.kinds import KINDS, ClusterAway
+from benchmarks.faults.plan import plan
+
+
+def table(result: Result) -> str:
+    """What came of a campaign, in Markdown."""
+    lines = [
+        "| fault | times | lasts [s] | next commit after [s], median | longest |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for name in sorted({kind for kind, _, _ in result.faults}):
+        lasted = [seconds for kind, seconds, _ in result.faults if kind == name]
+        after = [seconds for kind, _, seconds in result.faults if kind == name]
+        lines.append(
+            f"| {name} | {len(after)} | {min(lasted):.1f} to {max(lasted):.1f}"
+            f" | {statistics.median(after):.1f} | {max(after):.1f} |"
+        )
+    restarts = ", ".join(f"{name} {count}" for name, count in result.restarts.items())
+    lines += [
+        "",
+        f"{len(result.faults)} faults in {result.seconds:.0f} s. {result.jobs} jobs succeeded.",
+        f"They have {result.iterations} iterations. Processes started again: {restarts}.",
+        "",
+        f"- iterations lost: {result.lost}",
+        f"- histories that differ: {len(result.different)}",
+        f"- manual steps: {len(result.manual)}",
+        *(f"  - {step}" for step in result.manual),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Run a campaign; 1 if anything was lost, differs or needed a person."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--faults", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--database", choices=["sqlite", "postgresql"], default="sqlite")
+    parser.add_argument("--evaluator", choices=["in-process", "ray"], default="in-process")
+    parser.add_argument("--kinds", help="names with commas between; default: all that are possible")
+    parser.add_argument("--away", type=float, default=20.0, help="how long the cluster is away [s]")
+    parser.add_argument("--minutes", type=float, help="inject no more faults after so long")
+    parser.add_argument("--iterations", type=int, default=60, help="of each job")
+    parser.add_argument("--patience", type=float, default=180.0, help="without a commit [s]")
+    parser.add_argument("--report", type=Path, help="file for the table")
+    parser.add_argument("--logs", type=Path, help="folder for the processes' logs")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    ClusterAway.shortest = ClusterAway.longest = options.away
+    with_ray = options.evaluator == "ray"
+    # A library for the clock that waits are not told of: Ray's would take an hour longer.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    opened = Deployment(options.database, with_ray, with_clock=not with_ray)
+    until = time.monotonic() + 60.0 * options.minutes if options.minutes else None
+    with opened as deployment:
+        possible = [name for name, kind in KINDS.items() if kind.possible(deployment)]
+        chosen = options.kinds.split(",") if options.kinds else possible
+        impossible = sorted(set(chosen) - set(possible))
+        if impossible:
+            parser.error(f"not possible here: {', '.join(impossible)}")
+        left_out = sorted(set(KINDS) - set(chosen))
+        print(f"left out: {', '.join(left_out) or 'none'}", file=sys.stderr)
+        result = run(
+            deployment,
+            plan(options.seed, options.faults, chosen),
+            iterations=options.iterations,
+            patience=options.patience,
+            until=until,
+            say=lambda line: print(line, file=sys.stderr, flush=True),
+        )
+        if options.logs:
+            shutil.copytree(deployment.folder / "logs", options.logs, dirs_exist_ok=True)
+    written = json.dumps(asdict(result), indent=2) if options.json else table(result)
+    print(written)
+    if options.report:
+        options.report.write_text(table(result), encoding="utf-8")
+    return int(bool(result.lost or result.different or result.manual))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,293 @@
+"""The kinds of faults: how each is brought about, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sqlite3
+from abc import ABC, abstractmethod
+from contextlib import suppress
+from typing import ClassVar, Final
+
+from sqlalchemy import Connection, Engine, NullPool, create_engine, text
+
+from benchmarks.faults.deployment import Deployment
+from benchmarks.faults.supervisor import Service
+
+_MEBIBYTE: Final = 1 << 20
+
+
+class Fault(ABC):
+    """A fault in a deployment.
+
+    Attributes:
+        name: Of its kind.
+        shortest, longest: How long it lasts [s].
+
+    Args:
+        deployment: What it is a fault of.
+        draw: From [0, 1): chooses the victim.
+    """
+
+    name: ClassVar[str]
+    shortest: float = 0.0
+    longest: float = 0.0
+
+    def __init__(self, deployment: Deployment, draw: float) -> None:
+        self.deployment, self.draw = deployment, draw
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        """Whether it can be brought about in a deployment."""
+        del deployment
+        return True
+
+    @abstractmethod
+    def inject(self) -> None:
+        """Let it begin."""
+
+    def heal(self) -> None:  # noqa: B027 - a process that was killed needs no healing
+        """Let it end."""
+
+    @property
+    def runner(self) -> Service:
+        """The runner that it hits."""
+        runners = self.deployment.runners
+        return runners[int(self.draw * len(runners))]
+
+
+class KillApi(Fault):
+    name = "kill-api"
+
+    def inject(self) -> None:
+        self.deployment.api.send(signal.SIGKILL)
+
+
+class KillRunner(Fault):
+    name = "kill-runner"
+
+    def inject(self) -> None:
+        self.runner.send(signal.SIGKILL)
+
+
+class KillPostgres(Fault):
+    """The postmaster, or one of its processes."""
+
+    name = "kill-postgresql"
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        return deployment.server is not None
+
+    def inject(self) -> None:
+        server = self.deployment.server
+        assert server is not None
+        victims = [server.pid, *server.below("postgres")]
+        _kill(victims[0] if self.draw < 0.5 else victims[int(self.draw * len(victims))])
+
+
+class _OfRay(Fault):
+    titles: ClassVar[tuple[str, ...]]
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        return deployment.cluster is not None
+
+    def inject(self) -> None:
+        assert self.deployment.cluster is not None
+        victims = self.deployment.cluster.below(*self.titles)
+        if victims:
+            _kill(victims[int(self.draw * len(victims))])
+
+
+class KillWorker(_OfRay):
+    name = "kill-worker"
+    titles = ("ray::",)
+
+
+class KillRaylet(_OfRay):
+    name = "kill-raylet"
+    titles = ("/raylet/raylet",)
+
+
+class KillGcs(_OfRay):
+    name = "kill-gcs"
+    titles = ("gcs_server",)
+
+
+class ClusterAway(_OfRay):
+    name = "cluster-away"
+    shortest = longest = 20.0
+
+    def inject(self) -> None:
+        assert self.deployment.cluster is not None
+        self.deployment.cluster.take_away()
+
+    def heal(self) -> None:
+        assert self.deployment.cluster is not None
+        self.deployment.cluster.bring_back()
+
+
+class StopRunner(Fault):
+    """SIGSTOP past a lease, then SIGCONT: it wakes when its jobs are another's."""
+
+    name = "stop-runner"
+
+    def __init__(self, deployment: Deployment, draw: float) -> None:
+        super().__init__(deployment, draw)
+        self.shortest = deployment.lease_seconds + 0.5
+        self.longest = deployment.lease_seconds + 4.0
+        self._victim = self.runner.pid
+
+    def inject(self) -> None:
+        _kill(self._victim, signal.SIGSTOP)
+
+    def heal(self) -> None:
+        _kill(self._victim, signal.SIGCONT)
+
+
+class DatabaseLocked(Fault):
+    """Somebody else's transaction holds the write lock."""
+
+    name = "database-locked"
+    shortest, longest = 1.0, 8.0
+    _sqlite: sqlite3.Connection | None = None
+    _postgresql: Connection | None = None
+    _engine: Engine | None = None
+
+    def inject(self) -> None:
+        with suppress(Exception):
+            if self.deployment.server is None:
+                self._sqlite = sqlite3.connect(self.deployment.url, timeout=10.0)
+                self._sqlite.execute("BEGIN IMMEDIATE")
+            else:
+                url = self.deployment.url.replace("postgresql://", "postgresql+psycopg://")
+                self._engine = create_engine(url, poolclass=NullPool)
+                self._postgresql = self._engine.connect()
+                self._postgresql.execute(text("LOCK TABLE jobs IN ACCESS EXCLUSIVE MODE"))
+
+    def heal(self) -> None:
+        for held in (self._sqlite, self._postgresql):
+            if held is not None:
+                with suppress(Exception):
+                    held.rollback()
+                    held.close()
+
+
+class DiskFull(Fault):
+    name = "disk-full"
+    shortest, longest = 1.0, 6.0
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        return deployment.disk is not None
+
+    def inject(self) -> None:
+        assert self.deployment.disk is not None
+        self.deployment.disk.fill()
+
+    def heal(self) -> None:
+        assert self.deployment.disk is not None
+        self.deployment.disk.make_room()
+
+
+class ClockStep(Fault):
+    """The time of day jumps by an hour, forth or back, and then to what it was."""
+
+    name = "clock-step"
+    shortest, longest = 1.0, 5.0
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        return deployment.clock is not None
+
+    def inject(self) -> None:
+        assert self.deployment.clock is not None
+        self.deployment.clock.step_to(3600 if self.draw < 0.5 else -3600)
+
+    def heal(self) -> None:
+        assert self.deployment.clock is not None
+        self.deployment.clock.step_to(0)
+
+
+class ForkRefused(Fault):
+    """No process and no thread is to be had any more."""
+
+    name = "fork-refused"
+    shortest, longest = 1.0, 6.0
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        return all(runner.group is not None for runner in deployment.runners)
+
+    def inject(self) -> None:
+        self._limit("1")
+
+    def heal(self) -> None:
+        self._limit("max")
+
+    def _limit(self, most: str) -> None:
+        assert self.runner.group is not None
+        (self.runner.group / "pids.max").write_text(most, encoding="ascii")
+
+
+class OutOfMemory(Fault):
+    """A runner gets no more address space than it has."""
+
+    name = "out-of-memory"
+    shortest, longest = 1.0, 5.0
+    _before: tuple[int, int, int] | None = None
+
+    def inject(self) -> None:
+        pid = self.runner.pid
+        with suppress(OSError):
+            with open(f"/proc/{pid}/statm", encoding="ascii") as status:  # noqa: PTH123
+                size = int(status.read().split()[0]) * resource.getpagesize()
+            soft, hard = resource.prlimit(pid, resource.RLIMIT_AS)
+            resource.prlimit(pid, resource.RLIMIT_AS, (size + _MEBIBYTE, hard))
+            self._before = pid, soft, hard
+
+    def heal(self) -> None:
+        if self._before is not None:
+            pid, soft, hard = self._before
+            with suppress(OSError):
+                resource.prlimit(pid, resource.RLIMIT_AS, (soft, hard))
+
+
+class Partition(Fault):
+    """The cable between PostgreSQL and the API or a runner is pulled."""
+
+    name = "partition"
+    shortest, longest = 2.0, 25.0
+
+    @staticmethod
+    def possible(deployment: Deployment) -> bool:
+        return deployment.network is not None
+
+    def inject(self) -> None:
+        assert self.deployment.network is not None
+        self.deployment.network.cut(self._client)
+
+    def heal(self) -> None:
+        assert self.deployment.network is not None
+        self.deployment.network.mend(self._client)
+
+    @property
+    def _client(self) -> int:
+        return int(self.draw * (1 + len(self.deployment.runners)))
+
+
+def _kill(pid: int, number: signal.Signals = signal.SIGKILL) -> None:
+    with suppress(ProcessLookupError):
+        os.kill(pid, number)
+
+
+KINDS: Final[dict[str, type[Fault]]] = {
+    kind.name: kind
+    for kind in (
+        *(KillApi, KillRunner, KillPostgres, KillWorker, KillRaylet, KillGcs, StopRunner),
+        *(DatabaseLocked, DiskFull, ClockStep, ForkRefused, OutOfMemory, Partition, ClusterAway),
+    )
+}
+"""Every kind by its name."""

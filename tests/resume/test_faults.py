@@ -1,0 +1,57 @@
+"""A short fault campaign: whatever happens, histories keep their bits and nobody has to help."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections import Counter
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from benchmarks.faults.campaign import remembered, run, specs, undisturbed
+from benchmarks.faults.deployment import Deployment
+from benchmarks.faults.kinds import KINDS
+from benchmarks.faults.plan import plan
+from services.optimizer.store.sql_store import open_store
+from services.runtime import run_embedded
+from services.worker.in_process import InProcessEvaluator
+
+
+def test_a_plan_is_drawn_from_its_seed_and_gives_every_kind_its_turn() -> None:
+    drawn = plan(1, 11, ["a", "b", "c"])
+    assert plan(1, 11, ["a", "b", "c"]) == drawn != plan(2, 11, ["a", "b", "c"])
+    assert sorted(Counter(fault.kind for fault in drawn).values()) == [3, 4, 4]
+
+
+@pytest.mark.slow
+def test_the_campaign_sees_a_single_bit_that_differs(tmp_path: Path) -> None:
+    (spec, *_) = specs(2)
+    (alone,) = undisturbed([spec])
+    path = tmp_path / "jobs.db"
+    with (
+        closing(open_store(str(path))) as store,
+        closing(InProcessEvaluator(1)) as evaluator,
+    ):
+        job, _ = store.create_job(spec)
+        run_embedded(store, evaluator, job.id)
+        assert remembered(store, job.id) == alone
+        with closing(sqlite3.connect(path)) as connection, connection:
+            (fitness,) = connection.execute("SELECT fitness FROM evaluations LIMIT 1").fetchone()
+            changed = fitness * (1.0 + 2.0**-52)
+            connection.execute("UPDATE evaluations SET fitness = ? WHERE rowid = 1", [changed])
+        assert remembered(store, job.id) != alone
+
+
+@pytest.mark.slow
+def test_processes_and_services_that_fail_cost_no_bit_and_nobodys_time() -> None:
+    kinds = ["kill-runner", "kill-api", "database-locked", "out-of-memory", "disk-full"]
+    with Deployment(with_clock=False) as deployment:
+        possible = [kind for kind in kinds if KINDS[kind].possible(deployment)]
+        planned = plan(1, len(possible), possible, pause=0.2)
+        result = run(deployment, planned, iterations=40, patience=60.0)
+    assert sorted(kind for kind, _, _ in result.faults) == sorted(possible)
+    assert result.jobs > 0
+    assert (result.lost, result.different, result.manual) == (0, [], [])
+    assert result.restarts["api"] == 1
+    assert result.restarts["runner-0"] + result.restarts["runner-1"] >= 1

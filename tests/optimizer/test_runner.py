@@ -209,6 +209,8 @@ def kernel_not_stored() -> Exception:
         BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"),
         MemoryError(),
         RuntimeError("can't start new thread"),
+        ImportError("_ufuncs.so: failed to map segment from shared object"),
+        ImportError("_ufuncs.so: cannot open shared object file: Too many open files"),
         kernel_not_stored(),
         KernelBuildError("cc did not compile: cannot write: No space left on device"),
         StoreUnavailable("database is locked"),

@@ -32,6 +32,12 @@ _SAID_BY_COMPILERS: Final = tuple(
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EAGAIN, errno.EMFILE)
 )
 
+_SAID_BY_LOADERS: Final = (
+    "failed to map segment",
+    *(os.strerror(number) for number in (errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)),
+)
+"""In the ImportError of a compiled module that the system could not load."""
+
 _TAKEN_UP: Final = 5.0
 """Seconds after which an attempt counts as one that has reached what was away: those that do not
 fail sooner."""
@@ -87,8 +93,8 @@ def is_infrastructure(error: BaseException) -> bool:
 
     Returns:
         True for what `Unavailable` stands for, for a lack of memory, threads, processes, files or
-        space, for connections that broke, and for a kernel that the system kept from being
-        compiled, stored or loaded.
+        space, for connections that broke, for a kernel that the system kept from being compiled,
+        stored or loaded, and for a module that it kept from being loaded.
     """
     return any(_is_of_the_machine(link) for link in _causes(error)) or (
         isinstance(error, KernelBuildError)
@@ -108,6 +114,8 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 def _is_of_the_machine(error: BaseException) -> bool:
     if isinstance(error, OSError):
         return error.errno in _OF_THE_MACHINE
+    if isinstance(error, ImportError):
+        return any(phrase in str(error) for phrase in _SAID_BY_LOADERS)
     # What `Thread.start` raises where the system refuses another thread.
     no_thread = isinstance(error, RuntimeError) and "can't start new thread" in str(error)
     return no_thread or isinstance(error, (Unavailable, MemoryError))

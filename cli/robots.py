@@ -59,6 +59,18 @@ def robot_data(text: str | None) -> str | dict[str, Any]:
         raise InvalidRequest(f"{folder} is not a robot's folder: {error}", field="robot") from error
 
 
+def folder_defaults(text: str) -> dict[str, Any]:
+    """What the folder of a robot says that its jobs have; nothing for other robots.
+
+    Raises InvalidRequest.
+    """
+    if text.lstrip().startswith("{") or not Path(text).is_dir():
+        return {}
+    from gaitswarm.robots import job_defaults
+
+    return job_defaults(text)
+
+
 def scenario_data(text: str) -> list[str | dict[str, Any]]:
     """What a spec would hold under `scenarios`: names and numbers, and the contents of files.
 

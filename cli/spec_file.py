@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from cli.robots import chosen_robot, scenario_data
+from cli.robots import chosen_robot, folder_defaults, scenario_data
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
@@ -77,6 +77,8 @@ def build_spec(options: SpecOptions) -> AnySpec:
     Raises InvalidRequest that names the field.
     """
     data = read_json_object(options.spec, "spec") if options.spec is not None else {}
+    if options.robot is not None and data.get("kind", "tuning") == "tuning":
+        data = folder_defaults(options.robot) | data
     chosen = {name: value for name, value in options.given.items() if name != "spec"}
     if options.scenarios is not None:
         chosen["scenarios"] = scenario_data(options.scenarios)

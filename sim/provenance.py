@@ -27,6 +27,7 @@ _NOT_IN_A_CASE: Final = (
     "benchmark.py",
     "measurement",
     "mujoco/export.py",
+    "proposal",
     "provenance.py",
     "replay.py",
     "robot/shapes.py",

@@ -195,19 +195,22 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
 
 def _feet(robot: Robot, scenario: Scenario) -> tuple[_KneeUpFoot | _ChainFoot, ...]:
     legs = zip(robot.legs, robot.description.legs, robot.planned_soles(), strict=True)
+    hips = max(leg.hip[2] for leg in robot.legs)
     return tuple(
-        _foot(leg, scenario, sole, data.phase + scenario.start_phase) for leg, data, sole in legs
+        _foot(leg, scenario, sole, data.phase + scenario.start_phase, hips)
+        for leg, data, sole in legs
     )
 
 
 def _foot(
-    leg: LegKinematics, scenario: Scenario, sole: float, phase: float
+    leg: LegKinematics, scenario: Scenario, sole: float, phase: float, hips: float
 ) -> _KneeUpFoot | _ChainFoot:
+    """hips: height of the highest one in the body's frame [m]."""
     stride, ground = scenario.stride_of(leg.side), scenario.hip_height - sole
     limits = tuple((lower, upper) for lower, upper in leg.limits.tolist())
     if isinstance(leg, ChainLeg):
         x, _, _ = leg.foot(leg.stance.tolist())
-        rest = (x, leg.side * scenario.radius, leg.hip[2] - ground)
+        rest = (x, leg.side * scenario.radius, hips - ground)
         return _ChainFoot(phase=phase, stride=stride, limits=limits, leg=leg, rest=rest)
     return _KneeUpFoot(
         phase=phase,

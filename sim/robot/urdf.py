@@ -1,8 +1,7 @@
-"""A robot's URDF: its kinematic tree, inertias and geometry. No other module reads one."""
+"""A robot's URDF: its kinematic tree, inertias and geometry."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -13,14 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
-from sim.robot.bounds import LARGEST, check_urdf, shortened
+from sim.robot.bounds import check_urdf
+from sim.robot.elements import Origin, numbers_of, origin_of
 from sim.robot.inertia import NO_INERTIA, BodyInertia
+from sim.robot.joints import Joint, joint_of, standardise
 
 if TYPE_CHECKING:
-    from scipy.spatial.transform import Rotation
+    pass
 
 Floats = NDArray[np.float64]
 
+GeometryUse = Literal["visual", "collision"]
 SolidKind = Literal["box", "sphere", "cylinder", "capsule"]
 
 _NONE_HELD: Final[Mapping[str, float]] = MappingProxyType({})
@@ -32,61 +34,6 @@ _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
     "capsule": ("radius", "length"),
 }
 """URDF's attributes of each solid, in the order of `Solid.size`."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Origin:
-    """Where a frame lies in another one.
-
-    Attributes:
-        xyz: position, (3,) [m].
-        rpy: roll, pitch and yaw about the other frame's fixed axes, (3,) [rad].
-    """
-
-    xyz: Floats
-    rpy: Floats
-
-    def matrix(self) -> Floats:
-        """Rotation from the frame to the other one, (3, 3); exact if it does not turn."""
-        return self._rotation().as_matrix() if self.rpy.any() else np.eye(3)
-
-    def quaternion(self) -> Floats:
-        """Rotation from the frame to the other one as quaternion x y z w, (4,)."""
-        return self._rotation().as_quat()
-
-    def _rotation(self) -> Rotation:
-        # Slow to import, and most robots have no turned frame.
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415
-
-        return Rotation.from_euler("xyz", self.rpy)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Joint:
-    """A joint of any type.
-
-    Attributes:
-        name: as in the file.
-        kind: its type: revolute, fixed, ...
-        parent: link that carries it.
-        child: link that it carries.
-        origin: of the child's frame in the parent's, at rest.
-        axis: that it turns about in the child's frame, of unit length, (3,).
-        limits: least and largest position [rad]; infinite where there are none.
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    origin: Origin
-    axis: Floats
-    limits: tuple[float, float]
-
-    @property
-    def fixed(self) -> bool:
-        """Whether it never moves."""
-        return self.kind == "fixed"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,16 +66,22 @@ class Link:
     inertia: BodyInertia
     element: ET.Element
 
-    def solids(self) -> tuple[Solid, ...]:
-        """Solids of its visual geometry, or else of its collision geometry; meshes are left out.
+    def solids(self, use: GeometryUse = "visual") -> tuple[Solid, ...]:
+        """Simple solids of its geometry; meshes are left out.
+
+        Args:
+            use: Geometry that is looked at first; the other one is where that has no solids.
+
+        Returns:
+            The solids.
 
         Raises:
             RobotFileError: A number of one cannot be read.
         """
-        for use in ("visual", "collision"):
+        for part_use in (use, "collision" if use == "visual" else "visual"):
             solids = [
                 self._solid(part, element)
-                for part in self.element.findall(use)
+                for part in self.element.findall(part_use)
                 for element in part.findall("geometry/*")
                 if element.tag in _SIZES
             ]
@@ -138,8 +91,8 @@ class Link:
 
     def _solid(self, part: ET.Element, solid: ET.Element) -> Solid:
         whose = f"link {self.name!r}"
-        size = [_numbers(solid, name, whose) for name in _SIZES[solid.tag]]
-        return Solid(cast(SolidKind, solid.tag), np.concatenate(size), _origin(part, whose))
+        size = [numbers_of(solid, name, whose) for name in _SIZES[solid.tag]]
+        return Solid(cast(SolidKind, solid.tag), np.concatenate(size), origin_of(part, whose))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,9 +178,9 @@ def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
         root = ET.fromstring(text)  # noqa: S314 - it has no entities of its own
     except ET.ParseError as error:
         raise RobotFileError(f"robot.urdf: {error}") from error
-    if _standardised(root, held):
+    if standardise(root, held):
         text = ET.tostring(root, encoding="unicode")
-    joints = tuple(_joint(element) for element in root.findall("joint"))
+    joints = tuple(joint_of(element) for element in root.findall("joint"))
     links: dict[str, Link] = {}
     for element in root.findall("link"):
         name = element.get("name", "")
@@ -237,54 +190,6 @@ def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
     in_order = {name: links[name] for name in _from_the_body(links, joints)}
     bodies, places = _rigid_bodies(in_order, joints)
     return Urdf(text, in_order, joints, bodies, places)
-
-
-def _standardised(root: ET.Element, held: Mapping[str, float]) -> bool:
-    """Fix joints that are held, let continuous ones be revolute; whether that changed anything."""
-    changed = False
-    missing = set(held)
-    for element in root.findall("joint"):
-        name, kind = element.get("name", ""), element.get("type", "")
-        if name in held:
-            missing.discard(name)
-            _hold(element, kind, held[name])
-        elif kind == "continuous":
-            # Pinocchio has two positions for a joint without ends.
-            element.set("type", "revolute")
-            for limit in element.findall("limit"):
-                element.remove(limit)
-            ends = {"lower": f"{-LARGEST:g}", "upper": f"{LARGEST:g}"}
-            ET.SubElement(element, "limit", ends | {"effort": "0", "velocity": "0"})
-        else:
-            continue
-        changed = True
-    if missing:
-        raise RobotFileError(f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}")
-    return changed
-
-
-def _hold(element: ET.Element, kind: str, angle: float) -> None:
-    """Let a joint be a fixed one, its frame turned by the angle."""
-    joint = _joint(element)
-    if kind not in ("revolute", "continuous", "fixed") and angle:
-        raise RobotFileError(
-            f"robot.toml: held_joints: joint {joint.name!r} is {kind} and does not turn; hold it"
-            " at 0"
-        )
-    if angle and kind != "fixed":
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415
-
-        turned = Rotation.from_matrix(joint.origin.matrix())
-        turned = turned * Rotation.from_rotvec(angle * joint.axis)
-        xyz, rpy = joint.origin.xyz.tolist(), turned.as_euler("xyz").tolist()
-        for origin in element.findall("origin"):
-            element.remove(origin)
-        numbers = {"xyz": xyz, "rpy": rpy}
-        ET.SubElement(element, "origin", {k: " ".join(map(repr, v)) for k, v in numbers.items()})
-    element.set("type", "fixed")
-    for part in ("axis", "limit", "mimic", "dynamics"):
-        for child in element.findall(part):
-            element.remove(child)
 
 
 def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterator[str]:
@@ -345,35 +250,6 @@ def _rigid_bodies(
     return bodies, places
 
 
-def _joint(element: ET.Element) -> Joint:
-    name = element.get("name", "")
-    ends = [element.find(end) for end in ("parent", "child")]
-    parent, child = ("" if end is None else end.get("link", "") for end in ends)
-    whose = f"joint {name!r}"
-    direction = element.find("axis")
-    axis = np.array([1.0, 0.0, 0.0]) if direction is None else _numbers(direction, "xyz", whose)
-    length = float(np.linalg.norm(axis))
-    kind = element.get("type", "")
-    if length == 0.0 and kind != "fixed":
-        raise RobotFileError(f"robot.urdf: {whose}: its axis has no direction")
-    origin = _origin(element, whose)
-    return Joint(
-        name, kind, parent, child, origin, axis / (length or 1.0), _limits(element, kind, whose)
-    )
-
-
-def _limits(joint: ET.Element, kind: str, whose: str) -> tuple[float, float]:
-    limit = joint.find("limit")
-    if kind == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
-        return -math.inf, math.inf
-    lower, upper = (float(_numbers(limit, end, whose, "0")[0]) for end in ("lower", "upper"))
-    if lower > upper:
-        raise RobotFileError(
-            f"robot.urdf: {whose}: its lower limit {lower:g} lies above the upper one {upper:g}"
-        )
-    return lower, upper
-
-
 def _inertia(link: ET.Element, whose: str) -> BodyInertia:
     inertial = link.find("inertial")
     if inertial is None:
@@ -382,37 +258,13 @@ def _inertia(link: ET.Element, whose: str) -> BodyInertia:
     if mass is None or tensor is None:
         raise RobotFileError(f"robot.urdf: {whose}: its <inertial> needs a <mass> and an <inertia>")
     xx, yy, zz, xy, xz, yz = (
-        float(_numbers(tensor, name, whose)[0])
+        float(numbers_of(tensor, name, whose)[0])
         for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
-    origin = _origin(inertial, whose)
+    origin = origin_of(inertial, whose)
     turn = origin.matrix()
     rotational = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
-    kilograms = float(_numbers(mass, "value", whose)[0])
+    kilograms = float(numbers_of(mass, "value", whose)[0])
     if kilograms < 0.0:
         raise RobotFileError(f"robot.urdf: {whose}: a mass must not be less than 0")
     return BodyInertia(kilograms, origin.xyz, rotational)
-
-
-def _origin(element: ET.Element, whose: str) -> Origin:
-    origin = element.find("origin")
-    if origin is None:
-        return Origin(np.zeros(3), np.zeros(3))
-    xyz, rpy = (_numbers(origin, name, whose, "0 0 0") for name in ("xyz", "rpy"))
-    return Origin(xyz, rpy)
-
-
-def _numbers(element: ET.Element, attribute: str, whose: str, default: str = "") -> Floats:
-    """Numbers of an attribute: three of a vector, else one."""
-    text = element.get(attribute, default)
-    count = 3 if attribute in ("xyz", "rpy", "size") else 1
-    try:
-        values = np.array([float(part) for part in text.split()])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != count or not (np.abs(values) <= LARGEST).all():
-        raise RobotFileError(
-            f"robot.urdf: {whose}: {attribute}={shortened(text)!r} of <{element.tag}> is not"
-            f" {'three numbers' if count == 3 else 'a number'} of {LARGEST:g} at most"
-        )
-    return values

@@ -1,0 +1,110 @@
+"""`gaitswarm robot`: a robot of one's own from a URDF, and a look at it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cli.options import Json
+
+if TYPE_CHECKING:
+    from gaitswarm.views.robot_check import RobotCheckView
+    from sim.robot import RobotFiles
+
+Folder = Annotated[
+    Path, typer.Argument(metavar="FOLDER", help="With robot.toml and robot.urdf.", exists=False)
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the group of commands."""
+    group = typer.Typer(help="Make a robot of your own from its URDF, and check it.")
+    group.command()(init)
+    group.command()(check)
+    app.add_typer(group, name="robot")
+
+
+def init(
+    urdf: Annotated[Path, typer.Argument(metavar="FILE.urdf", help="Of a robot with legs.")],
+    *,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FOLDER", help="New, or empty.")
+    ],
+    name: Annotated[str | None, typer.Option(help="Of the robot [default: the file's].")] = None,
+    as_json: Json = False,
+) -> None:
+    """Find legs, choose a stance, propose actuators, and write a robot's folder.
+
+    It holds robot.toml, with a comment on every guess; robot.urdf; and job.json, what jobs of this
+    robot have unless they say otherwise. Then --robot FOLDER works in every command.
+    """
+    from cli.output import note, print_text
+    from gaitswarm.robots import init_robot
+
+    made = init_robot(urdf, output, name=name)
+    if as_json:
+        _print({"folder": str(output), "name": made.name, "guesses": list(made.guesses)})
+        return
+    for guess in made.guesses:
+        print_text(f"{guess}\n")
+    note(
+        f"robot {made.name!r} written to {output}; look at it with `gaitswarm robot check {output}`"
+    )
+
+
+def check(folder: Folder, *, as_json: Json = False) -> None:
+    """Load a robot, let it stand for a second, and say what there is to it."""
+    from cli.output import note, print_json, print_text
+    from gaitswarm.robots import check_robot
+
+    view = check_robot(_files(folder))
+    if as_json:
+        print_json(view)
+        return
+    print_text(_told(view))
+    for warning in view.warnings:
+        note(f"warning: {warning}")
+
+
+def _files(folder: Path) -> RobotFiles:
+    from cli.robots import chosen_robot
+    from services.optimizer.errors import InvalidRequest
+    from sim.robot import RobotFiles
+
+    if not folder.is_dir():
+        raise InvalidRequest(f"{folder} is no folder", field="folder")
+    files = chosen_robot(str(folder))
+    if not isinstance(files, RobotFiles):
+        raise InvalidRequest(f"{folder} is no robot's folder", field="folder")
+    return files
+
+
+def _told(view: RobotCheckView) -> str:
+    standing = view.standing
+    stood = (
+        f"standing for {standing.seconds:g} s: soles carry {standing.normal_forces:.1f} N of"
+        f" {standing.weight:.1f} N; the body is at {standing.height:.3f} m"
+    )
+    lines = [
+        f"{view.name}: {len(view.legs)} legs, {view.joints} joints, {view.mass:.3f} kg",
+        "",
+        f"{'leg':20} {'joints':52} {'length':>8} {'reach':>8}",
+        *(
+            f"{leg.name:20} {', '.join(leg.joints):52} {leg.length:6.3f} m {leg.reach:6.3f} m"
+            for leg in view.legs
+        ),
+        "",
+        stood,
+    ]
+    lines += [f"held: {name} at {angle:g} rad" for name, angle in view.held.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _print(document: dict[str, Any]) -> None:
+    import json
+
+    from cli.output import print_text
+
+    print_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n")

@@ -1,0 +1,255 @@
+"""Robots of one's own: made from a URDF, and checked."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from gaitswarm.errors import simulation_errors
+from gaitswarm.views.robot_check import CheckedLegView, RobotCheckView, StandingView
+from services.optimizer.errors import InvalidRequest
+from sim.errors import RobotFileError
+from sim.gait.trajectory import require_reachable
+from sim.outcome import Status
+from sim.proposal.document import Proposal, propose_robot
+from sim.proposal.drive import GRAVITY
+from sim.proposal.legs import reach_below
+from sim.robot import Robot, RobotFiles, load_robot, parse_robot
+from sim.robot.bounds import LONGEST_URDF
+from sim.robot.legs import ChainLeg
+from sim.scenario import Scenario
+from sim.simulate import simulate
+
+if TYPE_CHECKING:
+    from sim.simulate import Simulation
+
+JOB_FILE: Final = "job.json"
+"""In a robot's folder: what a job of this robot has unless it says otherwise."""
+
+_SECONDS: Final = 1.0
+_STIFF: Final = {"P": 1.0}
+
+_OFF: Final = 0.02
+"""Share of the weight by which standing forces may be off before that is a warning."""
+
+
+@dataclass(frozen=True, slots=True)
+class MadeRobot:
+    """A robot's folder that was written.
+
+    Attributes:
+        name: of the robot.
+        guesses: what to look at, one sentence each.
+    """
+
+    name: str
+    guesses: tuple[str, ...]
+
+
+def init_robot(
+    urdf: str | os.PathLike[str], output: str | os.PathLike[str], *, name: str | None = None
+) -> MadeRobot:
+    """Make a robot's folder from a URDF: legs, stance, actuators and two walks are chosen.
+
+    Args:
+        urdf: File of the robot.
+        output: Folder to write, new or empty; as a whole or not at all.
+        name: Of the robot; default the file's.
+
+    Returns:
+        What was made.
+
+    Raises:
+        InvalidRequest: The file cannot be read or has no legs that can be simulated, or the folder
+            cannot be written; names the field.
+    """
+    source, folder = Path(urdf), Path(output)
+    _check_free(folder)
+    try:
+        with source.open(encoding="utf-8") as file:
+            text = file.read(LONGEST_URDF + 1)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidRequest(f"cannot read {source}: {error}", field="urdf") from error
+    chosen = name or source.stem
+    try:
+        proposal = propose_robot(text, chosen)
+        robot = parse_robot(proposal.toml, proposal.urdf)
+        for scenario in proposal.job["scenarios"]:
+            require_reachable(robot, Scenario.model_validate(scenario))
+    except RobotFileError as error:
+        said = str(error).replace("robot.urdf", source.name, 1)
+        raise InvalidRequest(said, field="urdf") from error
+    with simulation_errors("urdf"):
+        _write(folder, proposal)
+    return MadeRobot(chosen, proposal.guesses)
+
+
+def check_robot(files: RobotFiles) -> RobotCheckView:
+    """Load a robot, let it stand, and look for what is unphysical.
+
+    Args:
+        files: Of the robot.
+
+    Returns:
+        What was seen.
+
+    Raises:
+        InvalidRequest: It cannot be simulated; names the file and the field.
+        EvaluatorUnavailable: The compiler does not compile its kernel.
+    """
+    with simulation_errors("folder"):
+        robot = load_robot(files)
+        scenario = standing_scenario(robot)
+        require_reachable(robot, scenario)
+        stood = simulate(
+            scenario, "p", list(_STIFF), np.array([list(_STIFF.values())]), robot=robot, log=True
+        )
+    standing, warnings = _standing(robot, stood)
+    return RobotCheckView(
+        name=robot.description.name,
+        mass=robot.mass,
+        joints=robot.n_joints,
+        legs=[
+            CheckedLegView(
+                name=data.name,
+                joints=list(data.joints),
+                foot=data.foot,
+                length=sum(leg.lengths),
+                reach=reach_below(robot, number),
+            )
+            for number, (leg, data) in enumerate(
+                zip(robot.legs, robot.description.legs, strict=True)
+            )
+        ],
+        held=dict(robot.description.held_joints),
+        standing=standing,
+        warnings=[*warnings, *_unphysical(robot)],
+    )
+
+
+def standing_scenario(robot: Robot) -> Scenario:
+    """A second in the robot's stance, all feet on the ground.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        A walk of no stride to speak of, at the height and width of the stance, or of the thesis's
+        scenarios for legs without one.
+    """
+    radius, height = 0.16, 0.15
+    stances = [leg for leg in robot.legs if isinstance(leg, ChainLeg)]
+    if stances:
+        feet = np.array([leg.foot(leg.stance.tolist()) for leg in stances])
+        radius = max(1e-6, float(np.abs(feet[:, 1]).mean()))
+        hips = max(leg.hip[2] for leg in robot.legs)
+        height = hips - float(feet[:, 2].mean()) + float(np.mean(robot.planned_soles()))
+    return Scenario(
+        name="standing",
+        cycle_time=_SECONDS,
+        cycles=1.0,
+        radius=radius,
+        hip_height=height,
+        stride=1e-9,
+        height=0.0,
+    )
+
+
+def _standing(robot: Robot, stood: Simulation) -> tuple[StandingView, list[str]]:
+    log = stood.logs[0]
+    if log is None:
+        raise RuntimeError("a reachable walk has a log")
+    weight = robot.mass * GRAVITY
+    last = len(log.time) // 5
+    carried = float(np.nan_to_num(log.foot_force[-last:, :, 2]).sum(axis=1).mean())
+    view = StandingView(
+        seconds=_SECONDS,
+        normal_forces=carried,
+        weight=weight,
+        height=float(np.nan_to_num(log.base_position[-1, 2])),
+    )
+    status = Status(int(stood.outcome.statuses[0]))
+    warnings = []
+    if status in (Status.FELL, Status.DIVERGED):
+        warnings.append(
+            f"it does not stand for {_SECONDS:g} s ({status.name.lower()}): look at the stance, and"
+            " at the actuators' torque"
+        )
+    elif abs(carried - weight) > _OFF * weight:
+        warnings.append(
+            f"soles carry {carried:.1f} N of {weight:.1f} N: the robot is not at rest; look at"
+            " contact.stiffness and contact.damping"
+        )
+    return view, warnings
+
+
+def _unphysical(robot: Robot) -> list[str]:
+    """Links whose mass or inertia no body can have."""
+    warnings = []
+    for name, body in robot.urdf.bodies.items():
+        if body.mass == 0.0:
+            warnings.append(f"link {name!r} and what is fixed to it have no mass")
+            continue
+        moments = np.linalg.eigvalsh(body.rotational)
+        if moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-6):
+            warnings.append(
+                f"link {name!r}: no body of {body.mass:g} kg has the principal moments"
+                f" {', '.join(f'{moment:.3g}' for moment in moments)} kg m2"
+            )
+    return warnings
+
+
+def job_defaults(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """What the folder of a robot says that its jobs have.
+
+    Args:
+        folder: Of the robot.
+
+    Returns:
+        Fields of a spec, unchecked; none if there is no such file.
+
+    Raises:
+        InvalidRequest: The file cannot be read, or is no JSON object.
+    """
+    path = Path(folder) / JOB_FILE
+    if not path.is_file():
+        return {}
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InvalidRequest(f"cannot read {path}: {error}", field="robot") from error
+    if not isinstance(document, dict):
+        raise InvalidRequest(f"{path} must hold one JSON object", field="robot")
+    return document
+
+
+def _check_free(folder: Path) -> None:
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InvalidRequest(f"{folder} is there and not empty; name another", field="output")
+
+
+def _write(folder: Path, proposal: Proposal) -> None:
+    job = json.dumps(proposal.job, indent=2) + "\n"
+    texts = {"robot.toml": proposal.toml, "robot.urdf": proposal.urdf, JOB_FILE: job}
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        try:
+            for file, text in texts.items():
+                (made / file).write_text(text, encoding="utf-8")
+            made.chmod(0o755)
+            if folder.exists():
+                folder.rmdir()
+            made.rename(folder)
+        except OSError:
+            shutil.rmtree(made, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise InvalidRequest(f"cannot write {folder}: {error.strerror}", field="output") from error

@@ -1,0 +1,40 @@
+"""What a look at a robot of one's own shows."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from gaitswarm.views.base import View
+
+
+class CheckedLegView(View):
+    """A leg."""
+
+    name: str = Field(description="Of the leg.", examples=["FL"])
+    joints: list[str] = Field(description="Its joints, from the body on.")
+    foot: str = Field(description="Link or fixed joint at its end.")
+    length: float = Field(description="From the first joint to the foot, stretched [m].")
+    reach: float = Field(
+        description="How far the foot gets below the highest hip within the joints' limits [m]."
+    )
+
+
+class StandingView(View):
+    """What came of standing still, simulated with all joints held as stiffly as they can be."""
+
+    seconds: float = Field(description="For how long [s].")
+    normal_forces: float = Field(description="Sum over the feet, mean of the last fifth [N].")
+    weight: float = Field(description="Of the robot [N].")
+    height: float = Field(description="Of the body's origin over the ground at the end [m].")
+
+
+class RobotCheckView(View):
+    """A robot as it is loaded, and how it stands."""
+
+    name: str = Field(description="Of the robot.")
+    mass: float = Field(description="Without load [kg].")
+    joints: int = Field(description="That move.")
+    legs: list[CheckedLegView] = Field(description="In the order of robot.toml.")
+    held: dict[str, float] = Field(description="Joints of no leg, each with its angle [rad].")
+    standing: StandingView = Field(description="How it stands.")
+    warnings: list[str] = Field(description="What is unphysical or was guessed badly.")

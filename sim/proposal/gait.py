@@ -1,0 +1,63 @@
+"""Phases and walks for a robot of unknown design, scaled by how it swings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+from sim.proposal.drive import GRAVITY
+from sim.proposal.stance import Stance
+from sim.robot.legs import ChainLeg
+
+_WALKS: Final = {"slow": (0.9, 0.25), "fast": (0.6, 0.35)}
+"""Cycle time in units of a pendulum's of the hips' height, stride in units of the height."""
+
+_LIFT: Final = 0.2
+"""Height of the swing in units of the hips' height."""
+
+_DUTY: Final = 0.6
+
+
+def alternating_phases(legs: Sequence[ChainLeg]) -> list[float]:
+    """Phases of a gait in which neighbours alternate: trot on four legs, tripod on six.
+
+    Args:
+        legs: Of the robot.
+
+    Returns:
+        By leg the start of its support, as a share of the cycle.
+    """
+    phases = [0.0] * len(legs)
+    for side in (1.0, -1.0):
+        row = [k for k, leg in enumerate(legs) if leg.side == side or (not leg.side and side > 0)]
+        row.sort(key=lambda k: -legs[k].hip[0])
+        for place, k in enumerate(row):
+            phases[k] = 0.5 * ((place + (side < 0)) % 2)
+    return phases
+
+
+def propose_scenarios(stance: Stance, sole: float) -> list[dict[str, Any]]:
+    """A slow and a fast walk on level ground.
+
+    Args:
+        stance: Of the robot.
+        sole: Length of the soles [m].
+
+    Returns:
+        Scenarios, as a job has them.
+    """
+    height = stance.height + sole
+    pendulum = 2.0 * math.pi * math.sqrt(height / GRAVITY)
+    return [
+        {
+            "name": name,
+            "cycle_time": round(max(0.2, cycle * pendulum), 2),
+            "radius": round(stance.radius, 4),
+            "hip_height": round(height, 4),
+            "stride": round(stride * height, 4),
+            "height": round(_LIFT * height, 4),
+            "duty_factor": _DUTY,
+        }
+        for name, (cycle, stride) in _WALKS.items()
+    ]

@@ -1,0 +1,267 @@
+"""Which joints of a URDF are legs, and where these end."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RobotFileError
+from sim.robot.chain import Chain, chain_of
+from sim.robot.description import JOINTS_PER_LEG, Leg
+from sim.robot.joints import Joint
+from sim.robot.legs import ChainLeg
+from sim.robot.robot import Robot
+from sim.robot.urdf import Solid, Urdf
+
+Floats = NDArray[np.float64]
+
+_FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
+
+_TURNS: Final = frozenset({"revolute", "continuous"})
+
+_STEPS: Final = 25
+"""Angles of each joint that are tried."""
+
+_UNNAMED: Final = "-"
+
+_SHARE_OF_THE_LONGEST: Final = 0.5
+"""How far down a chain has to reach to be a leg, of what the one that reaches furthest does."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundLeg:
+    """A leg of a URDF.
+
+    Attributes:
+        joints: names, from the body on.
+        link: name of the last one.
+        foot: name of a link or fixed joint at the leg's end; None if there is none.
+        end: of the leg in the last link's frame [m].
+        sole: radius of the sphere at its end [m]; None if there is none.
+        notes: what was guessed.
+    """
+
+    joints: tuple[str, str, str]
+    link: str
+    foot: str | None
+    end: tuple[float, float, float]
+    sole: float | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FoundLegs:
+    """What the movable joints of a URDF are.
+
+    Attributes:
+        legs: in the order of their first joints in the file.
+        held: all other movable joints, each with an angle within its limits [rad].
+    """
+
+    legs: tuple[FoundLeg, ...]
+    held: Mapping[str, float] = field(default_factory=dict)
+
+
+def find_legs(urdf: Urdf) -> FoundLegs:
+    """Find the legs: chains of three joints that turn, from the body to a foot that reaches down.
+
+    Args:
+        urdf: Of the robot, no joint held.
+
+    Returns:
+        Legs and all other joints.
+
+    Raises:
+        RobotFileError: There are fewer than two; says what there is instead.
+    """
+    chains = list(_chains(urdf))
+    threes = [chain for chain in chains if _is_candidate(chain)]
+    if len(threes) < 2:
+        raise RobotFileError(_why_none(urdf, chains))
+    drops = [-_lowest(urdf, chain) for chain in threes]
+    legs = [
+        _found(urdf, chain)
+        for chain, drop in zip(threes, drops, strict=True)
+        if drop > 0.0 and drop >= _SHARE_OF_THE_LONGEST * max(drops)
+    ]
+    if len(legs) < 2:
+        raise RobotFileError(
+            "robot.urdf: fewer than two chains of three joints reach below the body; z must point"
+            " up in the frame of its first link"
+        )
+    owned = {name for leg in legs for name in leg.joints}
+    held = {
+        joint.name: _held_at(joint)
+        for joint in urdf.joints
+        if not joint.fixed and joint.name not in owned
+    }
+    return FoundLegs(tuple(legs), held)
+
+
+def chain_leg(urdf: Urdf, joints: Sequence[str], end: Sequence[float] | Floats) -> ChainLeg:
+    """Kinematics of three joints, at rest in the middle of their limits.
+
+    Args:
+        urdf: Of the robot.
+        joints: Names, from the body on.
+        end: Of the leg in the last link's frame, (3,) [m].
+
+    Returns:
+        The leg.
+    """
+    last = next(joint.child for joint in urdf.joints if joint.name == joints[-1])
+    first, second, third = joints
+    chain = chain_of(
+        urdf,
+        Leg(
+            name=_UNNAMED,
+            phase=0.0,
+            actuators=(_UNNAMED, _UNNAMED, _UNNAMED),
+            own_joints=(first, second, third),
+            own_foot=last,
+        ),
+    )
+    return _kinematics(chain, np.asarray(end, dtype=np.float64))
+
+
+def _kinematics(chain: Chain, end: Floats) -> ChainLeg:
+    ends = np.clip(chain.limits, -np.pi, np.pi)
+    return ChainLeg(
+        _UNNAMED,
+        np.array([place.rotation for place in chain.placements]),
+        np.array([place.offset for place in chain.placements]),
+        np.array([place.axis for place in chain.placements]),
+        end,
+        ends.mean(axis=1),
+        chain.limits,
+    )
+
+
+def reach_below(robot: Robot, number: int) -> float:
+    """How far a leg's foot gets below the highest hip.
+
+    Args:
+        robot: The robot.
+        number: Of the leg.
+
+    Returns:
+        The distance within the joints' limits [m].
+    """
+    leg = robot.description.legs[number]
+    kinematics = _kinematics(chain_of(robot.urdf, leg), chain_of(robot.urdf, leg).foot)
+    feet, _ = kinematics.feet(tried_angles(kinematics))
+    return max(leg.hip[2] for leg in robot.legs) - float(feet[:, 2].min())
+
+
+def tried_angles(leg: ChainLeg) -> Floats:
+    """A grid of a leg's angles within their limits and one turn.
+
+    Args:
+        leg: The leg.
+
+    Returns:
+        (n, 3) [rad].
+    """
+    ends = np.clip(leg.limits, -np.pi, np.pi)
+    axes = [np.linspace(lower, upper, _STEPS) for lower, upper in ends]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, JOINTS_PER_LEG)
+
+
+def _chains(urdf: Urdf) -> Iterable[tuple[Joint, ...]]:
+    """Chains of movable joints that hang on the body, each as far as it does not branch."""
+    behind: dict[str, list[Joint]] = {}
+    for joint in urdf.joints:
+        if not joint.fixed:
+            behind.setdefault(urdf.places[joint.parent].body, []).append(joint)
+    for first in behind.get(next(iter(urdf.links)), []):
+        chain = [first]
+        while len(carried := behind.get(chain[-1].child, [])) == 1:
+            chain.append(carried[0])
+        # What branches, such as an arm with fingers, ends in no foot.
+        yield (*chain, *carried) if carried else tuple(chain)
+
+
+def _is_candidate(chain: Sequence[Joint]) -> bool:
+    return len(chain) == JOINTS_PER_LEG and all(joint.kind in _TURNS for joint in chain)
+
+
+def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
+    if not chains:
+        return "robot.urdf: no joint of it moves; legs have three joints that turn"
+    counts = sorted({len(chain) for chain in chains})
+    kinds = sorted({j.kind for chain in chains for j in chain} - _TURNS)
+    found = f"{len(chains)} chain{'s' * (len(chains) > 1)} of {', '.join(map(str, counts))} joints"
+    if kinds:
+        found += f", some of them {', '.join(kinds)}"
+    return (
+        f"robot.urdf: legs of three joints that turn are what can be simulated, but on"
+        f" {next(iter(urdf.links))!r} hang {found}"
+    )
+
+
+def _lowest(urdf: Urdf, chain: Sequence[Joint]) -> float:
+    end, *_ = _end_of(urdf, chain[-1].child)
+    leg = chain_leg(urdf, [joint.name for joint in chain], end)
+    feet, _ = leg.feet(tried_angles(leg))
+    return float(feet[:, 2].min())
+
+
+def _found(urdf: Urdf, chain: Sequence[Joint]) -> FoundLeg:
+    first, second, third = (joint.name for joint in chain)
+    link = chain[-1].child
+    end, foot, sole, notes = _end_of(urdf, link)
+    x, y, z = np.asarray(end).tolist()
+    return FoundLeg((first, second, third), link, foot, (x, y, z), sole, notes)
+
+
+def _end_of(urdf: Urdf, link: str) -> tuple[Floats, str | None, float | None, tuple[str, ...]]:
+    """Where a leg ends in its last link's frame: a frame that is fixed to it, a sphere, or its end.
+
+    Returns the position, the frame's name, the radius of a sphere there, and what was guessed.
+    """
+    parts = [name for name, place in urdf.places.items() if place.body == link]
+    spheres = [(at, s.size[0]) for part in parts for at, s in _solids(urdf, part, "sphere")]
+    others = [name for name in parts if name != link]
+    named = [name for name in others if _FOOT_NAME.search(name)]
+    if others:
+        far = max(named or others, key=lambda n: float(np.linalg.norm(urdf.places[n].position)))
+        at = urdf.places[far].position
+        if np.linalg.norm(at) > 0.0:
+            near = [float(r) for centre, r in spheres if np.linalg.norm(centre - at) <= r]
+            notes = () if named else (f"its end is the link {far!r}, the farthest one",)
+            return at, far, max(near, default=None), notes
+    if spheres:
+        at, radius = max(spheres, key=lambda s: float(np.linalg.norm(s[0])))
+        return at, None, float(radius), (f"its end is the sphere of the link {link!r}",)
+    corners = [c for part in parts for at, s in _solids(urdf, part) for c in _ends(at, s)]
+    if corners:
+        at = max(corners, key=lambda c: float(np.linalg.norm(c)))
+        return at, None, None, (f"its end is the far end of the shape of the link {link!r}",)
+    raise RobotFileError(
+        f"robot.urdf: link {link!r} has no foot: add a link at its end, joined by a fixed joint"
+    )
+
+
+def _solids(urdf: Urdf, part: str, kind: str | None = None) -> Iterable[tuple[Floats, Solid]]:
+    place = urdf.places[part]
+    for solid in urdf.links[part].solids("collision"):
+        if kind in (None, solid.kind):
+            yield place.rotation @ solid.origin.xyz + place.position, solid
+
+
+def _ends(at: Floats, solid: Solid) -> Iterable[Floats]:
+    half = solid.size / 2.0 if solid.kind == "box" else np.full(3, solid.size[-1] / 2.0)
+    turn = solid.origin.matrix()
+    axes = turn.T * half[:, None] if solid.kind == "box" else (turn.T * half[:, None])[2:]
+    yield from (at + axis for axis in axes)
+    yield from (at - axis for axis in axes)
+
+
+def _held_at(joint: Joint) -> float:
+    lower, upper = joint.limits
+    return float(np.clip(0.0, lower, upper)) if joint.kind in _TURNS else 0.0

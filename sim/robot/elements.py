@@ -1,0 +1,97 @@
+"""Elements of a URDF: numbers with their bounds, and frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RobotFileError
+from sim.robot.bounds import LARGEST, shortened
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Origin:
+    """Where a frame lies in another one.
+
+    Attributes:
+        xyz: position, (3,) [m].
+        rpy: roll, pitch and yaw about the other frame's fixed axes, (3,) [rad].
+    """
+
+    xyz: Floats
+    rpy: Floats
+
+    def matrix(self) -> Floats:
+        """Rotation from the frame to the other one, (3, 3); exact if it does not turn."""
+        return self._rotation().as_matrix() if self.rpy.any() else np.eye(3)
+
+    def quaternion(self) -> Floats:
+        """Rotation from the frame to the other one as quaternion x y z w, (4,)."""
+        return self._rotation().as_quat()
+
+    def _rotation(self) -> Rotation:
+        # Slow to import, and most robots have no turned frame.
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+        return Rotation.from_euler("xyz", self.rpy)
+
+
+def origin_of(element: ET.Element, whose: str) -> Origin:
+    """Where an element's frame lies.
+
+    Args:
+        element: With an `<origin>`, or without: then the frame is the other one.
+        whose: Name of its owner, for messages.
+
+    Returns:
+        The frame.
+
+    Raises:
+        RobotFileError: A number cannot be read.
+    """
+    origin = element.find("origin")
+    if origin is None:
+        return Origin(np.zeros(3), np.zeros(3))
+    xyz, rpy = (numbers_of(origin, name, whose, "0 0 0") for name in ("xyz", "rpy"))
+    return Origin(xyz, rpy)
+
+
+def numbers_of(
+    element: ET.Element, attribute: str, whose: str, default: str = "", largest: float = LARGEST
+) -> Floats:
+    """Numbers of an attribute: three of a vector, else one.
+
+    Args:
+        element: That has it.
+        attribute: Its name.
+        whose: Name of the element's owner, for messages.
+        default: Text where the element has no such attribute.
+        largest: Size of a number at most.
+
+    Returns:
+        (3,) of xyz, rpy and size, else (1,), in URDF's units.
+
+    Raises:
+        RobotFileError: It is no number, too few or too large; names owner and attribute.
+    """
+    text = element.get(attribute, default)
+    count = 3 if attribute in ("xyz", "rpy", "size") else 1
+    try:
+        values = np.array([float(part) for part in text.split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != count or not (np.abs(values) <= largest).all():
+        raise RobotFileError(
+            f"robot.urdf: {whose}: {attribute}={shortened(text)!r} of <{element.tag}> is not"
+            f" {'three numbers' if count == 3 else 'a number'} of {LARGEST:g} at most"
+        )
+    return values

@@ -1,0 +1,164 @@
+"""Joints of a URDF, and those that are held or turn without end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RobotFileError
+from sim.robot.bounds import LARGEST
+from sim.robot.elements import Origin, numbers_of, origin_of
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joint:
+    """A joint of any type.
+
+    Attributes:
+        name: as in the file.
+        kind: its type: revolute, fixed, ...
+        parent: link that carries it.
+        child: link that it carries.
+        origin: of the child's frame in the parent's, at rest.
+        axis: that it turns about in the child's frame, of unit length, (3,).
+        limits: least and largest position [rad]; infinite where there are none.
+        effort: largest torque [N m]; 0 where the file gives none.
+        velocity: largest rate [rad/s]; 0 where the file gives none.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Origin
+    axis: Floats
+    limits: tuple[float, float]
+    effort: float
+    velocity: float
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it never moves."""
+        return self.kind == "fixed"
+
+
+def joint_of(element: ET.Element) -> Joint:
+    """Read a joint.
+
+    Args:
+        element: A `<joint>`.
+
+    Returns:
+        The joint.
+
+    Raises:
+        RobotFileError: A number cannot be read, the axis has no direction, or its limits are the
+            wrong way round.
+    """
+    name = element.get("name", "")
+    ends = [element.find(end) for end in ("parent", "child")]
+    parent, child = ("" if end is None else end.get("link", "") for end in ends)
+    whose = f"joint {name!r}"
+    direction = element.find("axis")
+    axis = np.array([1.0, 0.0, 0.0]) if direction is None else numbers_of(direction, "xyz", whose)
+    length = float(np.linalg.norm(axis))
+    kind = element.get("type", "")
+    if length == 0.0 and kind != "fixed":
+        raise RobotFileError(f"robot.urdf: {whose}: its axis has no direction")
+    origin = origin_of(element, whose)
+    limit = element.find("limit")
+    effort, velocity = (
+        0.0 if limit is None else float(numbers_of(limit, attribute, whose, "0", math.inf)[0])
+        for attribute in ("effort", "velocity")
+    )
+    return Joint(
+        name=name,
+        kind=kind,
+        parent=parent,
+        child=child,
+        origin=origin,
+        axis=axis / (length or 1.0),
+        limits=_limits(limit, kind, whose),
+        effort=effort,
+        velocity=velocity,
+    )
+
+
+def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
+    """Fix joints that are held, and let continuous ones be revolute.
+
+    Args:
+        root: Of the URDF, which is changed.
+        held: Joints that are held, by name at which angle [rad].
+
+    Returns:
+        Whether anything was changed.
+
+    Raises:
+        RobotFileError: A held joint is not there, or does not turn and is held at another position
+            than 0.
+    """
+    changed = False
+    missing = set(held)
+    for element in root.findall("joint"):
+        name, kind = element.get("name", ""), element.get("type", "")
+        if name in held:
+            missing.discard(name)
+            _hold(element, kind, held[name])
+        elif kind == "continuous":
+            # Pinocchio has two positions for a joint without ends.
+            element.set("type", "revolute")
+            for limit in element.findall("limit"):
+                element.remove(limit)
+            ends = {"lower": f"{-LARGEST:g}", "upper": f"{LARGEST:g}"}
+            ET.SubElement(element, "limit", ends | {"effort": "0", "velocity": "0"})
+        else:
+            continue
+        changed = True
+    if missing:
+        raise RobotFileError(f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}")
+    return changed
+
+
+def _hold(element: ET.Element, kind: str, angle: float) -> None:
+    """Let a joint be a fixed one, its frame turned by the angle."""
+    joint = joint_of(element)
+    if kind not in ("revolute", "continuous", "fixed") and angle:
+        raise RobotFileError(
+            f"robot.toml: held_joints: joint {joint.name!r} is {kind} and does not turn; hold it"
+            " at 0"
+        )
+    if angle and kind != "fixed":
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+        turned = Rotation.from_matrix(joint.origin.matrix())
+        turned = turned * Rotation.from_rotvec(angle * joint.axis)
+        xyz, rpy = joint.origin.xyz.tolist(), turned.as_euler("xyz").tolist()
+        for origin in element.findall("origin"):
+            element.remove(origin)
+        numbers = {"xyz": xyz, "rpy": rpy}
+        ET.SubElement(element, "origin", {k: " ".join(map(repr, v)) for k, v in numbers.items()})
+    element.set("type", "fixed")
+    for part in ("axis", "limit", "mimic", "dynamics"):
+        for child in element.findall(part):
+            element.remove(child)
+
+
+def _limits(limit: ET.Element | None, kind: str, whose: str) -> tuple[float, float]:
+    if kind == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
+        return -math.inf, math.inf
+    lower, upper = (
+        float(numbers_of(limit, end, whose, "0", math.inf)[0]) for end in ("lower", "upper")
+    )
+    if lower > upper:
+        raise RobotFileError(
+            f"robot.urdf: {whose}: its lower limit {lower:g} lies above the upper one {upper:g}"
+        )
+    return lower, upper

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
-from datetime import timedelta
 from typing import Any, Final
 
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.errors import InvalidRequest, Unreadable
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
 from services.optimizer.jobs.documents import check_budget
 from services.optimizer.jobs.fork import Fork
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import (
-    QUARANTINE_AFTER,
     Claim,
     Command,
     Job,
@@ -30,14 +26,7 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.audit import audit_page, note_change, note_submission
 from services.optimizer.store.changes import SqlChanges
 from services.optimizer.store.claims import (
-    claimable,
-    claimed_row,
-    crashes_before,
-    held,
     lease_is_live,
-    quarantine,
-    require_budget_of,
-    set_aside,
     take_job,
 )
 from services.optimizer.store.deletion import SqlDeletion
@@ -59,7 +48,7 @@ from services.optimizer.store.job_list import (
     newest_jobs,
     sort_jobs,
 )
-from services.optimizer.store.job_rows import request_digest, storable, to_job
+from services.optimizer.store.job_rows import request_digest, to_job
 from services.optimizer.store.migrate import create
 from services.optimizer.store.outbox import SqlOutbox
 from services.optimizer.store.queue import count_jobs
@@ -70,26 +59,18 @@ from services.optimizer.store.recordings import (
     recording_id,
 )
 from services.optimizer.store.records import (
-    complete_iteration,
     entering,
-    insert_ask,
     job_row,
-    outstanding_ask,
-    progress_after,
-    provenance_columns,
     require_readable,
-    state_after_commit,
-    state_after_release,
     update_job,
 )
 from services.optimizer.store.revisions import check_revision
+from services.optimizer.store.runs import SqlRuns
 from services.optimizer.store.submissions import Submission, check_quota, insert_job, repeated_job
 from services.optimizer.store.tokens import SqlTokens
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _LONGEST_KEY: Final = 200
-
-_log = logging.getLogger(__name__)
 
 
 def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
@@ -115,7 +96,7 @@ def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
     return SqlStore(database, clock=clock)
 
 
-class SqlStore(SqlDeletion, SqlHistory):
+class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
     """`Store` on a database that has the newest schema, such as `open_store` gives.
 
     Args:
@@ -126,6 +107,7 @@ class SqlStore(SqlDeletion, SqlHistory):
     def __init__(self, database: Database, *, clock: Clock = database_time) -> None:
         SqlHistory.__init__(self, database)
         SqlDeletion.__init__(self, database, clock)
+        SqlRuns.__init__(self, database, clock)
         self.tokens = SqlTokens(database, clock)
         self.outbox = SqlOutbox(database, clock)
         self.changes = SqlChanges(database)
@@ -315,95 +297,6 @@ class SqlStore(SqlDeletion, SqlHistory):
         """Read recorded walks."""
         with self._database.transaction(write=False) as connection:
             return load_recordings(connection, ids)
-
-    # the runner's side
-
-    def claim(
-        self,
-        runner: str,
-        *,
-        lease_seconds: float,
-        job_id: str | None = None,
-        quarantine_after: int = QUARANTINE_AFTER,
-    ) -> Claim | None:
-        """Take a job that waits for a runner, for as long as the lease lasts."""
-        with self._database.transaction(write=True) as connection:
-            if job_id is not None:
-                job_row(connection, job_id)
-            query = claimable(self._clock(connection), job_id)
-            while (row := connection.execute(query).mappings().first()) is not None:
-                # Once more: a certain job may have been waited for.
-                now = self._clock(connection)
-                if row["state"] == JobState.PAUSING:
-                    update_job(connection, row, entering(JobState.PAUSED, now))
-                    continue
-                crashes = crashes_before(row, runner)
-                if crashes >= quarantine_after:
-                    quarantine(connection, row, crashes, now)
-                    continue
-                try:
-                    return take_job(connection, row, runner, lease_seconds, now, crashes=crashes)
-                except Unreadable as error:
-                    # The next job must not wait for somebody to mend this one.
-                    _log.warning("job %s is set aside: %s", row["id"], error)
-                    set_aside(connection, row, error, now)
-        return None
-
-    def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> JobState:
-        """Prolong a lease."""
-        with self._database.transaction(write=True) as connection:
-            row = held(connection, claim)
-            expires = self._clock(connection) + timedelta(seconds=lease_seconds)
-            changes: dict[str, Any] = {"lease_expires_at": expires}
-            reason = None if waiting is None else storable(waiting)
-            if reason != row["waiting"]:
-                changes |= {"waiting": reason}
-            update_job(connection, row, changes)
-            return JobState(row["state"])
-
-    def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
-        """Record what the numbers depend on from the next iteration on."""
-        with self._database.transaction(write=True) as connection:
-            row = held(connection, claim)
-            update_job(connection, row, provenance_columns(row, provenance))
-
-    def begin(self, claim: Claim, ask: Ask) -> None:
-        """Store an ask where there is none."""
-        with self._database.transaction(write=True) as connection:
-            row = held(connection, claim)
-            if outstanding_ask(connection, row) is None:
-                require_budget_of(claim, row)
-                now = self._clock(connection)
-                insert_ask(connection, row, ask, expected=row["iterations"], now=now)
-
-    def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
-        """Store an iteration, the ask that follows, and what becomes of the job."""
-        with self._database.transaction(write=True) as connection:
-            row = claimed_row(connection, claim)
-            # The token outlives the lease, which a commit that ends or pauses the job gives up.
-            if row["lease_token"] == claim.token and done.iteration < row["iterations"]:
-                return JobState(row["state"])
-            row = held(connection, claim)
-            now = self._clock(connection)
-            require_budget_of(claim, row)
-            head = complete_iteration(connection, row, done, now)
-            if following is not None:
-                insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
-            state = state_after_commit(JobState(row["state"]), following)
-            progress = progress_after(row, done) | {"head": head}
-            update_job(connection, row, entering(state, now) | progress)
-            return state
-
-    def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
-        """Give a job back, or let it fail."""
-        if state not in (JobState.FAILED, JobState.PAUSED, JobState.QUEUED):
-            raise ValueError(f"a runner cannot release a job as {state}")
-        with self._database.transaction(write=True) as connection:
-            row = held(connection, claim)
-            after = state_after_release(JobState(row["state"]), state)
-            text = storable(error) if error is not None else row["error"]
-            changes = entering(after, self._clock(connection)) | {"error": text}
-            update_job(connection, row, changes)
 
     def audit(
         self, *, job_id: str | None = None, after: str | None = None, limit: int = 50

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.large_store import fill
 from services.optimizer.analysis.distribution import distribution
-from services.optimizer.analysis.history import HistoryCache
+from services.optimizer.analysis.history_cache import HistoryCache
 from services.optimizer.analysis.ranking import rank
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job, JobOrder

@@ -184,7 +184,7 @@ def _belongs(evidence: Evidence, spec: AnySpec, lineage: Any, provenance: Any) -
     """Whether documents, as they were stored, are those of the rest of the file."""
     own = evidence.job.lineage
     return (
-        spec.with_budget(evidence.spec.iterations) == evidence.spec
+        evidence.spec in (spec, spec.with_budget(evidence.spec.iterations))
         and (None if lineage is None else Lineage.model_validate(lineage)) == own
         and RECORDS.validate_python(provenance or ()) == evidence.provenance.records
     )

@@ -120,7 +120,9 @@ def test_the_stance_is_level_within_limits_and_its_walks_can_be_planned(urdf: st
         scenario = Scenario.model_validate(walk)
         require_reachable(robot, scenario)
         # The walk is about the stance: in mid-support its joints are where they stand.
-        away = np.abs(desired_angles(robot, scenario).angles[:, :3] - robot.legs[0].stance)
+        first = robot.legs[0]
+        assert isinstance(first, ChainLeg)
+        away = np.abs(desired_angles(robot, scenario).angles[:, :3] - first.stance)
         assert away.min(axis=0).max() < 0.1
 
 

@@ -57,7 +57,7 @@ def lose() -> str:
         assert bits(evaluator.evaluate(WANTED, never)) == expected
         return not evaluator.on_ray
 
-    with patch("services.worker.ray_evaluator.PULSE_SECONDS", 0.3):
+    with patch("services.worker.cluster.pump.PULSE_SECONDS", 0.3):
         eventually(lost)
     eventually(lambda: evaluator.on_ray)
     assert bits(evaluator.evaluate(WANTED, never)) == expected

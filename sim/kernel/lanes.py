@@ -53,8 +53,20 @@ def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
         filled.sort(key=lambda lane: -lane.end)
     begins = [entry for lane in filled for entry in lane.begins()]
     order = tuple(index for _, index in sorted(begins))
-    end = filled[0].end
+    end = _end(durations, order, lanes)
     return LanePlan(order, end, ideal / end if end else 1.0)
+
+
+def _end(durations: Sequence[float], order: Sequence[int], lanes: int) -> float:
+    """When the last lane is done if each free lane begins the next walk of the order.
+
+    It may be earlier than where the walks were spread: a lane that has no more walks there takes
+    the next one here.
+    """
+    free = [0.0] * lanes
+    for index in order:
+        heapq.heapreplace(free, free[0] + durations[index])
+    return max(free)
 
 
 @dataclass(slots=True)

@@ -34,6 +34,12 @@ def test_every_walk_begins_once_and_refilled_lanes_end_when_the_plan_says(
         assert plan.use == pytest.approx(sum(durations) / lanes / plan.end)
 
 
+def test_a_free_lane_takes_the_next_walk_even_where_that_was_meant_for_another() -> None:
+    durations = [37, 2782, 2011, 12, 2098, 36, 2630, 4377]  # spread over two lanes until 7019
+    plan = plan_lanes(durations, 2)
+    assert plan.end == end_of_last_lane(durations, plan.order, 2) == 7007
+
+
 @given(
     durations=st.lists(st.integers(1, 5000), min_size=1, max_size=200),
     lanes=st.sampled_from([2, 8, 16]),

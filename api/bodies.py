@@ -17,6 +17,7 @@ from pydantic import TypeAdapter, ValidationError, WrapValidator
 
 from sim.errors import RobotFileError
 from sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
+from sim.wording import with_known_keys
 
 MOST_NAMES: Final = 10_000
 """Names of fields in a body, designs to start from aside: each may be an error to be told."""
@@ -38,7 +39,7 @@ def validated(model: Any, name: str) -> Callable[..., Any]:
     adapter: TypeAdapter[Any] = TypeAdapter(model)
 
     async def read(http: Request, **body: Any) -> Any:
-        work = partial(_validated, adapter, body[name])
+        work = partial(_validated, model, adapter, body[name])
         return await run_sync(work, limiter=http.state.validations)
 
     # FastAPI knows of the body and its schema by this; the validation is put off.
@@ -53,12 +54,12 @@ def validated(model: Any, name: str) -> Callable[..., Any]:
     return read
 
 
-def _validated(adapter: TypeAdapter[Any], document: Any) -> Any:
+def _validated(model: Any, adapter: TypeAdapter[Any], document: Any) -> Any:
     _check_bounds(document)
     try:
         return adapter.validate_python(document)
     except ValidationError as error:
-        found = error.errors(include_url=False)
+        found = with_known_keys(error.errors(include_url=False), model)
         raise RequestValidationError(
             [{**entry, "loc": ("body", *entry["loc"])} for entry in found], body=document
         ) from error

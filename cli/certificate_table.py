@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
 from cli.engines_table import engine_table
+from cli.fitted_table import Table
 from cli.output import note, print_text, stdout_console
 from cli.tables import number
 

@@ -12,8 +12,7 @@ from services.optimizer.jobs.optimizer_choice import with_settings
 from services.optimizer.jobs.preference import figure_of_merit
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from services.optimizer.jobs.job import Job
 
 THESIS: Final = {"chapter": 3, "gain_pso_ps": 6.887 / 5.644 - 1.0, "gain_average": 0.20}
@@ -201,8 +200,7 @@ def study_table(found: Sequence[Comparison]) -> Table:
     Args:
         found: comparisons whose jobs have been run.
     """
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.tables import interval_cells, number, relative_change
 
     table = Table(box=None, header_style="bold", pad_edge=False)

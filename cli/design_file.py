@@ -1,13 +1,13 @@
-"""Designs as commands are given them: files, published names, ids of jobs."""
+"""Designs as commands are given them: JSON, files, published names, ids of jobs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from cli.spec_file import read_json_object
+from cli.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
 from sim.scenario import GAIT_VARIABLES
@@ -40,14 +40,20 @@ class GivenDesign:
 
 
 def given_design(
-    given: str, controller: str | None, *, server: str | None, db: str | None
+    given: str,
+    controller: str | None,
+    trajectory: Path | None = None,
+    *,
+    server: str | None,
+    db: str | None,
 ) -> GivenDesign:
     """The design that an argument DESIGN|ID names.
 
     Args:
-        given: `published:NAME`, a file, `-` for standard input, or the id of a job that tunes a
-            drive; `job:ID` is always a job, whatever files there are.
+        given: a JSON object, `published:NAME`, a file, `-` for standard input, or the id of a job
+            that tunes a drive; `job:ID` is always a job, whatever files there are.
         controller: of the design; None for the job's, or for fuzzy-pi.
+        trajectory: as for `read_design`.
         server: URL of the server to ask for the job, or None.
         db: database to look for it, or None.
 
@@ -59,11 +65,15 @@ def given_design(
             field.
         NotFound: no such job, or none of its designs has walked in every scenario.
     """
-    if may_be_file(given) and not given.startswith(_PUBLISHED):
-        return _from_elsewhere(given, Path(given).stem, controller)
+    if not may_be_file(given):
+        best = _best_of_job(given.removeprefix(_JOB), controller, server, db)
+        return replace(best, values=_in_gait(best.values, trajectory))
     if given.startswith(_PUBLISHED):
-        return _from_elsewhere(given, f"published {given.removeprefix(_PUBLISHED)}", controller)
-    return _best_of_job(given.removeprefix(_JOB), controller, server, db)
+        label = f"published {given.removeprefix(_PUBLISHED)}"
+    else:
+        label = "design" if _is_json(given) else Path(given).stem
+    chosen = _controller_name(controller or _DEFAULT_CONTROLLER)
+    return GivenDesign(label, chosen, read_design(given, chosen, trajectory))
 
 
 def may_be_file(given: str) -> bool:
@@ -74,12 +84,11 @@ def may_be_file(given: str) -> bool:
     if given.startswith(_JOB):
         return False
     named = given == "-" or given.startswith(_PUBLISHED) or given.endswith(".json")
-    return named or Path(given).exists()
+    return named or _is_json(given) or Path(given).exists()
 
 
-def _from_elsewhere(given: str, label: str, controller: str | None) -> GivenDesign:
-    chosen = _controller_name(controller or _DEFAULT_CONTROLLER)
-    return GivenDesign(label, chosen, read_design(given, chosen))
+def _is_json(given: str) -> bool:
+    return given.lstrip().startswith("{")
 
 
 def _best_of_job(
@@ -102,7 +111,7 @@ def _best_of_job(
         best = jobs.best(job_id)
     if controller not in (None, spec.controller):
         raise InvalidRequest(
-            f"job {job_id} tunes {spec.controller}; leave the option out", field="controller"
+            f"job {job_id} tunes {spec.controller}, not {controller}", field="controller"
         )
     values = design_numbers(spec.controller, best.design)
     return GivenDesign(spec.name or f"job {job_id}", spec.controller, values, spec)
@@ -111,8 +120,9 @@ def _best_of_job(
 def read_design(design: str, controller: str, trajectory: Path | None = None) -> dict[str, Any]:
     """Values by name, choices as their indices; numbers are not checked yet.
 
-    design: a file with a flat object {name: value}, or with one under `design`, as `best --json`
-        prints; or `published:NAME` for a design of the literature.
+    design: a flat JSON object {name: value}, or one with that under `design`, as `best --json`
+        prints; or a file that holds it; or `published:NAME` for a design of the literature; or
+        `job:ID` for the best of a job in the database that the environment names.
     trajectory: a file with gait parameters only, none of which a design file may set as well; a
         published design walks in this gait in place of its own.
     Raises InvalidRequest that names the field.
@@ -121,14 +131,19 @@ def read_design(design: str, controller: str, trajectory: Path | None = None) ->
     own = _controller(controller)
     known = (*own.variables, *own.conventions, *GAIT_VARIABLES)
     values = _checked(values, known, "design")
+    return _in_gait(values, trajectory, replacing=design.startswith(_PUBLISHED))
+
+
+def _in_gait(
+    values: dict[str, Any], trajectory: Path | None, *, replacing: bool = False
+) -> dict[str, Any]:
+    """A design with the gait parameters of a file; replacing: also those that it sets itself."""
     if trajectory is None:
         return values
     gait = _checked(read_json_object(trajectory, "trajectory"), GAIT_VARIABLES, "trajectory")
     for name in gait:
-        if name in values and not design.startswith(_PUBLISHED):
-            raise InvalidRequest(
-                "set in the design file too; choose one", field=f"trajectory.{name}"
-            )
+        if name in values and not replacing:
+            raise InvalidRequest("set in the design too; choose one", field=f"trajectory.{name}")
     return {**values, **gait}
 
 
@@ -142,7 +157,12 @@ def _read_values(design: str, controller: str) -> dict[str, Any]:
                 f"no published design {name!r} of {controller}; known are {known}", field="design"
             )
         return dict(published[name])
-    content = read_json_object(Path(design), "design")
+    if design.startswith(_JOB):
+        return _best_of_job(design.removeprefix(_JOB), controller, None, None).values
+    if _is_json(design):
+        content = json_object(design, "design")
+    else:
+        content = read_json_object(Path(design), "design")
     values = content.get("design", content)
     if not isinstance(values, dict):
         raise InvalidRequest("must be an object of values by name", field="design")

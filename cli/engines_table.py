@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
+from cli.fitted_table import Table
 from cli.tables import MISSING, SHORT, number
 from sim.mujoco.engines import OWN
 

@@ -13,8 +13,8 @@ from cli.tables import SHORT, number
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from rich.table import Table
 
+    from cli.fitted_table import Table
     from gaitswarm.views import SimulationView
     from gaitswarm.views.trade_offs import (
         FrontView,
@@ -30,7 +30,7 @@ _ACCENT: Final = "#d1495b"
 
 def marked_table(view: FrontView) -> Table:
     """Knees, the best in each objective, and the winners of preferences."""
-    from rich.table import Table
+    from cli.fitted_table import Table
 
     table = Table(box=None, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)
@@ -156,7 +156,7 @@ def front_csv(view: FrontView) -> bytes:
 
 def fits_table(view: PreferenceForView) -> Table:
     """Preferences that suit a design, one for each set of biases, the best first."""
-    from rich.table import Table
+    from cli.fitted_table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("biases of", "rank", "margin %", "rival", "bias", "exponent"):

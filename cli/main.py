@@ -9,7 +9,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
-from typing import Any, TextIO, cast
+from typing import Annotated, Any, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
@@ -74,7 +74,6 @@ class _HelpAtOnce(TyperGroup):
 app = typer.Typer(
     name="gaitswarm",
     cls=_HelpAtOnce,
-    help="Find robust drive controllers for walking robots.",
     epilog="Exit codes: 0 done, 1 job failed or cancelled, or a check failed, 2 bad input, 3 not"
     " found, 4 not possible in the job's state, 5 server, database, workers or output unavailable,"
     " 6 not allowed, 70 a bug, 130 interrupted.",
@@ -84,6 +83,28 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        import gaitswarm
+
+        typer.echo(f"gaitswarm {gaitswarm.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Find robust drive controllers for walking robots."""
+
+
 for _module in (
     optimize,
     serve,

@@ -24,7 +24,9 @@ _HUGE: Final = 1e300
 DesignOption = Annotated[
     str,
     typer.Option(
-        "--design", metavar="FILE|published:NAME", help="Design as for `simulate`, or published:A."
+        "--design",
+        metavar="JSON|FILE|published:NAME|job:ID",
+        help="Design as for `simulate`, or published:A.",
     ),
 ]
 ScenarioOption = Annotated[

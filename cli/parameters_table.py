@@ -10,8 +10,8 @@ from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.table import Table
 
+    from cli.fitted_table import Table
     from gaitswarm.views.identification import IdentifiabilityView, ParameterView
 
 _SHOWN: Final = (0.2, 0.1, 0.05, 0.02)
@@ -50,9 +50,9 @@ def show_parameters(
 
 def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> Table:
     """Parameters as rows: best value, true one, and widths of the intervals in percent."""
-    from rich.table import Table
     from rich.text import Text
 
+    from cli.fitted_table import Table
     from cli.tables import number
 
     title = "Fitted parameters; widths of their intervals in % of the range searched"

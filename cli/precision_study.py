@@ -21,8 +21,7 @@ from sim.robot.description import ContactLaw
 from sim.scenario import SCENARIOS, Scenario
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from sim.robot.shipped import RobotName
 
 Floats = NDArray[np.float64]
@@ -246,7 +245,7 @@ def study_tables(found: Sequence[Agreement]) -> tuple[Table, Table]:
     Args:
         found: one for each variant.
     """
-    from rich.table import Table
+    from cli.fitted_table import Table
 
     deviations, ranking = (
         Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0)) for _ in range(2)

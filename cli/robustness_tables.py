@@ -9,14 +9,14 @@ from cli.tables import MISSING, SHORT, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.table import Table
 
+    from cli.fitted_table import Table
     from gaitswarm.views.robustness import IndexView, RobustnessView
 
 
 def scenarios_table(view: RobustnessView) -> Table:
     """One row a scenario: index, interval, and what each objective adds to it."""
-    from rich.table import Table
+    from cli.fitted_table import Table
 
     table = Table(title="Robustness index", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
@@ -41,7 +41,7 @@ def scenarios_table(view: RobustnessView) -> Table:
 
 def variables_table(view: RobustnessView) -> Table:
     """One row a variable: to which the objectives answer most, over all scenarios and in each."""
-    from rich.table import Table
+    from cli.fitted_table import Table
 
     table = Table(title="By variable", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("variable", no_wrap=True)

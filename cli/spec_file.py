@@ -198,12 +198,12 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
     from pydantic import ValidationError
 
     from gaitswarm.errors import invalid_request
-    from services.optimizer.jobs.documents import SPECS
+    from services.optimizer.jobs.documents import SPECS, AnySpec
 
     try:
         spec = SPECS.validate_python(data)
     except ValidationError as error:
-        raise invalid_request(error, data) from error
+        raise invalid_request(error, data, AnySpec) from error
     spec.check_can_be_simulated()
     return spec
 

@@ -6,8 +6,9 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
-from rich.table import Table
 from rich.text import Text
+
+from cli.fitted_table import Table
 
 if TYPE_CHECKING:
     from gaitswarm.views import (

@@ -174,12 +174,13 @@ def _checked(
     from pydantic import ValidationError
 
     from sim.choice import without_tags
+    from sim.wording import message_of
 
     try:
         return model.model_validate(document)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        message = first["msg"].removeprefix("Value error, ")
+        message = message_of(first)
         location = without_tags(first["loc"])
         if location:
             field = str(location[0])

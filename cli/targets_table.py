@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from gaitswarm.views.calibration import ReachedView, TargetsView
     from gaitswarm.views.identification import IdentifiabilityView
 
@@ -34,8 +33,7 @@ def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
 
 def targets_table(reached: TargetsView) -> Table:
     """Targets as rows: what was printed or measured, what is simulated, and how far off it is."""
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.tables import number
 
     left_out = any(target.left_out is not None for target in reached.targets)
@@ -64,8 +62,7 @@ def targets_table(reached: TargetsView) -> Table:
 
 def choices_table(parameters: IdentifiabilityView) -> Table:
     """Choices as rows: the least misfit with each, over all runs and of each run."""
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.tables import number
 
     title = "Least misfit by choice"

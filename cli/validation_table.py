@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from rich.table import Table
 from rich.text import Text
 
+from cli.fitted_table import Table
 from sim.validation.measures import Tolerance
 
 if TYPE_CHECKING:

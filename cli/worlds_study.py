@@ -13,8 +13,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.optimizer_choice import with_settings
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from gaitswarm.views.certificate import CertificateView, ProportionView
 
 
@@ -248,8 +247,7 @@ def study_table(found: Sequence[Contestant]) -> Table:
     Args:
         found: Contestants whose jobs have been run, the search without worlds first.
     """
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.tables import interval_cells, number, relative_change
 
     table = Table(
@@ -279,8 +277,7 @@ def runs_table(found: Sequence[Contestant]) -> Table:
     Args:
         found: Contestants whose jobs have been run.
     """
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.tables import number
 
     table = Table(title="Runs", title_justify="left", box=None, padding=(0, 1, 0, 0))

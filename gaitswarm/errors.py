@@ -82,19 +82,24 @@ class Interrupted(KeyboardInterrupt):
         )
 
 
-def invalid_request(error: ValidationError, document: Mapping[str, Any]) -> InvalidRequest:
+def invalid_request(
+    error: ValidationError, document: Mapping[str, Any], model: Any = None
+) -> InvalidRequest:
     """What pydantic found wrong, in the words of the input.
 
     Args:
         error: Of validating the document.
         document: What was validated.
+        model: What it was to be, so that an unknown key is answered with those that are known.
 
     Returns:
         An error that names every bad field; its `field` is the first.
     """
     from gaitswarm.views import field_errors
+    from sim.wording import with_known_keys
 
-    first, *others = field_errors(error.errors(include_url=False), document)
+    found = with_known_keys(error.errors(include_url=False), model)
+    first, *others = field_errors(found, document)
     more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)
     return InvalidRequest(first.message + more, field=first.field)
 

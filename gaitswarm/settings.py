@@ -14,6 +14,7 @@ from services.optimizer.errors import InvalidRequest, StoreUnavailable
 from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.worker import EvaluatorKind
 from sim.compiler.cache import DEFAULT_SIZE
+from sim.wording import message_of
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
 
@@ -260,7 +261,7 @@ def read_settings(**options: Any) -> Settings:
         return Settings(**given)
     except ValidationError as error:
         problems = [
-            (_source(str(problem["loc"][0]), given), problem["msg"])
+            (_source(str(problem["loc"][0]), given), message_of(problem))
             for problem in error.errors(include_url=False, include_input=False)
         ]
         (field, message), *others = problems

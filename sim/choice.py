@@ -50,8 +50,13 @@ def without_tags(location: Location) -> tuple[str | int, ...]:
     Returns:
         Keys and indices from the document's root.
     """
-    return tuple(part for part in location if not _is_tag(part))
+    return tuple(part for part in location if not is_tag(part))
 
 
-def _is_tag(part: str | int) -> bool:
+def is_tag(part: str | int) -> bool:
+    """Whether a part of a location says which alternative was validated.
+
+    Args:
+        part: of `loc` of a pydantic error.
+    """
     return isinstance(part, str) and (part == _KEY or (part[:1] == "<" and part[-1:] == ">"))

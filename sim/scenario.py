@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     Tag,
@@ -20,6 +21,7 @@ from sim.choice import NAME, OWN, alternatives
 from sim.errors import SimulationInputError
 from sim.former_names import current_names
 from sim.variables import Variable
+from sim.wording import message_of
 
 ScenarioName = Annotated[
     str,
@@ -373,7 +375,7 @@ def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise SimulationInputError(f"{where}: {first['msg']}") from error
+        raise SimulationInputError(f"{where}: {message_of(first)}") from error
 
 
 def _preset_exists(name: str) -> str:
@@ -381,9 +383,15 @@ def _preset_exists(name: str) -> str:
     return name
 
 
+def _number_as_name(value: object) -> object:
+    """1 as "1", which `find_scenario` knows."""
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 ScenarioChoice = Annotated[
     Annotated[ScenarioName, AfterValidator(_preset_exists), Tag(NAME)]
     | Annotated[Scenario, Tag(OWN)],
     alternatives("must be the name or number of a preset, or an object: a scenario of your own"),
+    BeforeValidator(_number_as_name),
 ]
 """How jobs and requests choose a walk."""

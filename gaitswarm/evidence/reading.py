@@ -30,6 +30,7 @@ from sim.errors import RobotFileError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 from sim.outcome import Status
 from sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
+from sim.wording import message_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -215,9 +216,11 @@ def _parsed(kind: type[M], members: Mapping[str, bytes], name: str) -> M:
 
 
 def _unreadable(name: str, error: ValidationError) -> BadArchive:
-    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+    first = error.errors(include_url=False, include_input=False)[0]
     where = ".".join(str(part) for part in first["loc"])
-    return BadArchive(f"{name} cannot be read by this gaitswarm: {where}: {first['msg'][:200]}")
+    return BadArchive(
+        f"{name} cannot be read by this gaitswarm: {where}: {message_of(first)[:200]}"
+    )
 
 
 def _member(members: Mapping[str, bytes], name: str) -> bytes:

@@ -11,6 +11,7 @@ from pydantic import Field
 from gaitswarm.views.base import View
 from sim.choice import without_tags
 from sim.former_names import as_written
+from sim.wording import message_of
 
 _LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)
 
@@ -24,7 +25,7 @@ class FieldErrorView(View):
     )
     message: str = Field(
         description="What is wrong with it and what it must be.",
-        examples=["Input should be a finite number"],
+        examples=["must be a finite number"],
     )
 
     @classmethod
@@ -56,7 +57,7 @@ class ProblemView(View):
     status: int = Field(description="HTTP status code.", examples=[422])
     detail: str = Field(
         description="What went wrong this time and what to do about it.",
-        examples=["iterations: Input should be greater than or equal to 1"],
+        examples=["iterations: must be at least 1"],
     )
     instance: str = Field(description="Path of the request.", examples=["/v1/jobs"])
     errors: list[FieldErrorView] = Field(
@@ -83,8 +84,7 @@ def field_errors(
             continue
         location = as_written(document, without_tags(error["loc"]))
         path = ".".join(str(part) for part in (*([prefix] if prefix else []), *location))
-        message = str(error["msg"]).removeprefix("Value error, ")
-        found.append(FieldErrorView.from_message(path, message))
+        found.append(FieldErrorView.from_message(path, message_of(error)))
     return list(dict.fromkeys(found))
 
 

@@ -23,6 +23,7 @@ from sim.robot.description import (
 )
 from sim.robot.robot import Robot
 from sim.variables import Variable
+from sim.wording import message_of
 
 _WHOLE: Final = (
     Variable(
@@ -204,7 +205,7 @@ def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) ->
     try:
         RobotDescription.model_validate(described.model_dump())
     except ValidationError as error:
-        message = error.errors()[0]["msg"].removeprefix("Value error, ")
+        message = message_of(error.errors()[0])
         raise SimulationInputError(f"{', '.join(values)}: {message}") from error
     return described
 
@@ -246,7 +247,7 @@ def _changed(part: Part, variables: Mapping[str, str], values: Mapping[str, floa
     except ValidationError as error:
         first = error.errors()[0]
         culprit = variables[str(first["loc"][0])]
-        raise SimulationInputError(f"{culprit}: {first['msg']}") from error
+        raise SimulationInputError(f"{culprit}: {message_of(first)}") from error
 
 
 def _named(variable: Variable, of: str) -> Variable:

@@ -21,6 +21,7 @@ from sim.robot.description import (
     Sensors,
     Supply,
 )
+from sim.wording import message_of, with_known_keys
 
 _TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
 _KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")
@@ -50,11 +51,11 @@ def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]
     Returns:
         One line for people, which names the field as the file does.
     """
-    first = error.errors()[0]
+    first = with_known_keys(error.errors(), RobotDescription)[0]
     location = as_written(document, first["loc"])
     where = shortened(".".join(str(part) for part in location))
     line = line_of(text, [part for part in location if not _is_class(part)])
-    message = first["msg"].removeprefix("Value error, ")
+    message = message_of(first)
     meaning = _meaning(str(first["loc"][-1])) if first["loc"] else None
     return (
         "robot.toml"

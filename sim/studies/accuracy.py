@@ -23,6 +23,7 @@ from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
 from sim.robot.robot import with_shafts
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate
+from sim.wording import message_of
 
 RESOLUTIONS: Final = ((6, 6), (8, 8), (10, 6))
 """Bits of error and current in the tables that are compared."""
@@ -163,7 +164,7 @@ def noise_on_links(
             for link in (1, 2, 3)
         ]
     except ValidationError as error:
-        said = error.errors(include_url=False)[0]["msg"].removeprefix("Value error, ")
+        said = message_of(error.errors(include_url=False)[0])
         raise SimulationInputError(
             said if said.startswith("deviation: ") else f"deviation: {said}"
         ) from error

@@ -45,7 +45,7 @@ def nothing_is_written(store: SqlStore) -> Iterator[None]:
         ({"scenarios": []}, "scenarios", "at least 1"),
         ({"scenarios": ["1", "normal-fast"]}, "scenarios", "named twice"),
         ({"scenarios": [{**OWN, "cycle_time": 0.0}]}, "scenarios.0.cycle_time", "0.2"),
-        ({"scenarios": [{**OWN, "wheels": 4}]}, "scenarios.0.wheels", "not permitted"),
+        ({"scenarios": [{**OWN, "wheels": 4}]}, "scenarios.0.wheels", "unknown key"),
         ({"scenarios": [{"name": "own"}]}, "scenarios.0.radius", "required"),
         ({"scenarios": [{**OWN, "stride": 0.9}]}, "scenarios.0", "misses its foot trajectory"),
         ({"variables": [{"name": "FI1R", "low": 6000, "high": 1500}]}, "variables.0", "inverted"),
@@ -60,7 +60,7 @@ def nothing_is_written(store: SqlStore) -> Iterator[None]:
         ({"iterations": 2.5}, "iterations", "integer"),
         ({"optimizer": {"particles": 0}}, "optimizer.particles", "greater than or equal to 1"),
         ({"seed": -1}, "seed", "greater than or equal to 0"),
-        ({"budget": 1}, "budget", "not permitted"),
+        ({"budget": 1}, "budget", "unknown key; known are"),
     ],
 )
 def test_a_spec_that_makes_no_sense_is_refused_by_field(

@@ -52,10 +52,10 @@ def test_rows_of_a_walk_share_what_its_first_row_says(table: Path, tmp_path: Pat
         ("walk,controller\n", "line 1, column design: the head lacks this column"),
         (HEAD + "pi,pi,,normal-fast,speed,1,1\n", "line 2, column design: empty in the first row"),
         (HEAD + f"\n{PI}speed,fast,0.1\n", "line 3, column value: 'fast' is not a number"),
-        (HEAD + f"{PI}speed,1,0\n", "line 2, column tolerance: Input should be greater than 0"),
+        (HEAD + f"{PI}speed,1,0\n", "line 2, column tolerance: must be greater than 0"),
         (HEAD + f"{PI}speed,-1,0.1\n", "line 2, column value: -1, but speed is greater than 0"),
-        (HEAD + f"{PI}haste,1,0.1\n", "line 2, column quantity: Input should be 'torque'"),
-        (HEAD + f"{PI}speed,1,0.1,,guess\n", "line 2, column use: Input should be 'fit'"),
+        (HEAD + f"{PI}haste,1,0.1\n", "line 2, column quantity: must be 'torque'"),
+        (HEAD + f"{PI}speed,1,0.1,,guess\n", "line 2, column use: must be 'fit'"),
         (HEAD + f"{PI}speed,1,0.1,pi\n", "line 2, column relative_to: the walk itself"),
         (HEAD + f"{PI}speed,1,0.1,,,6\n", "line 2, column use: the line has more cells"),
         (

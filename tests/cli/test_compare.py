@@ -57,7 +57,7 @@ def test_a_design_file_is_compared_on_a_variant_of_the_robot(
         (["compare", "--robot", "{"], "robot"),
         (["study", "steps", "--scenario", "moon"], "moon"),
         (["study", "noise", "--deviation", "5"], "deviation: 5 rad is more than 0.5 rad"),
-        (["study", "noise", "--deviation", "-1"], "deviation: Input should be greater than 0"),
+        (["study", "noise", "--deviation", "-1"], "deviation: must be greater than 0"),
     ],
 )
 def test_what_makes_no_sense_is_exit_code_2(

@@ -119,7 +119,7 @@ def test_an_error_in_a_robot_file_names_field_line_and_unit(
             "no-such-robot",
             "unknown robot 'no-such-robot'; known are szabadka2, szabadka2-identified",
         ),
-        ('{"contact_law": "glue"}', "robot.contact_law: Input should be 'linear_zone'"),
+        ('{"contact_law": "glue"}', "robot.contact_law: must be 'linear_zone'"),
         (str(QUADRUPED.parent), "is not a robot's folder"),
         ('{"name": ' * 5000, "robot: not JSON"),
     ],

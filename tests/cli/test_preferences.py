@@ -45,7 +45,7 @@ def test_winners_are_listed_by_how_robust_they_are(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--drawn", "0"), "drawn: Input should be greater than or equal to 1"),
+        (("--drawn", "0"), "drawn: must be at least 1"),
         (("--samples", "9"), "samples: 8 variables need at least 36"),
         (("--precision", "half"), "precision"),
     ],

@@ -68,7 +68,7 @@ def test_settings_are_laid_over_those_of_a_spec(
         ),
         (
             ["--optimizer-settings", '{"sigma": 3}'],
-            "optimizer.sigma: Input should be less than or equal to 1",
+            "optimizer.sigma: must be at most 1",
         ),
         (["--optimizer-settings", '{"a": '], "optimizer-settings: is not valid JSON"),
         (["--optimizer-settings", "@none.json"], "optimizer-settings: cannot read none.json"),

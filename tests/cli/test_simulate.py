@@ -11,7 +11,7 @@ import pytest
 
 from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
 from sim.scenario import SCENARIOS
-from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.walks import PUBLISHED_A
 
 pytestmark = pytest.mark.slow
@@ -46,16 +46,28 @@ def test_measurements_are_printed_in_their_units(
     assert f"{measurements['motor_heat']:.4g}" in result.out
 
 
-def test_a_design_comes_from_a_file_from_best_or_from_the_literature(
+def test_a_design_is_json_a_file_what_best_prints_or_of_the_literature(
     gaitswarm: Gaitswarm, write_json: WriteJson
 ) -> None:
     flat = write_json(PUBLISHED_A, "flat.json")
     best = write_json({"fitness": 1.0, "design": PUBLISHED_A}, "best.json")
     results = [
         gaitswarm("simulate", "--design", design, *FAST, "--json").json
-        for design in (flat, best, "published:A")
+        for design in (json.dumps(PUBLISHED_A), flat, best, "published:A")
     ]
-    assert results[0] == results[1] == results[2]
+    assert all(result == results[0] for result in results)
+
+
+def test_the_best_of_a_job_walks_as_it_did_in_the_job(
+    gaitswarm: Gaitswarm, finished: Finished
+) -> None:
+    best = gaitswarm("best", finished.id, "--db", finished.db, "--json").json
+    walked = gaitswarm("simulate", "--design", f"job:{finished.id}", "--db", finished.db, "--json")
+    objectives = [
+        {name: found["objectives"] for name, found in result["scenarios"].items()}
+        for result in (walked.json, best)
+    ]
+    assert objectives[0] == objectives[1]
 
 
 def test_scenarios_are_chosen_by_name_and_number(gaitswarm: Gaitswarm) -> None:

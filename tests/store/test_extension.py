@@ -48,7 +48,7 @@ def test_a_refused_extension_changes_nothing(store: SqlStore) -> None:
 @pytest.mark.parametrize(
     ("asked", "iterations", "words"),
     [
-        (small(), 30_000, "worlds: Input should be less than or equal to 100000"),
+        (small(), 30_000, "worlds: must be at most 100000"),
         (spec().model_copy(update={"optimizer": OPTIMIZERS["pso-ps"]}), 20_000, "is replayed"),
     ],
     ids=["certificate", "replayed"],

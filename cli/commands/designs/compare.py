@@ -98,8 +98,7 @@ def _row(figures: WalkFigures) -> dict[str, object]:
 
 
 def _show(drives: list[NamedDrive], figures: tuple[WalkFigures, ...]) -> None:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.output import stdout_console
     from cli.tables import number
 

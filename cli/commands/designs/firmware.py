@@ -88,8 +88,7 @@ def _bits(text: str) -> tuple[int, int]:
 
 
 def _show(view: FirmwareView) -> None:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.output import note, stdout_console
 
     table = Table(box=None, padding=(0, 2, 0, 0))

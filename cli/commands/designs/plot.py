@@ -70,7 +70,8 @@ def surface(
     design: Annotated[
         str,
         typer.Option(
-            metavar="FILE|published:NAME", help="Design as for `simulate`, or as published:A."
+            metavar="JSON|FILE|published:NAME|job:ID",
+            help="Design as for `simulate`, or as published:A.",
         ),
     ] = "published:A",
 ) -> None:

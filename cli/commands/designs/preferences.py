@@ -105,8 +105,7 @@ def _place(design: str) -> tuple[int, int]:
 
 
 def _print(view: RobustPreferencesView) -> None:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.output import stdout_console
     from cli.tables import MISSING, number
 

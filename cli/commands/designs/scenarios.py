@@ -43,8 +43,7 @@ def scenarios(
 
 
 def _print(view: ScenarioFamiliesView) -> None:
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.output import stdout_console
     from cli.tables import MISSING, number
 

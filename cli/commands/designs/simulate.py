@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.options import Json, Precision, RobotOption
+from cli.options import Db, Json, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views import SimulationView
@@ -22,17 +22,25 @@ def simulate(
     design: Annotated[
         str,
         typer.Option(
-            metavar="FILE|published:NAME",
+            metavar="JSON|FILE|published:NAME|job:ID",
             help="JSON object {variable: value} of the controller's variables and any gait"
-            " parameters, or with one under `design`; or a published design, as published:A.",
+            " parameters, or with one under `design`; a published design, as published:A; or the"
+            " best of a job.",
         ),
     ],
     controller: Annotated[
-        str, typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")
-    ] = "fuzzy-pi",
+        str | None,
+        typer.Option(
+            help="fuzzy-pi, fuzzy-pi-3, p, pi or pid [default: the job's, else fuzzy-pi]."
+        ),
+    ] = None,
     scenario: Annotated[
-        str, typer.Option(help="Name, number or FILE.json, several separated by commas, or all.")
-    ] = "all",
+        str | None,
+        typer.Option(
+            help="Name, number or FILE.json, several separated by commas, or all [default: the"
+            " job's, else all]."
+        ),
+    ] = None,
     trajectory: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="JSON object of gait parameters, beside the design."),
@@ -55,27 +63,34 @@ def simulate(
     ] = None,
     robot: RobotOption = None,
     precision: Precision = None,
+    server: Server = None,
+    db: Db = None,
     as_json: Json = False,
 ) -> None:
     """Let one design walk and say what it is worth; a fall is a result, not an error."""
     from pydantic import ValidationError
 
-    from cli.design_file import read_design
+    from cli.design_file import given_design
     from cli.output import note
     from cli.robots import chosen_robot, scenario_data
     from cli.spec_file import json_object
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
-    data = {
+    given = given_design(design, controller, trajectory, server=server, db=db)
+    data: dict[str, Any] = {
         "robot": chosen_robot(robot),
-        "controller": controller,
-        "design": read_design(design, controller, trajectory),
-        "scenarios": scenario_data(scenario),
+        "controller": given.controller,
+        "design": given.values,
+        "scenarios": scenario_data(scenario or "all"),
         "preference": preference,
         "precision": precision or "double",
         "log": log is not None,
     }
+    if given.spec is not None and robot is None:
+        data["robot"] = given.spec.robot
+    if given.spec is not None and scenario is None:
+        data["scenarios"] = given.spec.resolved_scenarios()
     if world is not None:
         found = json_object(world, "world")
         data["world"] = found.get("values", found)

@@ -122,9 +122,9 @@ def _in_full(
 
 
 def _print(found: VerificationView | HistoryVerificationView) -> None:
-    from rich.table import Table
     from rich.text import Text
 
+    from cli.fitted_table import Table
     from cli.output import stdout_console
     from cli.tables import number
     from gaitswarm.views.verification import VerificationView

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 NoiseKind = Literal["angle", "torque"]
 
 Design = Annotated[
-    str, typer.Option(metavar="FILE|published:NAME", help="Design as for `simulate`.")
+    str, typer.Option(metavar="JSON|FILE|published:NAME|job:ID", help="Design as for `simulate`.")
 ]
 Controller = Annotated[str, typer.Option(help="Controller of the design.")]
 Scenario = Annotated[str, typer.Option(help="Name or number, several separated by commas, or all.")]
@@ -118,8 +118,7 @@ def _show(deviations: Iterable[Deviation], *, as_json: bool, ratios: bool = Fals
     import json
     import math
 
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.output import print_text, stdout_console
     from sim.outcome import OBJECTIVE_NAMES
 

@@ -164,8 +164,7 @@ def _versions(specs: Iterable[TournamentSpec]) -> dict[str, str]:
 
 def _show(found: Standings) -> None:
     """Mean ranks, and medians of the best at the end of the budget."""
-    from rich.table import Table
-
+    from cli.fitted_table import Table
     from cli.output import stdout_console
 
     table = Table(box=None, header_style="bold", pad_edge=False)

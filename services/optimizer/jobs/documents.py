@@ -13,6 +13,7 @@ from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.kinds.identification import IdentificationSpec
 from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from sim.wording import message_of
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"
@@ -65,7 +66,7 @@ def checked_spec(spec: AnySpec, changes: Mapping[str, Any]) -> AnySpec:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = [str(part) for part in first["loc"] if not str(part).startswith("<")]
-        message = first["msg"].removeprefix("Value error, ")
+        message = message_of(first)
         raise InvalidRequest(message, field=".".join(where)) from error
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from services.optimizer.search.space import Space
+from sim.wording import message_of
 
 
 class SearchSettings(BaseModel):
@@ -198,7 +199,7 @@ def parse_state(state: dict[str, Any], optimizer: str, model: type[M]) -> M:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise ValueError(f"not a state of {optimizer}: {where}: {first['msg']}") from error
+        raise ValueError(f"not a state of {optimizer}: {where}: {message_of(first)}") from error
 
 
 def matrix(rows: list[list[float]], shape: tuple[int, ...], name: str) -> NDArray[np.float64]:

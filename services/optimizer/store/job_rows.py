@@ -18,6 +18,7 @@ from services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import UnparsedText
+from sim.wording import message_of
 
 _KEPT: Final = (
     "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"
@@ -118,8 +119,8 @@ def first_problems(error: ValidationError) -> str:
     Returns:
         Path and message of the first three problems, and how many more there are.
     """
-    found = error.errors(include_url=False, include_context=False, include_input=False)
-    lines = [f"{'.'.join(map(str, entry['loc']))}: {entry['msg']}" for entry in found[:3]]
+    found = error.errors(include_url=False, include_input=False)
+    lines = [f"{'.'.join(map(str, entry['loc']))}: {message_of(entry)}" for entry in found[:3]]
     if len(found) > len(lines):
         lines.append(f"{len(found) - len(lines)} more")
     return "; ".join(lines)

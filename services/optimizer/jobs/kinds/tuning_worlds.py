@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
 from sim.variables import Variable, VariableChoice
+from sim.wording import message_of
 from sim.worlds import PERTURBATIONS, sample_worlds
 
 Floats = NDArray[np.float64]
@@ -155,7 +156,7 @@ def _bounded(known: Variable, own: Variable) -> Variable:
     try:
         return Variable.model_validate(document)
     except ValidationError as error:
-        message = error.errors(include_url=False)[0]["msg"].removeprefix("Value error, ")
+        message = message_of(error.errors(include_url=False)[0])
         raise ValueError(f"ranges: {message}") from error
 
 

@@ -1,0 +1,59 @@
+"""A table that never cuts a word: where it is too wide, its rows are stacked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.measure import Measurement
+from rich.table import Column
+from rich.table import Table as RichTable
+from rich.text import Text
+
+
+class Table(RichTable):
+    """As Rich's, but ids and numbers stay whole on a console of any width.
+
+    Cells break between words only. Where even so a row does not fit on a line, every row becomes a
+    block of lines, each with a heading and a cell.
+    """
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """The table, or its rows as blocks. Called by Rich."""
+        for column in self.columns:
+            column.min_width = _longest_word(console, options, column)
+        if self._narrowest() <= options.max_width:
+            yield from super().__rich_console__(console, options)
+        else:
+            yield from self._blocks()
+
+    def _narrowest(self) -> int:
+        """Characters that the table takes when all columns are as narrow as their words."""
+        _, right, _, left = self.padding
+        edges = 0 if self.pad_edge else left + right
+        return sum((c.min_width or 0) + left + right for c in self.columns) - edges
+
+    def _blocks(self) -> Iterator[Text | RichTable]:
+        """One block a row, with an empty line between two."""
+        if self.title:
+            yield Text(str(self.title), style="italic")
+        rows = list(zip(*(column.cells for column in self.columns), strict=True))
+        for number, row in enumerate(rows):
+            if number:
+                yield Text()
+            block = RichTable(box=None, show_header=False, padding=(0, 2, 0, 0))
+            block.add_column(overflow="fold", no_wrap=True)
+            block.add_column(overflow="fold")
+            for column, cell in zip(self.columns, row, strict=True):
+                block.add_row(_on_one_line(column.header), cell)
+            yield block
+
+
+def _longest_word(console: Console, options: ConsoleOptions, column: Column) -> int:
+    """Of a column's heading and cells."""
+    cells = [column.header, *column.cells]
+    return max(Measurement.get(console, options, cell).minimum for cell in cells)
+
+
+def _on_one_line(heading: RenderableType) -> RenderableType:
+    return Text(" ".join(str(heading).split())) if isinstance(heading, str | Text) else heading

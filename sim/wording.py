@@ -1,0 +1,138 @@
+"""What pydantic finds wrong, in plain words and with the way out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from types import UnionType
+from typing import Annotated, Any, Final, Union, get_args, get_origin
+
+from pydantic import BaseModel, Tag
+
+from sim.choice import is_tag
+
+_PLAIN: Final = {
+    "missing": "is missing",
+    "extra_forbidden": "unknown key; leave it out",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "int_parsing_size": "is too large",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "finite_number": "must be a finite number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "string_type": "must be a text",
+    "list_type": "must be a list",
+    "tuple_type": "must be a list",
+    "dict_type": "must be an object",
+    "model_type": "must be an object",
+    "model_attributes_type": "must be an object",
+    "dataclass_type": "must be an object",
+    "none_required": "must be null",
+    "datetime_parsing": "must be a time, as 2026-01-31T12:00:00Z",
+    "datetime_type": "must be a time, as 2026-01-31T12:00:00Z",
+    "datetime_from_date_parsing": "must be a time, as 2026-01-31T12:00:00Z",
+    "greater_than": "must be greater than {gt}",
+    "greater_than_equal": "must be at least {ge}",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be at most {le}",
+    "multiple_of": "must be a multiple of {multiple_of}",
+    "too_short": "must have at least {min_length}, not {actual_length}",
+    "too_long": "must have at most {max_length}, not {actual_length}",
+    "string_too_short": "must have at least {min_length} characters",
+    "string_too_long": "must have at most {max_length} characters",
+    "string_pattern_mismatch": "must match the pattern {pattern}",
+    "union_tag_invalid": "must have as {discriminator} one of {expected_tags}",
+    "literal_error": "must be {expected}",
+    "enum": "must be {expected}",
+}
+"""By pydantic's type of error; in braces what its context holds."""
+
+
+def message_of(error: Mapping[str, Any]) -> str:
+    """What is wrong with a value, and what it must be.
+
+    Args:
+        error: One of `ValidationError.errors()`.
+
+    Returns:
+        A sentence that follows the name of the field and a colon.
+    """
+    kind, context = error["type"], error.get("ctx", {})
+    if kind == "extra_forbidden" and "known" in context:
+        return f"unknown key; {_hint(str(error['loc'][-1]), context['known'])}"
+    if kind in _PLAIN:
+        return _PLAIN[kind].format_map({name: _number(value) for name, value in context.items()})
+    said = str(error["msg"]).removeprefix("Value error, ")
+    return said.replace("Input should be", "must be").replace("Input should", "must")
+
+
+def with_known_keys(
+    errors: Sequence[Mapping[str, Any]], model: Any
+) -> tuple[Mapping[str, Any], ...]:
+    """Errors that tell, where a key is unknown, which ones are known there.
+
+    Args:
+        errors: As `ValidationError.errors()`, with locations from the model on.
+        model: What was validated against: a model, or a union of some.
+
+    Returns:
+        The errors, in their order, for `message_of`.
+    """
+    return tuple(
+        {**error, "ctx": {"known": known}}
+        if error["type"] == "extra_forbidden" and (known := _known_keys(model, error["loc"]))
+        else error
+        for error in errors
+    )
+
+
+def _number(value: object) -> object:
+    return f"{value:g}" if isinstance(value, float) else value
+
+
+def _hint(key: str, known: Sequence[str]) -> str:
+    near = get_close_matches(key, known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
+
+
+def _known_keys(model: Any, location: Sequence[str | int]) -> list[str]:
+    """Names of the fields of the models that hold the last part of a location."""
+    reached = [model]
+    for part in location[:-1]:
+        reached = [inner for one in reached for inner in _inner(one, part)]
+    models = [one for node in reached for _, one in _alternatives(node) if _is_model(one)]
+    return list(dict.fromkeys(name for one in models for name in one.model_fields))
+
+
+def _inner(annotation: Any, part: str | int) -> Iterator[Any]:
+    """What an annotation has at one part of a location."""
+    for tag, one in _alternatives(annotation):
+        if tag is not None and tag == part:
+            yield one
+        elif _is_model(one):
+            if part in one.model_fields:
+                yield one.model_fields[part].annotation
+        elif get_args(one) and not (isinstance(part, str) and is_tag(part)):
+            # Of a mapping the last argument is the value's, of a list or tuple the items'.
+            yield [kind for kind in get_args(one) if kind is not ...][-1]
+
+
+def _alternatives(annotation: Any, tag: str | None = None) -> Iterator[tuple[str | None, Any]]:
+    """(tag, annotation) of every member of a union, or of what is none."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        inner, *extra = get_args(annotation)
+        own = next((entry.tag for entry in extra if isinstance(entry, Tag)), tag)
+        yield from _alternatives(inner, own)
+    elif origin in (Union, UnionType):
+        for member in get_args(annotation):
+            yield from _alternatives(member, tag)
+    else:
+        yield tag, annotation
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)

@@ -1,0 +1,54 @@
+"""Tables keep their ids and numbers whole on a console of any width."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from cli.fitted_table import Table
+
+ROWS = [
+    ("wnb852gbnr7w", "first try on slopes", "succeeded", "18.1539"),
+    ("pbnc75p8qd4s", "", "running", "-0.00441"),
+]
+
+
+def printed(table: Table, width: int) -> str:
+    out = io.StringIO()
+    Console(file=out, width=width).print(table)
+    return out.getvalue()
+
+
+def jobs() -> Table:
+    table = Table("id", "name", "state", "best fitness", box=None)
+    for row in ROWS:
+        table.add_row(*row)
+    return table
+
+
+@pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
+def test_no_word_is_cut(width: int) -> None:
+    words = printed(jobs(), width).split()
+    assert {word for row in ROWS for cell in row for word in cell.split()} <= set(words)
+
+
+@pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
+def test_no_line_is_longer_than_the_console(width: int) -> None:
+    assert max(map(len, printed(jobs(), width).splitlines())) <= width
+
+
+def test_where_rows_fit_each_has_a_line_of_its_own() -> None:
+    head, *rows = printed(jobs(), 80).splitlines()
+    assert head.split() == ["id", "name", "state", "best", "fitness"]
+    assert [row.split()[0] for row in rows] == ["wnb852gbnr7w", "pbnc75p8qd4s"]
+
+
+def test_where_they_do_not_each_is_a_block_of_headings_and_cells() -> None:
+    blocks = printed(jobs(), 36).split("\n\n")
+    assert [line.split(maxsplit=1)[0] for line in blocks[0].splitlines()] == [
+        "id", "name", "state", "best",
+    ]  # fmt: skip
+    assert "best fitness  18.1539" in blocks[0]
+    assert "pbnc75p8qd4s" in blocks[1]

@@ -163,7 +163,7 @@ def test_worlds_are_all_perturbations_by_default_and_stored_with_their_bounds() 
             {"ranges": [{"name": "friction_factor", "kind": "integer", "low": 1, "high": 2}]},
             "friction_factor is continuous, not integer",
         ),
-        ({"aggregate": "median"}, "must be 'mean', 'quantile', 'worst' or 'cvar'"),
+        ({"aggregate": "median"}, "Input should be 'mean', 'quantile', 'worst' or 'cvar'"),
         ({"level": 1.0}, "less than 1"),
         ({"count": 0}, "greater than or equal to 1"),
     ],

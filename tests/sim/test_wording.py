@@ -43,7 +43,7 @@ def said(document: Any, model: Any = Leg) -> list[str]:
         ({"name": "LEFT"}, "must match the pattern ^[a-z]+$"),
         ({"side": "up"}, "must be 'left' or 'right'"),
         ({"joints": 3}, "must be a list"),
-        ({"joints": []}, "must have at least 1, not 0"),
+        ({"joints": []}, "must have at least 1 items, not 0"),
         ({"joints": [1.5]}, "must be a whole number"),
         ({"joints": ["x"]}, "must be a whole number"),
         ({"foot": 3}, "must be an object"),

@@ -119,7 +119,7 @@ def test_fitness_is_the_mean_of_the_best_of_all_problems() -> None:
     [
         ({"method": "annealing"}, "method", "unknown method 'annealing'; known are"),
         ({"method": {"name": "annealing"}}, "method", "unknown method 'annealing'"),
-        ({"method": {"name": "pso", "speed": 3}}, "method.speed", "unknown key"),
+        ({"method": {"name": "pso", "speed": 3}}, "method.speed", "Extra inputs"),
         ({"problems": [{"function": "D5"}]}, "problems.0.function", "D7C0R0I1"),
         ({"problems": [3]}, "problems.0", "must be an object"),
         ({"problems": [TUNING, TUNING]}, "", "problems: 'walk' is named twice"),

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 from tests.examples.paths import ROOT
 
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+_README = ROOT / "README.md"
+DOCUMENTS = [_README, *sorted((ROOT / "docs").glob("*.md"))]
 
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _SHELL = ("", "sh", "bash", "console", "shell")
@@ -27,9 +28,19 @@ def blocks(kind: str) -> Iterator[str]:
 def shell_commands(program: str) -> list[list[str]]:
     """Arguments of every call of a program in a shell block or between backquotes."""
     text = documentation()
-    shell = [body for language, body in _BLOCK.findall(text) if language in _SHELL]
     inline = re.findall(r"`([^`\n]+)`", _BLOCK.sub("", text))
-    lines = "\n".join([*shell, *inline]).replace("\\\n", " ").splitlines()
+    return [*calls(text, program), *(call for line in inline for call in _calls(line, program))]
+
+
+def section(title: str) -> str:
+    """Text of the README's section with that title."""
+    return _README.read_text(encoding="utf-8").split(f"## {title}\n")[1].split("\n## ")[0]
+
+
+def calls(text: str, program: str) -> list[list[str]]:
+    """Arguments of every call of a program in the shell blocks of a text, in their order."""
+    shell = [body for language, body in _BLOCK.findall(text) if language in _SHELL]
+    lines = "\n".join(shell).replace("\\\n", " ").splitlines()
     return [call for line in lines for call in _calls(line, program)]
 
 

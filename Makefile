@@ -40,6 +40,9 @@ wheel: setup page-if-possible ## Build a wheel into dist/, with the page and com
 bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)
 
+# Tests start hundreds of processes: compiling every module anew would be a third of what one takes.
+test unit: export PYTHONDONTWRITEBYTECODE =
+
 test: setup-dev ## Run all tests; those of the page need node with npm, and Chromium.
 	@scripts/npm.sh --if-possible test
 	@scripts/page.sh --if-possible

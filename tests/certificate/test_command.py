@@ -14,7 +14,8 @@ import pytest
 
 from tests.certificate.examples import PI
 from tests.examples.commands import Result, run_command
-from tests.examples.processes import COMMAND_LINE, output, python, start_python
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import output
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 
 SMALL = ("--evaluator", "in-process", "--only", "friction_factor,efficiency_factor")
@@ -195,7 +196,7 @@ def test_a_certificate_that_is_killed_and_goes_on_has_the_same_numbers(files: Pa
     assert whole["engines"]["mujoco"]["scenarios"]["short"]["theirs"] == "ok"
     killed = [*arguments(files)[:-1], str(files / "killed.db"), *asked]
     for number in (signal.SIGKILL, signal.SIGINT):
-        process = start_python(*COMMAND_LINE, *killed, start_new_session=True)
+        process = ForkedCommand(*killed, start_new_session=True)
         for line in output(process.stderr):
             if re.match(r"iteration \d", line):
                 break
@@ -204,9 +205,9 @@ def test_a_certificate_that_is_killed_and_goes_on_has_the_same_numbers(files: Pa
         assert process.returncode != 0
         if number == signal.SIGINT:
             assert "the same command goes on" in rest
-    last = python(*COMMAND_LINE, *killed)
-    assert last.returncode == 0, last.stderr
-    assert {**json.loads(last.stdout), **_changing(whole)} == whole
+    last = run_command(*killed)
+    assert last.code == 0, last.err
+    assert {**last.json, **_changing(whole)} == whole
 
 
 def _changing(document: dict[str, Any]) -> dict[str, Any]:

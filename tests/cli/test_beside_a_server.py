@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
 from tests.examples.walks import SHORT_WALK
@@ -18,8 +19,6 @@ from tests.examples.walks import SHORT_WALK
 pytestmark = pytest.mark.slow
 
 IN_PROCESS = ("--evaluator", "in-process")
-
-OPTIMIZE = (*COMMAND_LINE, "optimize")
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +29,8 @@ def db(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def server(db: Path) -> Iterator[str]:
-    process = start_python(
-        *COMMAND_LINE, "serve", "--port", "0", *IN_PROCESS, "--db", db,
+    process = ForkedCommand(
+        "serve", "--port", "0", *IN_PROCESS, "--db", db,
         environment={"GAITSWARM_CACHE": "0"},
     )  # fmt: skip
     yield line_with(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
@@ -43,7 +42,9 @@ def server(db: Path) -> Iterator[str]:
 def test_an_optimization_beside_a_server_of_its_database_keeps_its_job(
     small_spec: Path, db: Path, server: str
 ) -> None:
-    process = start_python(*OPTIMIZE, "--spec", small_spec, "--db", db, "--cpus", "1", "--json")
+    process = start_python(
+        *COMMAND_LINE, "optimize", "--spec", small_spec, "--db", db, "--cpus", "1", "--json"
+    )
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
     assert json.loads(out)["state"] == "succeeded"
@@ -69,7 +70,7 @@ def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
     job_id = gaitswarm("submit", "--spec", spec, "--server", server).out.strip()
     eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > 0)
-    process = start_python(*OPTIMIZE, "--resume", job_id, "--db", db)
+    process = ForkedCommand("optimize", "--resume", job_id, "--db", db)
     line_with(process.stderr, r"^iteration \d+/")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
@@ -84,7 +85,7 @@ def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 250})
-    process = start_python(*OPTIMIZE, "--spec", spec, "--db", db, *IN_PROCESS, "--json")
+    process = ForkedCommand("optimize", "--spec", spec, "--db", db, *IN_PROCESS, "--json")
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
     line_with(process.stderr, r"^iteration \d+/250")
     process.send_signal(signal.SIGSTOP)
@@ -101,7 +102,7 @@ def test_an_optimization_that_is_cancelled_elsewhere_says_so(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
-    process = start_python(*OPTIMIZE, "--spec", spec, "--db", db, *IN_PROCESS, "--json")
+    process = ForkedCommand("optimize", "--spec", spec, "--db", db, *IN_PROCESS, "--json")
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
     assert gaitswarm("cancel", job_id, "--server", server).code == 0
     out, err = process.communicate(timeout=60)

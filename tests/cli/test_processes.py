@@ -16,17 +16,18 @@ import pytest
 
 from services.runtime import open_store
 from tests.cli.conftest import Gaitswarm, WriteJson
+from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
 
 pytestmark = pytest.mark.slow
 
-SERVE = (*COMMAND_LINE, "serve", "--port", "0", "--evaluator", "in-process")
+SERVE = ("serve", "--port", "0", "--evaluator", "in-process")
 
 
 @pytest.fixture
 def server(db: Path) -> Iterator[str]:
-    process = start_python(*SERVE, "--db", db)
+    process = start_python(*COMMAND_LINE, *SERVE, "--db", db)
     url = line_with(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
     yield url
     process.send_signal(signal.SIGINT)
@@ -52,7 +53,7 @@ def test_the_jobs_of_a_server_that_is_killed_are_free_after_the_lease_of_its_set
     monkeypatch.setenv("GAITSWARM_LEASE_SECONDS", "3")
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
     job_id = gaitswarm("submit", "--spec", spec, "--db", db).out.strip()
-    server = start_python(*SERVE, "--db", db)
+    server = ForkedCommand(*SERVE, "--db", db)
     with closing(open_store(str(db))) as store:
         eventually(lambda: store.job(job_id).progress.iterations > 0)
         server.kill()
@@ -67,7 +68,7 @@ def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_neve
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 40})
     options = ("--spec", spec, "--evaluator", "in-process", "--json")
-    process = start_python(*COMMAND_LINE, "optimize", *options, "--db", db)
+    process = ForkedCommand("optimize", *options, "--db", db)
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
     line_with(process.stderr, r"^iteration \d+/40")
     process.send_signal(signal.SIGINT)
@@ -105,7 +106,7 @@ def test_a_stop_is_heard_while_a_cluster_is_connected_that_never_answers(
     spec = ("--spec", small_spec) if command == "optimize" else ()
     with socket.create_server(("127.0.0.1", 0)) as cluster:
         address = f"127.0.0.1:{cluster.getsockname()[1]}"
-        process = start_python(*COMMAND_LINE, command, *spec, "--db", db, "--ray-address", address)
+        process = ForkedCommand(command, *spec, "--db", db, "--ray-address", address)
         cluster.settimeout(60.0)
         with cluster.accept()[0]:
             process.send_signal(stop)
@@ -123,9 +124,7 @@ def test_an_optimization_whose_database_is_overwritten_with_garbage_does_not_end
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 100})
     assert gaitswarm("submit", "--spec", spec, "--db", db).code == 0
-    process = start_python(
-        *COMMAND_LINE, "optimize", "--spec", spec, "--db", db, "--evaluator", "in-process"
-    )
+    process = ForkedCommand("optimize", "--spec", spec, "--db", db, "--evaluator", "in-process")
     line_with(process.stderr, r"^iteration \d+/100")
     db.write_bytes(os.urandom(db.stat().st_size))
     out, err = process.communicate(timeout=120)

@@ -9,7 +9,8 @@ import pytest
 
 from cli.exit_codes import ExitCode
 from tests.cli.conftest import Gaitswarm
-from tests.examples.processes import COMMAND_LINE, line_with, start_python
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import line_with
 
 
 def test_a_token_is_made_listed_and_revoked(gaitswarm: Gaitswarm, db: Path) -> None:
@@ -37,7 +38,7 @@ def test_beyond_this_machine_the_first_start_prints_a_token(
     gaitswarm: Gaitswarm, db: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     options = ("--db", str(db), "--host", "0.0.0.0", "--port", "0", "--no-runner")  # noqa: S104
-    process = start_python(*COMMAND_LINE, "serve", *options, stdout=None)
+    process = ForkedCommand("serve", *options, stdout=None)
     try:
         port = line_with(process.stderr, r"serves http://0\.0\.0\.0:(\d+) and")[1]
         secret = line_with(process.stderr, r"^\s*(gaitswarm_\S+)$")[1]

@@ -15,7 +15,7 @@ from cli.exit_codes import ExitCode
 from gaitswarm.views.verification import CheckView, HistoryVerificationView
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, JOB, Proved, tampered, with_cells
-from tests.examples.processes import COMMAND_LINE, python
+from tests.examples.commands import run_command
 
 pytestmark = pytest.mark.slow
 
@@ -221,13 +221,13 @@ def test_the_command_line_names_the_first_iteration_that_differs(
     copy: Path, proved: Proved
 ) -> None:
     head = digests(copy, proved.id)[-1]
-    arguments = (*COMMAND_LINE, "verify", proved.id, "--db", str(copy), "--replay", "2")
-    done = python(*arguments, "--head", head)
-    assert done.returncode == 0, done.stderr
-    assert f"3 iterations chained, head {head[:8]}" in " ".join(done.stdout.split())
+    arguments = ("verify", proved.id, "--db", copy, "--replay", 2)
+    done = run_command(*arguments, "--head", head)
+    assert done.code == 0, done.err
+    assert f"3 iterations chained, head {head[:8]}" in " ".join(done.out.split())
     execute(copy, "UPDATE evaluations SET fitness = 1 WHERE iteration = 2 AND particle = 3")
-    done = python(*arguments, "--json")
-    assert done.returncode == ExitCode.JOB_FAILED
-    assert json.loads(done.stdout)["broken_at"] == 2
-    done = python(*arguments)
-    assert "iteration 2: the fitness of particle 3" in " ".join(done.stdout.split())
+    done = run_command(*arguments, "--json")
+    assert done.code == ExitCode.JOB_FAILED
+    assert done.json["broken_at"] == 2
+    done = run_command(*arguments)
+    assert "iteration 2: the fitness of particle 3" in " ".join(done.out.split())

@@ -23,7 +23,7 @@ def python(
     """Run Python to its end. environment: beside this process's; options: of `subprocess.run`."""
     return subprocess.run(
         [sys.executable, *map(str, arguments)],
-        env=_environment(environment),
+        env=environment_of_process(environment),
         check=False,
         text=True,
         **{"capture_output": True, "timeout": 120, **options},
@@ -37,13 +37,14 @@ def start_python(
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(
         [sys.executable, *map(str, arguments)],
-        env=_environment(environment),
+        env=environment_of_process(environment),
         text=True,
         **(pipes | options),
     )
 
 
-def _environment(changes: Mapping[str, str] | None) -> dict[str, str]:
+def environment_of_process(changes: Mapping[str, str] | None) -> dict[str, str]:
+    """This process's environment with some changes, and with this checkout on Python's path."""
     return os.environ | {"PYTHONPATH": str(ROOT)} | dict(changes or {})
 
 

@@ -23,7 +23,8 @@ from api.server import ApiServer
 from gaitswarm.settings import Settings
 from services.monitoring.metrics import Metrics
 from services.optimizer.service import JobService
-from tests.examples.processes import COMMAND_LINE, line_with, output, start_python
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import line_with, output
 
 
 class Served:
@@ -111,8 +112,7 @@ class ServerProcess(Served):
 
     def __init__(self, database: Path, *options: str) -> None:
         chosen = options or ("--evaluator", "in-process")
-        self.process = start_python(
-            *COMMAND_LINE,
+        self.process = ForkedCommand(
             *("serve", "--db", str(database), "--port", "0", *chosen),
             environment={"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"},
             stdout=None,

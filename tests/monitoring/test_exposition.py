@@ -15,7 +15,8 @@ from services.optimizer.access import Scope, Token
 from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
-from tests.examples.processes import COMMAND_LINE, line_with, start_python
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import line_with
 from tests.examples.servers import Server
 from tests.monitoring.scraped import parsed, scraped
 
@@ -138,9 +139,7 @@ def test_a_port_that_is_taken_is_named() -> None:
 @pytest.mark.slow
 def test_a_runner_serves_its_own_metrics_but_not_the_databases(database: Path) -> None:
     options = ("runner", "--db", str(database), "--evaluator", "in-process", "--cpus", "2")
-    process = start_python(
-        *COMMAND_LINE, *options, environment={"GAITSWARM_METRICS_PORT": "0"}, stdout=None
-    )
+    process = ForkedCommand(*options, environment={"GAITSWARM_METRICS_PORT": "0"}, stdout=None)
     try:
         url = line_with(process.stderr, r"metrics: (http://\S+)")[1]
         scrape = parsed(httpx2.get(url).text)

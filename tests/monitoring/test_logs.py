@@ -22,8 +22,9 @@ from services.optimizer.log_context import log_context, log_fields
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
+from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.processes import COMMAND_LINE, eventually, start_python
+from tests.examples.processes import eventually
 from tests.examples.servers import Server
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
 
@@ -35,9 +36,7 @@ def logged(database: Path, visit: Callable[[httpx2.Client], None], **settings: s
     options = ("--db", str(database), "--port", "0", "--evaluator", "in-process", "--cpus", "1")
     path = database.with_suffix(".log")
     with path.open("w", encoding="utf-8") as log:
-        process = start_python(
-            *COMMAND_LINE, "serve", *options, environment=settings, stdout=None, stderr=log
-        )
+        process = ForkedCommand("serve", *options, environment=settings, stdout=None, stderr=log)
     try:
         eventually(lambda: "serves http" in path.read_text(encoding="utf-8"))
         url = path.read_text(encoding="utf-8").partition("serves ")[2].split()[0]

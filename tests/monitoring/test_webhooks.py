@@ -20,8 +20,9 @@ from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.jobs.notification import MOST_ATTEMPTS, check_url, pause_after
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.processes import COMMAND_LINE, eventually, start_python
+from tests.examples.processes import eventually
 from tests.examples.servers import Server
 from tests.monitoring.receiver import Receiver, receiving
 from tests.optimizer.formula import SPEC
@@ -246,8 +247,8 @@ def test_a_server_that_is_killed_between_end_and_delivery_tells_after_its_restar
     store = open_store(str(database))
     job_id = cancelled(store, receiver.url)
     for kill in (True, False):
-        process = start_python(
-            *COMMAND_LINE, "serve", *options, environment=environment, stdout=None, stderr=None
+        process = ForkedCommand(
+            "serve", *options, environment=environment, stdout=None, stderr=None
         )
         try:
             if kill:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import random
 import threading
 import time
@@ -21,6 +20,7 @@ from services.optimizer.run.runner import Runner
 from services.optimizer.search.evolution.hype import HypeSettings
 from services.optimizer.store.base import Store
 from services.runtime import open_evaluator, open_store, run_embedded
+from tests.examples.forked import PROCESSES
 from tests.examples.jobs import history
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 from tests.resume import job_process
@@ -92,12 +92,6 @@ def best_in_double(store: Store, job_id: str) -> tuple[bytes, float] | None:
     anew = best.reevaluation
     assert (anew is None) == (store.job(job_id).spec.precision == "double")
     return None if anew is None else (anew.objectives.tobytes(), anew.fitness)
-
-
-PROCESSES = multiprocessing.get_context("forkserver")
-"""Processes of one that has imported all that a job needs, and nothing else."""
-
-PROCESSES.set_forkserver_preload(["tests.resume.job_process"])
 
 
 class Life:

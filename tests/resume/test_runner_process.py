@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -17,8 +16,9 @@ from gaitswarm.jobs.open import open_jobs
 from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
+from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
-from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
+from tests.examples.processes import eventually, line_with
 
 pytestmark = pytest.mark.slow
 
@@ -31,11 +31,11 @@ def spec(iterations: int) -> JobSpec:
 
 
 @contextmanager
-def runner(**settings: str) -> Iterator[subprocess.Popen[str]]:
+def runner(**settings: str) -> Iterator[ForkedCommand]:
     environment = {"GAITSWARM_EVALUATOR": "in-process"}
     environment |= {f"GAITSWARM_{name}": value for name, value in settings.items()}
-    with start_python(
-        *COMMAND_LINE, "runner", environment=environment, stdout=None, start_new_session=True
+    with ForkedCommand(
+        "runner", environment=environment, stdout=None, start_new_session=True
     ) as started:
         try:
             yield started

@@ -19,7 +19,8 @@ from services.optimizer.jobs.kinds.problem import TuningProblem
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.tournament.methods import method_names
 from tests.examples.commands import Result, run_command
-from tests.examples.processes import COMMAND_LINE, output, python, start_python
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import output
 
 TWO = "D4C1R0I1,D7C0R0I1"
 """A page has two pictures and one of every problem, which take longer than the runs."""
@@ -164,11 +165,11 @@ def test_a_tournament_that_is_killed_and_goes_on_has_the_same_numbers(tmp_path: 
     assert command(whole, "--repetitions", 8, methods=methods, problems=TWO).code == 0
 
     arguments = (
-        *COMMAND_LINE, "tournament", "thesis", *map(str, small(TWO)), "--methods", methods,
+        "tournament", "thesis", *map(str, small(TWO)), "--methods", methods,
         "--repetitions", "8", "--db", str(killed / "jobs.db"), "--output", str(killed / "report"),
     )  # fmt: skip
     for number in (signal.SIGKILL, signal.SIGINT):
-        process = start_python(*arguments, start_new_session=True)
+        process = ForkedCommand(*arguments, start_new_session=True)
         for line in output(process.stderr):
             if ": run " in line:
                 break
@@ -178,8 +179,8 @@ def test_a_tournament_that_is_killed_and_goes_on_has_the_same_numbers(tmp_path: 
         if number == signal.SIGINT:
             assert "the same command goes on" in rest
     assert sum(jobs(killed).values()) < 24
-    last = python(*arguments)
-    assert last.returncode == 0, last.stderr
+    last = run_command(*arguments)
+    assert last.code == 0, last.err
     assert numbers(killed) == numbers(whole)
 
 

@@ -16,7 +16,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page wheel bench test unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev page-if-possible
+.PHONY: help demo serve page manual wheel bench test unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -31,6 +31,10 @@ serve: setup page-if-possible ## Serve page and REST API on http://127.0.0.1:800
 
 page: setup ## Build the page that is served (with node and npm, or those of a wheel).
 	@scripts/page.sh
+
+manual: setup-dev ## Build the manual that is served on /manual from docs/.
+	@rm -rf api/manual
+	@$(BIN)/python -m sphinx -q -W -b html -d build/manual -c docs . api/manual
 
 wheel: setup page-if-possible ## Build a wheel into dist/, with the page and compiled kernels.
 	@$(BIN)/python -m scripts.prebuilt
@@ -84,7 +88,7 @@ lock: ## Choose versions anew, after a change of the dependencies in pyproject.t
 	$(COMPILE) --group node -o requirements/node.lock
 
 clean: ## Remove the virtual environment and caches; jobs in the user's database stay.
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis .benchmarks build dist api/page web/node_modules web/openapi.json web/src/api/schema.d.ts
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis .benchmarks build dist api/page api/manual web/node_modules web/openapi.json web/src/api/schema.d.ts
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 setup:

@@ -14,6 +14,8 @@ from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddle
 from api.access import AccessMiddleware
 from api.dependencies import Component, lifespan
 from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
+from api.manual import FOLDER as MANUAL
+from api.manual import add_manual
 from api.middleware import (
     BodyLimitMiddleware,
     HeaderLimitMiddleware,
@@ -63,6 +65,7 @@ def create_app(
     *,
     settings: Settings,
     page_folder: Path = FOLDER,
+    manual_folder: Path = MANUAL,
     metrics: Metrics | None = None,
     components: Sequence[Component] = (),
 ) -> FastAPI:
@@ -74,6 +77,7 @@ def create_app(
         service: answers the requests.
         settings: limits and intervals.
         page_folder: of the built page; there need be none.
+        manual_folder: of the built manual; there need be none.
         metrics: of the process, which the application adds its own and the database's to; None:
             there are no others.
         components: parts of the process, beside the database, that /v1/readyz tells of.
@@ -119,6 +123,7 @@ def create_app(
     add_metrics(app, metrics, access)
     add_documentation(app)
     add_page(app, page_folder)
+    add_manual(app, manual_folder)
     add_problem_handlers(app)
     app.add_middleware(BodyLimitMiddleware, max_bytes=settings.api_max_body_bytes)
     app.add_middleware(

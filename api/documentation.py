@@ -81,7 +81,7 @@ _BEARER: Final = {
 
 _SCHEMAS: Final = "#/components/schemas/"
 
-_INLINE_SCRIPT: Final = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
+_INLINE_SCRIPT: Final = re.compile(rb"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
 Responses = dict[int | str, dict[str, Any]]
 
@@ -150,7 +150,7 @@ def add_documentation(app: FastAPI) -> None:
             swagger_css_url=f"{root}{ASSETS}/swagger-ui.css",
             swagger_favicon_url=f"{root}{ASSETS}/favicon.png",
         )
-        page.headers["Content-Security-Policy"] = _policy(bytes(page.body))
+        page.headers["Content-Security-Policy"] = policy_of(bytes(page.body))
         return page
 
     app.add_route("/docs", documentation, include_in_schema=False)
@@ -163,10 +163,15 @@ def _schemas(*models: type[BaseModel]) -> dict[str, Any]:
     return cast(dict[str, Any], schemas["$defs"])
 
 
-def _policy(page: bytes) -> str:
-    """Allows the inline script that starts /docs by its hash.
+def policy_of(page: bytes) -> str:
+    """The policy of a page that other projects' scripts make.
 
-    It writes styles into the page, which has no content of users.
+    Args:
+        page: Its HTML, which has no content of users.
+
+    Returns:
+        A content security policy that allows the page's inline scripts by their hashes, and styles
+        that scripts write.
     """
     hashes = [
         f"'sha256-{base64.b64encode(hashlib.sha256(script).digest()).decode()}'"

@@ -1,5 +1,7 @@
 """The Python library: simulate designs, run jobs, ask about them.
 
+.. code-block:: python
+
     import gaitswarm
 
     result = gaitswarm.optimize(controller="pi", scenarios="normal-fast", iterations=10)

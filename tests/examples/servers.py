@@ -55,7 +55,8 @@ class Served:
 class Server(Served):
     """The API in a thread of this process, and a client of it.
 
-    page_folder: of the built page; by default there is none, whether one was built here or not.
+    page_folder, manual_folder: of the built page and manual; by default there is none, whether one
+        was built here or not.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class Server(Served):
         service: JobService | None,
         *,
         page_folder: Path = Path("none"),
+        manual_folder: Path = Path("none"),
         metrics: Metrics | None = None,
         components: Sequence[dependencies.Component] = (),
         drain: Callable[[threading.Event], None] = lambda _: None,
@@ -74,6 +76,7 @@ class Server(Served):
             cast(JobService, service),
             settings=values,
             page_folder=page_folder,
+            manual_folder=manual_folder,
             metrics=metrics,
             components=components,
         )

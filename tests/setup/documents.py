@@ -11,7 +11,7 @@ from tests.examples.paths import ROOT
 _README = ROOT / "README.md"
 DOCUMENTS = [_README, *sorted((ROOT / "docs").glob("*.md"))]
 
-_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _SHELL = ("", "sh", "bash", "console", "shell")
 _ENDS = ("|", "||", "&&", ";", "&", ">", ">>", "2>", "<", "#")
 

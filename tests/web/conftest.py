@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +23,8 @@ from tests.web.visit import Visit
 # Read here: the tests themselves see none of the user's settings.
 REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_PAGE"))
 SCREENSHOTS = os.environ.get("GAITSWARM_SCREENSHOTS", "")
+
+HERE = Path(__file__).parent
 
 SMALL_JOB: dict[str, Any] = SMALL_SPEC | {
     "scenarios": [SHORT_WALK, SHORT_WALK | {"name": "loaded", "load": 5.0}],
@@ -48,13 +51,45 @@ def _chromium() -> str:
     return str(found)
 
 
-@pytest.fixture(scope="module")
-def browser(_chromium: str) -> Iterator[Browser]:
-    """Of a module: its event loop must not outlast it, other tests run loops of their own."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=_chromium, args=ARGUMENTS)
-        yield browser
-        browser.close()
+_opened = ExitStack()
+"""Closes the browser, if one is open."""
+
+
+@pytest.fixture(scope="session")
+def _open_browser(_chromium: str) -> Iterator[Callable[[], Browser]]:
+    """Start a browser, or give the one that is open."""
+    browsers: list[Browser] = []
+
+    def opened() -> Browser:
+        if not browsers:
+            playwright = _opened.enter_context(sync_playwright())
+            browser = playwright.chromium.launch(executable_path=_chromium, args=ARGUMENTS)
+            browsers.append(browser)
+            _opened.callback(browsers.clear)
+            _opened.callback(browser.close)
+        return browsers[0]
+
+    yield opened
+    _opened.close()
+
+
+@pytest.fixture
+def browser(_open_browser: Callable[[], Browser]) -> Browser:
+    """One for all tests of this folder that follow each other."""
+    return _open_browser()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
+    """After a test of this folder: close the browser before one of another folder begins.
+
+    Its event loop must not outlast them, other tests run loops of their own.
+    """
+    try:
+        yield
+    finally:
+        if nextitem is None or HERE not in nextitem.path.parents:
+            _opened.close()
 
 
 @pytest.fixture(scope="session")

@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
 
 import pytest
 
 from tests.examples.processes import python
 
+Told = Callable[..., Any]
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Told:
+    """The document that a benchmark prints, run in this process."""
+
+    def run(name: str, *options: str) -> Any:
+        module = import_module(f"benchmarks.{name}")
+        monkeypatch.setattr("sys.argv", [name, *options, "--json"])
+        module.main()
+        return json.loads(capsys.readouterr().out)
+
+    return run
+
 
 @pytest.mark.slow
-def test_the_physics_benchmark_tells_ratios() -> None:
-    done = python("-m", "benchmarks.physics", "--rounds", "1", "--json")
-    assert done.returncode == 0, done.stderr
-    rows = json.loads(done.stdout)
+def test_the_physics_benchmark_tells_ratios(told: Told) -> None:
+    rows = told("physics", "--rounds", "1")
     assert len(rows) == 3
     for row in rows:
         assert 0.0 < row["fastest"] <= row["us_per_step"]
@@ -24,10 +40,10 @@ def test_the_physics_benchmark_tells_ratios() -> None:
 
 
 @pytest.mark.slow
-def test_the_engines_benchmark_says_what_each_contestant_computes_and_what_is_timed() -> None:
-    done = python("-m", "benchmarks.engines", "--rounds", "1", "--json")
-    assert done.returncode == 0, done.stderr
-    rows = json.loads(done.stdout)["rows"]
+def test_the_engines_benchmark_says_what_each_contestant_computes_and_what_is_timed(
+    told: Told,
+) -> None:
+    rows = told("engines", "--rounds", "1")["rows"]
     assert {row["figure"] for row in rows} == {"throughput", "latency", "both"}
     assert all(row["computes"] and 0.0 < row["fastest"] <= row["us_per_step"] for row in rows)
     speed = {(row["what"], row["figure"]): row["us_per_step"] for row in rows}
@@ -44,20 +60,17 @@ def test_the_engines_benchmark_says_what_each_contestant_computes_and_what_is_ti
 
 
 @pytest.mark.slow
-def test_the_accuracy_benchmark_finds_our_step_nearer_to_a_fine_one_than_mujocos() -> None:
-    done = python("-m", "benchmarks.step_accuracy", "--rates", "2500", "--json")
-    assert done.returncode == 0, done.stderr
-    ours, mujocos = json.loads(done.stdout)
+def test_the_accuracy_benchmark_finds_our_step_nearer_to_a_fine_one_than_mujocos(
+    told: Told,
+) -> None:
+    ours, mujocos = told("step_accuracy", "--rates", "2500")
     assert (ours["rate"], mujocos["rate"]) == (2_500, 2_500)
     assert max(ours["percent"]) < max(mujocos["percent"]) < 5.0
 
 
 @pytest.mark.slow
-def test_the_history_benchmark_reads_a_store_of_its_own() -> None:
-    options = ["--jobs", "8", "--iterations", "20", "--repeats", "1", "--json"]
-    done = python("-m", "benchmarks.history", *options)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+def test_the_history_benchmark_reads_a_store_of_its_own(told: Told) -> None:
+    found = told("history", "--jobs", "8", "--iterations", "20", "--repeats", "1")
     assert found["evaluations"] == 500
     assert found["seconds"]
     assert all(0.0 < seconds < 60.0 for seconds in found["seconds"].values())
@@ -76,10 +89,8 @@ def test_the_start_up_benchmark_tells_how_long_people_wait() -> None:
 
 
 @pytest.mark.slow
-def test_the_benchmark_of_known_walks_tells_what_the_cache_adds() -> None:
-    done = python("-m", "benchmarks.known_walks", "--rows", "1000", "--rounds", "2", "--json")
-    assert done.returncode == 0, done.stderr
-    seconds = json.loads(done.stdout)
+def test_the_benchmark_of_known_walks_tells_what_the_cache_adds(told: Told) -> None:
+    seconds = told("known_walks", "--rows", "1000", "--rounds", "2")
     parts = seconds["keys"] + seconds["query"] + seconds["index"]
     assert seconds["added"] == pytest.approx(parts)
 

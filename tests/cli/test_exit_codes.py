@@ -16,6 +16,7 @@ import gaitswarm.jobs.open as gaitswarm_open
 from cli.exit_codes import ExitCode
 from gaitswarm.errors import EvaluatorUnavailable, StoreUnavailable
 from tests.cli.conftest import Finished, Gaitswarm
+from tests.examples.forked import run_forked
 from tests.examples.paths import ROOT
 from tests.examples.processes import COMMAND_LINE, python
 
@@ -93,7 +94,7 @@ def test_a_data_directory_that_cannot_be_made_is_exit_code_5_and_what_else_will_
     small_spec: Path,
 ) -> None:
     # A file, so that it cannot be written by root either.
-    done = run(
+    done = run_forked(
         *("optimize", "--spec", small_spec, *IN_PROCESS),
         environment={"XDG_DATA_HOME": str(small_spec)},
     )
@@ -110,10 +111,11 @@ def test_a_cache_directory_and_a_home_that_cannot_be_written_stop_nothing(
     no_folder = str(small_spec)
     of_user = {"XDG_CACHE_HOME": no_folder, "HOME": no_folder, "TMPDIR": str(tmp_path)}
     db = tmp_path / "jobs.db"
-    done = run("optimize", "--spec", small_spec, "--db", db, *IN_PROCESS, environment=of_user)
+    options = ("--spec", small_spec, "--db", db, *IN_PROCESS)
+    done = run_forked("optimize", *options, environment=of_user)
     assert done.returncode == ExitCode.OK, done.stderr
     picture = tmp_path / "surface.png"
-    drawn = run("plot", "surface", "--output", picture, environment=of_user)
+    drawn = run_forked("plot", "surface", "--output", picture, environment=of_user)
     assert drawn.returncode == ExitCode.OK, drawn.stderr
     assert picture.exists()
     assert "Traceback" not in done.stderr + drawn.stderr

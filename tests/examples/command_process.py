@@ -12,18 +12,24 @@ import cli.main
 
 # Commands import these when they run: here, in the process that is forked, once for all of them.
 for _name in (
+    "alembic.command",
     "api.app",
     "api.server",
     "cli.commands.jobs.serve",
     "cli.embedded",
+    "cli.robots",
+    "cli.spec_file",
     "cli.tables",
     "gaitswarm.jobs.database.jobs",
+    "numpy.random",
+    "rich.console",
     "services.monitoring.collectors",
     "services.monitoring.measured_store",
     "services.monitoring.webhooks",
     "services.runtime",
     "sim.simulate",
     "tests.resume.job_process",
+    "typer._adapters",
 ):
     import_module(_name)
 

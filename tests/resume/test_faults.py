@@ -49,7 +49,7 @@ def test_processes_and_services_that_fail_cost_no_bit_and_nobodys_time() -> None
     with Deployment(with_clock=False) as deployment:
         possible = [kind for kind in kinds if KINDS[kind].possible(deployment)]
         planned = plan(1, len(possible), possible, pause=0.2)
-        result = run(deployment, planned, iterations=40, patience=60.0)
+        result = run(deployment, planned, iterations=20, patience=60.0)
     assert sorted(kind for kind, _, _ in result.faults) == sorted(possible)
     assert result.jobs > 0
     assert (result.lost, result.different, result.manual) == (0, [], [])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -150,6 +151,11 @@ class LimitedProtocol(H11Protocol):
             transport: of the connection.
         """
         super().connection_made(transport)
+        # asyncio does so only for sockets that say that they are of TCP, which ours do not. An
+        # answer's body would wait for the client to acknowledge its head, which takes 40 ms.
+        connection = transport.get_extra_info("socket")
+        if connection is not None and connection.family in (socket.AF_INET, socket.AF_INET6):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         host = self.client[0] if self.client else ""
         if host and not self._limits.trusts(host):
             self._counted = host

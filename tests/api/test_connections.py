@@ -210,3 +210,16 @@ def _answered_within_seconds(server: Server, connect: Connect) -> None:
             pass
         connection.close()
     pytest.fail("no connection was given back")
+
+
+def test_an_answer_does_not_wait_for_the_client_to_acknowledge_its_head(
+    serve: Serve, connect: Connect
+) -> None:
+    connection = connect(serve())
+    seconds = []
+    for _ in range(60):
+        begun = time.perf_counter()
+        assert ask(connection)
+        seconds.append(time.perf_counter() - begun)
+    # A client acknowledges the first packets of a connection at once, later ones after 40 ms.
+    assert min(seconds[30:]) < 0.03

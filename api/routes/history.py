@@ -63,7 +63,7 @@ def list_iterations(
     responses=problems(404, 409, 422),
 )
 def list_evaluations(
-    job: ExistingJob,
+    job_id: JobId,
     service: Service,
     iteration: Annotated[
         int, Path(ge=0, le=LARGEST_INDEX, description="Index of a committed iteration, from 0.")
@@ -73,7 +73,8 @@ def list_evaluations(
 
     Raw objectives are as simulated; utilities follow from them and the job's preference.
     """
-    return CatalogueView(items=evaluation_views(service.evaluations(job.id, iteration), job.spec))
+    job = service.job(job_id)
+    return CatalogueView(items=evaluation_views(service.evaluations(job_id, iteration), job.spec))
 
 
 @router.get(
@@ -82,15 +83,16 @@ def list_evaluations(
     summary="Take the best design",
     responses=problems(404, 409, 422),
 )
-def get_best(job: ExistingJob, service: Service) -> BestView:
+def get_best(job_id: JobId, service: Service) -> BestView:
     """The design of least fitness so far, with its results in every scenario.
 
     404 while no design has walked in every scenario.
     """
-    best = service.best(job.id)
+    job = service.job(job_id)
+    best = service.best(job_id)
     if best is None:
         raise NotFound(
-            f"job {job.id} has no design yet that walks in every scenario; ask again after its"
+            f"job {job_id} has no design yet that walks in every scenario; ask again after its"
             " next iteration, or see why designs fail in its evaluations"
         )
     return BestView.from_evaluation(best, job.spec)

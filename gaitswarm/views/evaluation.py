@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
 from gaitswarm.views.base import View, finite
 from services.optimizer.jobs.iteration import Evaluation
@@ -71,27 +71,6 @@ class ScenarioResultView(View):
         + ".",
         examples=[_EXAMPLE],
     )
-
-    @classmethod
-    def from_case(
-        cls, status: int, objectives: Mapping[str, float], log_utility: float
-    ) -> ScenarioResultView:
-        """Make a view of what one case yields.
-
-        Args:
-            status: value of `sim.outcome.Status`.
-            objectives: raw objectives by name, in their units, NaN where there is none.
-            log_utility: logarithm of the utility, +inf for a failed walk.
-        """
-        ended = Status(status)
-        return cls.model_validate(
-            {
-                "status": ended.label,
-                "explanation": ended.phrase,
-                "utility": utility(log_utility),
-                "objectives": {name: finite(value) for name, value in objectives.items()},
-            }
-        )
 
 
 class EvaluationView(View):
@@ -175,6 +154,9 @@ class BestView(EvaluationView):
         return cls.model_validate({**dict(view), "search": search})
 
 
+_EVALUATIONS: Final = TypeAdapter(list[EvaluationView])
+
+
 def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
     """Make views of evaluations of one job.
 
@@ -191,23 +173,23 @@ def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[Eval
     objectives = np.stack([evaluation.objectives for evaluation in evaluations])
     statuses = np.stack([evaluation.statuses for evaluation in evaluations])
     logs = spec.judge(objectives, statuses != Status.OK).log_utilities
-    return [
-        EvaluationView(
-            iteration=evaluation.iteration,
-            particle=evaluation.particle,
-            fitness=finite(evaluation.fitness),
-            figure_of_merit=spec.figure_of_merit(evaluation.fitness),
-            design=space.shown(evaluation.design.tolist()),
-            scenarios=case_results(
-                spec.case_names,
-                spec.objectives,
-                evaluation.statuses,
-                evaluation.objectives,
-                log_utilities,
-            ),
-        )
-        for evaluation, log_utilities in zip(evaluations, logs, strict=True)
-    ]
+    names, columns = spec.case_names, [objective.name for objective in spec.objectives]
+    # Validated at once: a call for each result takes longer than all else.
+    return _EVALUATIONS.validate_python(
+        [
+            {
+                "iteration": evaluation.iteration,
+                "particle": evaluation.particle,
+                "fitness": finite(evaluation.fitness),
+                "figure_of_merit": spec.figure_of_merit(evaluation.fitness),
+                "design": space.shown(evaluation.design.tolist()),
+                "scenarios": _results(
+                    names, columns, evaluation.statuses, evaluation.objectives, log_utilities
+                ),
+            }
+            for evaluation, log_utilities in zip(evaluations, logs, strict=True)
+        ]
+    )
 
 
 def case_results(
@@ -230,8 +212,25 @@ def case_results(
         K views by name, in the same order.
     """
     columns = [objective.name for objective in objectives]
+    found = _results(names, columns, statuses, values, log_utilities)
+    return {name: ScenarioResultView.model_validate(result) for name, result in found.items()}
+
+
+def _results(
+    names: Sequence[str],
+    columns: Sequence[str],
+    statuses: NDArray[np.uint8],
+    values: NDArray[np.float64],
+    log_utilities: NDArray[np.float64],
+) -> dict[str, dict[str, object]]:
+    """As `case_results`, not yet validated."""
     return {
-        name: ScenarioResultView.from_case(status, dict(zip(columns, row, strict=True)), log)
+        name: {
+            "status": (ended := Status(status)).label,
+            "explanation": ended.phrase,
+            "utility": utility(log),
+            "objectives": dict(zip(columns, map(finite, row), strict=True)),
+        }
         for name, status, row, log in zip(
             names, statuses.tolist(), values.tolist(), log_utilities.tolist(), strict=True
         )

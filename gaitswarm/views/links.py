@@ -16,6 +16,12 @@ _OF_A_BEST: Final = ("scenarios", "preferences", "firmware")
 _RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
 """Those that only a job has whose spec can be read."""
 
+_COMMANDS: Final = {
+    state: [(c.value, after) for (before, c), after in TRANSITIONS.items() if before is state]
+    for state in JobState
+}
+"""By state: what a user may ask for, and the state after."""
+
 
 def job_links(job: Job) -> dict[str, str]:
     """Say where a client goes on from a job.
@@ -32,9 +38,9 @@ def job_links(job: Job) -> dict[str, str]:
         names += ["ranking", *(_OF_A_BEST if job.progress.best_fitness is not None else ())]
     resources = {name: f"{here}/{name}" for name in names}
     commands = {
-        command.value: f"{here}/{command.value}"
-        for (state, command), after in TRANSITIONS.items()
-        if state is job.state and (job.readable or after is not JobState.QUEUED)
+        command: f"{here}/{command}"
+        for command, after in _COMMANDS[job.state]
+        if job.readable or after is not JobState.QUEUED
     }
     if job.readable and job.state is not JobState.CANCELLED:
         commands["extend"] = f"{here}/extend"

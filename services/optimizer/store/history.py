@@ -18,7 +18,7 @@ from services.optimizer.store.columns import select_columns, select_known
 from services.optimizer.store.engine import Database
 from services.optimizer.store.job_rows import chain_documents
 from services.optimizer.store.reading import Page, StoredLink
-from services.optimizer.store.records import job_row
+from services.optimizer.store.records import job_row, require_job, shown_row
 from services.optimizer.store.rows import LISTED, Row, to_evaluation, to_iteration, to_reevaluation
 from services.optimizer.store.tables import evaluations, iterations, reevaluations
 
@@ -50,7 +50,7 @@ class SqlHistory:
         if after is not None:
             query = query.where(iterations.c.iteration > _bounded(after))
         with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
+            require_job(connection, job_id)
             rows = connection.execute(query).mappings().all()
         found = tuple(to_iteration(row) for row in rows[:limit])
         return Page(found, str(found[-1].index) if len(rows) > limit else None)
@@ -74,14 +74,14 @@ class SqlHistory:
             .order_by(evaluations.c.iteration, evaluations.c.particle)
         )
         with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
+            require_job(connection, job_id)
             rows = connection.execute(query).mappings().all()
         return tuple(to_evaluation(row) for row in rows)
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
         """Read the designs of a range of committed iterations as columns."""
         with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
+            require_job(connection, job_id)
             return select_columns(connection, job_id, _bounded(first), _bounded(last))
 
     def asked(self, job_id: str, first: int, last: int) -> tuple[NDArray[np.float64], ...]:
@@ -97,7 +97,7 @@ class SqlHistory:
             .order_by(iterations.c.iteration)
         )
         with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
+            require_job(connection, job_id)
             rows = connection.execute(query).scalars().all()
         return tuple(np.array(positions, dtype=np.float64) for positions in rows)
 
@@ -120,7 +120,7 @@ class SqlHistory:
     ) -> tuple[tuple[int, Reevaluation], ...]:
         """Read the designs of a range of iterations that were evaluated anew."""
         with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
+            require_job(connection, job_id)
             return select_reevaluations(connection, job_id, _bounded(first), _bounded(last))
 
     def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
@@ -131,7 +131,7 @@ class SqlHistory:
     def best(self, job_id: str) -> Evaluation | None:
         """Read the design of least fitness."""
         with self._database.transaction(write=False) as connection:
-            job = job_row(connection, job_id)
+            job = shown_row(connection, job_id)
             if job["best_iteration"] is None:
                 return None
             row = connection.execute(_particle(evaluations, job)).mappings().one()

@@ -27,7 +27,7 @@ from sqlalchemy import (
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import Job, JobOrder, JobState
-from services.optimizer.store.job_rows import to_job
+from services.optimizer.store.job_views import SHOWN, shown_job
 from services.optimizer.store.reading import Page
 from services.optimizer.store.records import ID_ALPHABET, is_job_id
 from services.optimizer.store.rows import Row
@@ -183,7 +183,7 @@ def newest_jobs(connection: Connection, among: Among, after: str | None, limit: 
     Raises:
         InvalidRequest: `after` is no cursor of this order.
     """
-    newest = select(jobs).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
+    newest = select(*SHOWN).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
     query = newest.where(*among).limit(limit + 1)
     if after is not None:
         created_at, job_id = from_cursor(after)
@@ -191,9 +191,43 @@ def newest_jobs(connection: Connection, among: Among, after: str | None, limit: 
         place = tuple_(created_at, job_id, types=types)
         query = query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
     rows = connection.execute(query).mappings().all()
-    found = tuple(to_job(row) for row in rows[:limit])
+    found = tuple(shown_job(row) for row in rows[:limit])
     more = len(rows) > limit
     return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
+
+
+def fittest_jobs(connection: Connection, among: Among, after: str | None, limit: int) -> Page[Job]:
+    """Read the list by fitness, no more of it than the page.
+
+    Args:
+        connection: An open transaction.
+        among: Only jobs for which these hold.
+        after: `next` of the page before.
+        limit: Most jobs on the page.
+
+    Returns:
+        The page, the best fitness first, jobs without one last.
+
+    Raises:
+        InvalidRequest: `after` is no cursor of this order.
+    """
+    fitness, job_id = (None, "") if after is None else from_fitness_cursor(after)
+    columns = (jobs.c.best_fitness, jobs.c.id)
+    rows: list[Row] = []
+    # Apart, for an index has those without a fitness at its other end.
+    if after is None or fitness is not None:
+        query = select(*SHOWN).where(*among, columns[0].is_not(None))
+        if after is not None:
+            place = tuple_(fitness, job_id, types=tuple(column.type for column in columns))
+            query = query.where(tuple_(*columns) > place)
+        rows += connection.execute(query.order_by(*columns).limit(limit + 1)).mappings()
+    if len(rows) <= limit:
+        last = job_id if fitness is None else ""
+        query = select(*SHOWN).where(*among, columns[0].is_(None), columns[1] > last)
+        query = query.order_by(*columns).limit(limit + 1 - len(rows))
+        rows += connection.execute(query).mappings()
+    following = cursor_of(rows[limit - 1], JobOrder.FITNESS) if len(rows) > limit else None
+    return Page(tuple(shown_job(row) for row in rows[:limit]), following)
 
 
 class _Entry(NamedTuple):
@@ -281,9 +315,9 @@ def job_rows(connection: Connection, ids: Sequence[str]) -> list[Row]:
         ids: Of the jobs.
 
     Returns:
-        The rows in the order of the ids.
+        The columns `SHOWN`, in the order of the ids.
     """
-    query = select(jobs).where(jobs.c.id.in_(ids))
+    query = select(*SHOWN).where(jobs.c.id.in_(ids))
     rows = {row["id"]: row for row in connection.execute(query).mappings()}
     return [rows[job_id] for job_id in ids]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -26,21 +26,55 @@ _KEPT: Final = (
 )
 
 
-def to_job(row: Row) -> Job:
+@dataclass(frozen=True, slots=True)
+class JobDocuments:
+    """What the documents of a job's row say.
+
+    Attributes:
+        spec: That it was submitted with, with its own budget; or what can be said of one that
+            cannot be read.
+        provenance: What its numbers depend on.
+        lineage: Where it comes from, if it was forked.
+    """
+
+    spec: AnySpec | UnreadableSpec
+    provenance: ProvenanceRecords
+    lineage: Lineage | None
+
+    @property
+    def readable(self) -> bool:
+        """Whether this version can read them."""
+        return not isinstance(self.spec, UnreadableSpec)
+
+
+def read_documents(row: Row) -> JobDocuments:
+    """Read the documents of a job.
+
+    Args:
+        row: Of its columns, `spec`, `provenance` and `lineage`.
+
+    Returns:
+        What they say, whether they can be read or not.
+    """
+    try:
+        return JobDocuments(submitted_spec(row), provenance_records(row), _lineage(row))
+    except Unreadable as error:
+        # Whoever cannot tell what the numbers depend on must not add others to them.
+        return JobDocuments(_unreadable(row["spec"], str(error)), (), None)
+
+
+def to_job(row: Row, documents: JobDocuments | None = None) -> Job:
     """A job from its row, whether its spec can be read or not.
 
     Args:
         row: All columns of `jobs`.
+        documents: What its documents say, where they have been read; the row need not have them.
 
     Returns:
         The job, under its present budget.
     """
-    spec = submitted_spec(row)
-    try:
-        provenance, lineage = provenance_records(row), _lineage(row)
-    except Unreadable as error:
-        # Whoever cannot tell what the numbers depend on must not add others to them.
-        provenance, lineage, spec = (), None, _unreadable(row["spec"], str(error))
+    documents = documents or read_documents(row)
+    spec = documents.spec
     submitted_iterations = spec.iterations
     if row["budget"] is not None:
         if isinstance(spec, UnreadableSpec):
@@ -67,9 +101,9 @@ def to_job(row: Row) -> Job:
             recent_seconds=row["recent_seconds"],
             head=row["head"],
         ),
-        provenance=provenance,
+        provenance=documents.provenance,
         accepts_changes=bool(row["accepts_changes"]),
-        lineage=lineage,
+        lineage=documents.lineage,
         owner=row["owner"],
         kept=bool(row["kept"]),
         submitted_iterations=submitted_iterations,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from services.optimizer.jobs.notification import Notification
 from services.optimizer.store.engine import Clock, Database
 from services.optimizer.store.notifications import is_due, notifications_of, settle, take_due
-from services.optimizer.store.records import job_row
+from services.optimizer.store.records import require_job
 
 
 class SqlOutbox:
@@ -60,5 +60,5 @@ class SqlOutbox:
             NotFound: There is no such job.
         """
         with self._database.transaction(write=False) as connection:
-            job_row(connection, job_id)
+            require_job(connection, job_id)
             return notifications_of(connection, job_id)

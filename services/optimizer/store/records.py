@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, Final
 
-from sqlalchemy import Connection, insert, select, update
+from sqlalchemy import Connection, Select, insert, select, update
 
 from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
@@ -19,6 +19,7 @@ from services.optimizer.store.chain import chained_columns
 from services.optimizer.store.changes import announce
 from services.optimizer.store.columns import select_columns
 from services.optimizer.store.job_rows import provenance_document, provenance_records, to_job
+from services.optimizer.store.job_views import SHOWN
 from services.optimizer.store.notifications import note_end
 from services.optimizer.store.rows import (
     Row,
@@ -68,9 +69,42 @@ def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
     Raises:
         NotFound: There is no such job.
     """
+    query = select(jobs)
+    return _row_of(connection, job_id, query.with_for_update() if lock else query)
+
+
+def shown_row(connection: Connection, job_id: str) -> Row:
+    """Read a job's row to show it.
+
+    Args:
+        connection: An open transaction.
+        job_id: Of the job.
+
+    Returns:
+        The columns `SHOWN`.
+
+    Raises:
+        NotFound: There is no such job.
+    """
+    return _row_of(connection, job_id, select(*SHOWN))
+
+
+def require_job(connection: Connection, job_id: str) -> None:
+    """Check that there is a job.
+
+    Args:
+        connection: An open transaction.
+        job_id: Of the job.
+
+    Raises:
+        NotFound: There is no such job.
+    """
+    _row_of(connection, job_id, select(jobs.c.id))
+
+
+def _row_of(connection: Connection, job_id: str, query: Select[Any]) -> Row:
     if is_job_id(job_id):
-        query = select(jobs).where(jobs.c.id == job_id, EXISTING)
-        row = connection.execute(query.with_for_update() if lock else query).mappings().first()
+        row = connection.execute(query.where(jobs.c.id == job_id, EXISTING)).mappings().first()
         if row is not None:
             return row
     raise NotFound(f"there is no job {job_id!r}")

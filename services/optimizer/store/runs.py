@@ -33,10 +33,10 @@ from services.optimizer.store.records import (
     complete_iteration,
     entering,
     insert_ask,
-    job_row,
     outstanding_ask,
     progress_after,
     provenance_columns,
+    require_job,
     state_after_commit,
     state_after_release,
     update_job,
@@ -68,7 +68,7 @@ class SqlRuns:
         """Take a job that waits for a runner, for as long as the lease lasts."""
         with self._database.transaction(write=True) as connection:
             if job_id is not None:
-                job_row(connection, job_id)
+                require_job(connection, job_id)
             query = claimable(self._clock(connection), job_id)
             while (row := connection.execute(query).mappings().first()) is not None:
                 # Once more: a certain job may have been waited for.

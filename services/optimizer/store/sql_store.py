@@ -44,11 +44,13 @@ from services.optimizer.store.in_use import admit
 from services.optimizer.store.job_list import (
     among_jobs,
     cursor_of,
+    fittest_jobs,
     job_rows,
     newest_jobs,
     sort_jobs,
 )
 from services.optimizer.store.job_rows import request_digest, to_job
+from services.optimizer.store.job_views import shown_job
 from services.optimizer.store.migrate import create
 from services.optimizer.store.outbox import SqlOutbox
 from services.optimizer.store.queue import count_jobs
@@ -62,6 +64,7 @@ from services.optimizer.store.records import (
     entering,
     job_row,
     require_readable,
+    shown_row,
     update_job,
 )
 from services.optimizer.store.revisions import check_revision
@@ -71,6 +74,9 @@ from services.optimizer.store.tokens import SqlTokens
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _LONGEST_KEY: Final = 200
+
+_LISTED: Final = {JobOrder.CREATED: newest_jobs, JobOrder.FITNESS: fittest_jobs}
+"""What reads a page of the job list by itself, where nothing is searched for."""
 
 
 def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
@@ -180,7 +186,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
     def job(self, job_id: str) -> Job:
         """Read a job with its progress."""
         with self._database.transaction(write=False) as connection:
-            return to_job(job_row(connection, job_id))
+            return shown_job(shown_row(connection, job_id))
 
     def jobs(
         self,
@@ -196,9 +202,10 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
         """Read a page of jobs."""
         limit = checked_limit(limit)
         among = among_jobs(state, parent)
-        if not search and kind is None and order is JobOrder.CREATED:
+        listed = _LISTED.get(order)
+        if not search and kind is None and listed is not None:
             with self._database.transaction(write=False) as connection:
-                return newest_jobs(connection, among, after, limit)
+                return listed(connection, among, after, limit)
         with self._database.transaction(write=False) as connection:
             found = sort_jobs(
                 connection, among=among, kind=kind, search=search, order=order, after=after
@@ -206,7 +213,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
             ids, more = found[:limit], len(found) > limit
             rows = job_rows(connection, ids)
         following = cursor_of(rows[-1], order) if more else None
-        return Page(tuple(map(to_job, rows)), following)
+        return Page(tuple(map(shown_job, rows)), following)
 
     def queue(self) -> Queue:
         """Count the jobs."""

@@ -28,6 +28,7 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    text,
 )
 from sqlalchemy.sql.operators import OperatorType
 from sqlalchemy.types import TypeDecorator, TypeEngine
@@ -135,6 +136,8 @@ metadata: Final = MetaData(
     }
 )
 
+_DELETED: Final = text("deleted_at IS NOT NULL")
+
 jobs: Final = Table(
     "jobs",
     metadata,
@@ -194,7 +197,9 @@ jobs: Final = Table(
     Index(None, "created_at", "id"),
     Index(None, "state", "created_at", "id"),
     Index(None, "parent_id"),
-    Index(None, "deleted_at"),
+    # Of deleted jobs alone: SQLite would take it to find all others, and then sort these.
+    Index(None, "deleted_at", sqlite_where=_DELETED, postgresql_where=_DELETED),
+    Index(None, "best_fitness", "id"),
 )
 
 EXISTING: Final = jobs.c.deleted_at.is_(None)

@@ -1,0 +1,111 @@
+"""What reading jobs costs: no more rows than are shown, and their documents once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from sqlalchemy import Engine, event, text
+
+from services.optimizer.jobs.job import JobOrder, JobState
+from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.job_rows import JobDocuments
+from services.optimizer.store.job_views import DocumentMemory
+from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.store.examples import completed, spec
+from tests.store.test_job_list import with_fitness
+
+_RENAMED = {
+    "sqlite": "UPDATE jobs SET spec = replace(spec, 'first', 'other')",
+    "postgresql": "UPDATE jobs SET spec = CAST(replace(CAST(spec AS text), 'first', 'other') AS json)",  # noqa: E501
+}
+
+
+@contextmanager
+def statements() -> Iterator[list[tuple[str, Any]]]:
+    """What is sent to databases inside the block, with its parameters."""
+    sent: list[tuple[str, Any]] = []
+
+    def note(_: Any, __: Any, statement: str, parameters: Any, *___: Any) -> None:
+        sent.append((statement, parameters))
+
+    event.listen(Engine, "before_cursor_execute", note)
+    try:
+        yield sent
+    finally:
+        event.remove(Engine, "before_cursor_execute", note)
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        {},
+        {"state": JobState.QUEUED},
+        {"order": JobOrder.FITNESS},
+    ],
+    ids=["newest", "of a state", "by fitness"],
+)
+def test_sqlite_reads_a_page_of_the_list_from_an_index_and_sorts_nothing(
+    migrated_sqlite: Any, question: dict[str, Any]
+) -> None:
+    url = f"sqlite:///{migrated_sqlite}"
+    store = open_store(url)
+    cursors = [None, "1767268800000000." + "b" * 12]
+    if "order" in question:
+        cursors = [None, "fitness:1.5:" + "b" * 12, "fitness::" + "b" * 12]
+    with statements() as sent:
+        for after in cursors:
+            store.jobs(after=after, limit=5, **question)
+    store.close()
+    selected = [(s, p) for s, p in sent if s.startswith("SELECT")]
+    assert len(selected) >= len(cursors)
+    database = connect(parse_url(url))
+    with database.transaction(write=False) as connection:
+        for statement, parameters in selected:
+            plan = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters).all()
+            steps = [str(row[-1]) for row in plan]
+            assert steps and all("USING INDEX ix_jobs" in step for step in steps), steps
+    database.close()
+
+
+def test_a_spec_is_read_once_and_anew_when_its_text_is_another(
+    store: SqlStore, database_url: str
+) -> None:
+    made, _ = store.create_job(spec(name="first"))
+    first = store.job(made.id)
+    assert store.job(made.id).spec is first.spec
+    assert store.jobs().items[0].spec is first.spec
+    database = connect(parse_url(database_url))
+    with database.transaction(write=True) as connection:
+        connection.execute(text(_RENAMED[connection.dialect.name]))
+    database.close()
+    assert store.job(made.id).spec == spec(name="other").resolved()
+    assert first.spec.name == "first"
+
+
+def test_what_is_remembered_of_a_job_has_its_state_budget_and_progress_anew(
+    store: SqlStore,
+) -> None:
+    job, _ = store.create_job(spec())
+    before = store.job(job.id)
+    store.extend(job.id, 40)
+    with_fitness(store, job, 2.0)
+    after = store.job(job.id)
+    assert (before.spec.iterations, after.spec.iterations) == (spec().iterations, 40)
+    assert (before.state, after.state) == (JobState.QUEUED, JobState.RUNNING)
+    assert (before.progress.iterations, after.progress.iterations) == (0, 1)
+    assert after.progress.evaluations == len(completed(0, (2.0, 3.0)).fitness)
+
+
+def test_documents_that_were_asked_for_longest_ago_are_forgotten_first() -> None:
+    documents = JobDocuments(spec().resolved(), (), None)
+    memory = DocumentMemory(250)
+    for name in "abcd":
+        memory.add((name * 100, None, None), documents)
+        assert memory.find(("a" * 100, None, None)) is documents
+    known = [name for name in "abcd" if memory.find((name * 100, None, None))]
+    assert known == ["a", "d"]
+    memory.add(("e" * 1000, None, None), documents)
+    assert memory.find(("e" * 1000, None, None)) is None

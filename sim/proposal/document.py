@@ -29,6 +29,11 @@ _LARGEST_CODE: Final = 26000.0
 
 _CONTROLLER: Final = "pid"
 
+_TWO_LEGS: Final = (
+    "two legs on point feet do not stand by themselves, and controllers here hold joints, not"
+    " balance: expect it to fall"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
@@ -86,7 +91,8 @@ def propose_robot(urdf: str, name: str) -> Proposal:
         "controller": _CONTROLLER,
         "scenarios": propose_scenarios(stance, sole.length),
     }
-    notes = [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
+    notes = [_TWO_LEGS] if len(legs) == 2 else []
+    notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
     return Proposal(toml + "\n", text, job, tuple(dict.fromkeys(notes)))

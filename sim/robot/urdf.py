@@ -187,6 +187,11 @@ def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
         if name in links:
             raise RobotFileError(f"robot.urdf: there are two links {name!r}")
         links[name] = Link(name, _inertia(element, f"link {name!r}"), element)
+    if not links:
+        raise RobotFileError(
+            "robot.urdf: there is no <link> in it; of a xacro file, make a URDF first"
+            " (`xacro FILE.xacro > FILE.urdf`)"
+        )
     in_order = {name: links[name] for name in _from_the_body(links, joints)}
     bodies, places = _rigid_bodies(in_order, joints)
     return Urdf(text, in_order, joints, bodies, places)

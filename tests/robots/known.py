@@ -1,0 +1,45 @@
+"""URDFs of other people's robots: those of the PyPI package example-robot-data, unedited."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+FOLDER: Final = Path(sys.prefix) / "robots"
+"""Where scripts/robots.sh puts the package's URDFs."""
+
+# Read here: the tests themselves see none of the user's settings.
+REQUIRED: Final = bool(os.environ.get("GAITSWARM_REQUIRE_ROBOTS"))
+
+QUADRUPEDS: Final = {
+    "a1": "a1_description/urdf/a1.urdf",
+    "go1": "go1_description/urdf/go1.urdf",
+    "go2": "go2_description/urdf/go2.urdf",
+    "b1": "b1_description/urdf/b1.urdf",
+    "b1-z1": "b1_description/urdf/b1-z1.urdf",
+    "laikago": "laikago_description/urdf/laikago.urdf",
+    "anymal_b": "anymal_b_simple_description/robots/anymal.urdf",
+    "anymal_b-kinova": "anymal_b_simple_description/robots/anymal-kinova.urdf",
+    "anymal_c": "anymal_c_simple_description/urdf/anymal.urdf",
+    "solo12": "solo_description/robots/solo12.urdf",
+    "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
+}
+"""Those of the package whose legs have three joints, by name."""
+
+BIPED: Final = "bolt_description/robots/bolt.urdf"
+"""The only other one with such legs."""
+
+
+def urdf_of(file: str) -> Path:
+    """A file of the package; the test is skipped, or fails if it must run, where it is missing."""
+    path = FOLDER / file
+    if not path.is_file():
+        said = "the URDFs of example-robot-data are missing: run scripts/robots.sh"
+        if REQUIRED:
+            pytest.fail(f"the tests of known robots must run here, but {said}")
+        pytest.skip(f"KNOWN ROBOTS ARE NOT TESTED: {said}")
+    return path

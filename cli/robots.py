@@ -51,12 +51,18 @@ def robot_data(text: str | None) -> str | dict[str, Any]:
     if not folder.is_dir():
         return text
     try:
-        return {
-            kind: (folder / f"robot.{kind}").read_text(encoding="utf-8")
-            for kind in ("toml", "urdf")
-        }
-    except (OSError, UnicodeDecodeError) as error:
+        return {kind: _text(folder / f"robot.{kind}") for kind in ("toml", "urdf")}
+    except OSError as error:
         raise InvalidRequest(f"{folder} is not a robot's folder: {error}", field="robot") from error
+
+
+def _text(path: Path) -> str:
+    from gaitswarm.robots import not_utf8
+
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InvalidRequest(not_utf8(path, error), field="robot") from error
 
 
 def folder_defaults(text: str) -> dict[str, Any]:

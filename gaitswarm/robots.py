@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import tempfile
 from dataclasses import dataclass
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 JOB_FILE: Final = "job.json"
 """In a robot's folder: what a job of this robot has unless it says otherwise."""
+
+_NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
 _SECONDS: Final = 1.0
 _STIFF: Final = {"P": 1.0}
@@ -75,9 +78,12 @@ def init_robot(
     try:
         with source.open(encoding="utf-8") as file:
             text = file.read(LONGEST_URDF + 1)
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise InvalidRequest(not_utf8(source, error), field="urdf") from error
+    except OSError as error:
         raise InvalidRequest(f"cannot read {source}: {error}", field="urdf") from error
-    chosen = name or source.stem
+    chosen = source.stem if name is None else name
+    _check_name(chosen)
     try:
         proposal = propose_robot(text, chosen)
         robot = parse_robot(proposal.toml, proposal.urdf)
@@ -89,6 +95,23 @@ def init_robot(
     with simulation_errors("urdf"):
         _write(folder, proposal)
     return MadeRobot(chosen, proposal.guesses)
+
+
+def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
+    """What to say of a file that cannot be decoded.
+
+    Args:
+        path: Of the file.
+        error: What Python says.
+
+    Returns:
+        A sentence with the way out.
+    """
+    byte = error.object[error.start]
+    return (
+        f"cannot read {path}: it is not UTF-8 text (byte 0x{byte:02x} at {error.start}); save it as"
+        " UTF-8"
+    )
 
 
 def check_robot(files: RobotFiles) -> RobotCheckView:
@@ -228,6 +251,16 @@ def job_defaults(folder: str | os.PathLike[str]) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise InvalidRequest(f"{path} must hold one JSON object", field="robot")
     return document
+
+
+def _check_name(name: str) -> None:
+    """Firmware, exports and folders are named by it."""
+    if not _NAME.fullmatch(name) or not name.isprintable():
+        raise InvalidRequest(
+            f"{name[:100]!r} cannot name a robot; 1 to 100 printable characters can that begin with"
+            " a letter or digit and have no / and no \\",
+            field="name",
+        )
 
 
 def _check_free(folder: Path) -> None:

@@ -15,6 +15,7 @@ from sim.proposal.gait import alternating_phases, propose_scenarios
 from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
 from sim.proposal.stance import Stance, choose_stance
 from sim.robot.urdf import parse_urdf
+from sim.robot.urdf_errors import by_line
 
 VOLTAGE: Final = 24.0
 """Of a battery that is unknown [V]."""
@@ -65,7 +66,8 @@ def propose_robot(urdf: str, name: str) -> Proposal:
     Raises:
         RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
     """
-    found = find_legs(parse_urdf(urdf))
+    with by_line(urdf):
+        found = find_legs(parse_urdf(urdf))
     text, feet = _with_feet(urdf, found.legs)
     tree = parse_urdf(text, found.held)
     joints = [leg.joints for leg in found.legs]
@@ -89,7 +91,7 @@ def propose_robot(urdf: str, name: str) -> Proposal:
     )
     job = {
         "controller": _CONTROLLER,
-        "scenarios": propose_scenarios(stance, sole.length),
+        "scenarios": propose_scenarios(stance, sole.length, len(legs)),
     }
     notes = [_TWO_LEGS] if len(legs) == 2 else []
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]

@@ -11,7 +11,13 @@ from sim.proposal.stance import Stance
 from sim.robot.legs import ChainLeg
 
 _WALKS: Final = {"slow": (0.9, 0.25), "fast": (0.6, 0.35)}
-"""Cycle time in units of a pendulum's of the hips' height, stride in units of the height."""
+"""Cycle time in units of a pendulum's of the hips' height, stride in units of the height; of robots
+that half their legs hold upright, which are three and more."""
+
+_TIPPING_WALKS: Final = {"slow": (0.4, 0.2), "fast": (0.4, 0.35)}
+"""The same of robots with fewer legs. While half of these swing, the body tips about the line
+between the others, by a factor e in sqrt(height/gravity), 0.16 of the pendulum's time: a swing of
+0.4 of the cycle ends by then."""
 
 _LIFT: Final = 0.2
 """Height of the swing in units of the hips' height."""
@@ -37,17 +43,19 @@ def alternating_phases(legs: Sequence[ChainLeg]) -> list[float]:
     return phases
 
 
-def propose_scenarios(stance: Stance, sole: float) -> list[dict[str, Any]]:
+def propose_scenarios(stance: Stance, sole: float, legs: int) -> list[dict[str, Any]]:
     """A slow and a fast walk on level ground.
 
     Args:
         stance: Of the robot.
         sole: Length of the soles [m].
+        legs: How many it has.
 
     Returns:
         Scenarios, as a job has them.
     """
     height = stance.height + sole
+    walks = _WALKS if legs // 2 >= 3 else _TIPPING_WALKS
     pendulum = 2.0 * math.pi * math.sqrt(height / GRAVITY)
     return [
         {
@@ -59,5 +67,5 @@ def propose_scenarios(stance: Stance, sole: float) -> list[dict[str, Any]]:
             "height": round(_LIFT * height, 4),
             "duty_factor": _DUTY,
         }
-        for name, (cycle, stride) in _WALKS.items()
+        for name, (cycle, stride) in walks.items()
     ]

@@ -134,7 +134,10 @@ def check_urdf(text: str) -> None:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise RobotFileError(f"robot.urdf: {error}") from error
+        raise RobotFileError(
+            f"robot.urdf, line {error.lineno}: not well-formed XML:"
+            f" {expat.ErrorString(error.code)} (column {error.offset})"
+        ) from error
 
 
 class _UrdfScan:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,12 +12,17 @@ from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
 from sim.robot.description import Leg
+from sim.robot.elements import MOST_TURNED
 from sim.robot.inertia import BodyInertia
-from sim.robot.urdf import Urdf
+from sim.robot.joints import Joint
+from sim.robot.urdf import Place, Urdf
 
 Floats = NDArray[np.float64]
 
 _NAMED: Final = 6
+
+_MOST_DEGREES: Final = 720.0
+"""A limit beyond that is one that nobody expects to be met."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,15 +68,18 @@ def chain_of(urdf: Urdf, leg: Leg) -> Chain:
         The leg's joints.
 
     Raises:
-        RobotFileError: A joint or the foot is not there, a joint is not revolute, or they are not a
-            chain from the body to the foot.
+        RobotFileError: A joint or the foot is not there, a joint is not revolute or has its limits
+            in degrees, or they are not a chain from the body to the foot.
     """
     named = {joint.name: joint for joint in urdf.joints}
     before, placements, limits = next(iter(urdf.links)), [], []
     for name in leg.joints:
         joint = named.get(name)
         if joint is None:
-            raise RobotFileError(f"robot.urdf: leg {leg.name!r} has no joint {name!r}")
+            raise RobotFileError(
+                f"robot.toml: leg {leg.name!r}: robot.urdf has no joint {name!r}"
+                f"{_meant(name, named)}; name the leg's three joints under `joints`"
+            )
         if joint.kind != "revolute":
             raise RobotFileError(
                 f"robot.urdf: joint {name!r} of leg {leg.name!r} is not revolute but"
@@ -89,30 +99,73 @@ def chain_of(urdf: Urdf, leg: Leg) -> Chain:
                 urdf.bodies[joint.child],
             )
         )
+        _check_limits(joint)
         limits.append(joint.limits)
         before = joint.child
-    foot = urdf.place(leg.foot)
+    foot = _foot(urdf, leg)
     if foot.body != before:
         raise RobotFileError(
-            f"robot.urdf: foot {leg.foot!r} is not on the last link of leg {leg.name!r}"
+            f"robot.toml: leg {leg.name!r}: its `foot` {leg.foot!r} is not on its last link"
+            f" {before!r}; name a link or a fixed joint there"
         )
     return Chain(tuple(placements), foot.position, np.array(limits))
 
 
+def _foot(urdf: Urdf, leg: Leg) -> Place:
+    try:
+        return urdf.place(leg.foot)
+    except RobotFileError as error:
+        meant = _meant(leg.foot, urdf.links)
+        raise RobotFileError(
+            f"robot.toml: leg {leg.name!r}: robot.urdf has no link or fixed joint"
+            f" {leg.foot!r}{meant}; name the leg's end under `foot`"
+        ) from error
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    nearest = difflib.get_close_matches(name, list(known), n=1)
+    return f" (did you mean {nearest[0]!r}?)" if nearest else ""
+
+
+def _check_limits(joint: Joint) -> None:
+    """Larger ones than any angle in degrees stand for none."""
+    if any(MOST_TURNED < abs(limit) <= _MOST_DEGREES for limit in joint.limits):
+        lower, upper = joint.limits
+        raise RobotFileError(
+            f"robot.urdf: joint {joint.name!r}: its limits of {lower:g} and {upper:g} are degrees,"
+            " it seems; a URDF has radians: 45 degrees are 0.7854. A joint without ends is of"
+            ' type="continuous"'
+        )
+
+
+def check_owners(legs: tuple[Leg, ...]) -> None:
+    """Check that no joint belongs to two legs.
+
+    Args:
+        legs: The robot's.
+
+    Raises:
+        RobotFileError: One does.
+    """
+    owned = [name for leg in legs for name in leg.joints]
+    twice = sorted({name for name in owned if owned.count(name) > 1})
+    if twice:
+        raise RobotFileError(
+            f"robot.toml: joint {twice[0]!r} belongs to more than one leg; name it in one"
+        )
+
+
 def check_joints(urdf: Urdf, legs: tuple[Leg, ...]) -> None:
-    """Check that every movable joint belongs to one leg.
+    """Check that every movable joint belongs to a leg.
 
     Args:
         urdf: Of the robot, its held joints fixed.
         legs: The robot's.
 
     Raises:
-        RobotFileError: A joint belongs to none or to two; says what to do with it.
+        RobotFileError: A joint belongs to none; says what to do with it.
     """
-    owned = [name for leg in legs for name in leg.joints]
-    twice = sorted({name for name in owned if owned.count(name) > 1})
-    if twice:
-        raise RobotFileError(f"robot.toml: joint {twice[0]!r} belongs to more than one leg")
+    owned = {name for leg in legs for name in leg.joints}
     others = [joint.name for joint in urdf.joints if not joint.fixed and joint.name not in owned]
     if others:
         more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""

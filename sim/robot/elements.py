@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
+
+MOST_TURNED: Final = 4.0 * math.pi
+"""An angle beyond two turns is one in degrees, but for those that stand for none [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,12 +60,17 @@ def origin_of(element: ET.Element, whose: str) -> Origin:
         The frame.
 
     Raises:
-        RobotFileError: A number cannot be read.
+        RobotFileError: A number cannot be read, or angles are more than two turns.
     """
     origin = element.find("origin")
     if origin is None:
         return Origin(np.zeros(3), np.zeros(3))
     xyz, rpy = (numbers_of(origin, name, whose, "0 0 0") for name in ("xyz", "rpy"))
+    if (np.abs(rpy) > MOST_TURNED).any():
+        raise RobotFileError(
+            f"robot.urdf: {whose}: rpy={shortened(origin.get('rpy', ''))!r} of <origin> are"
+            " degrees, it seems; a URDF has radians: 90 degrees are 1.5708"
+        )
     return Origin(xyz, rpy)
 
 

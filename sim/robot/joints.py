@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
-from sim.robot.bounds import LARGEST
+from sim.robot.bounds import LARGEST, shortened
 from sim.robot.elements import Origin, numbers_of, origin_of
 
 Floats = NDArray[np.float64]
+
+_KINDS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +62,8 @@ def joint_of(element: ET.Element) -> Joint:
         The joint.
 
     Raises:
-        RobotFileError: A number cannot be read, the axis has no direction, or its limits are the
-            wrong way round.
+        RobotFileError: A number cannot be read, the type is unknown, the axis has no direction, or
+            its limits are the wrong way round.
     """
     name = element.get("name", "")
     ends = [element.find(end) for end in ("parent", "child")]
@@ -71,7 +74,12 @@ def joint_of(element: ET.Element) -> Joint:
     length = float(np.linalg.norm(axis))
     kind = element.get("type", "")
     if length == 0.0 and kind != "fixed":
-        raise RobotFileError(f"robot.urdf: {whose}: its axis has no direction")
+        raise RobotFileError(f"robot.urdf: {whose}: its axis needs a direction, as 0 1 0")
+    if kind and kind not in _KINDS:
+        raise RobotFileError(
+            f"robot.urdf: {whose}: type={shortened(kind)!r} of <joint> is none of"
+            f" {', '.join(_KINDS)}"
+        )
     origin = origin_of(element, whose)
     limit = element.find("limit")
     effort, velocity = (
@@ -103,7 +111,7 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
 
     Raises:
         RobotFileError: A held joint is not there, or does not turn and is held at another position
-            than 0.
+            than 0; or a joint that is not held lacks the limit that URDF asks for.
     """
     changed = False
     missing = set(held)
@@ -120,10 +128,14 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
             ends = {"lower": f"{-LARGEST:g}", "upper": f"{LARGEST:g}"}
             ET.SubElement(element, "limit", ends | {"effort": "0", "velocity": "0"})
         else:
+            if kind in ("revolute", "prismatic"):
+                _check_limit(element.find("limit"), name)
             continue
         changed = True
     if missing:
-        raise RobotFileError(f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}")
+        raise RobotFileError(
+            f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}; take it out"
+        )
     return changed
 
 
@@ -151,6 +163,18 @@ def _hold(element: ET.Element, kind: str, angle: float) -> None:
             element.remove(child)
 
 
+def _check_limit(limit: ET.Element | None, joint: str) -> None:
+    """Pinocchio's reader asks for it, and does not name the joint."""
+    given = {} if limit is None else limit.attrib
+    missing = [name for name in ("effort", "velocity") if name not in given]
+    if missing:
+        raise RobotFileError(
+            f"robot.urdf: joint {joint!r} has no <limit> with {' and '.join(missing)}, which URDF"
+            ' asks for: <limit lower="-1" upper="1" effort="10" velocity="10"/> [rad, N m, rad/s];'
+            ' a joint without ends is of type="continuous"'
+        )
+
+
 def _limits(limit: ET.Element | None, kind: str, whose: str) -> tuple[float, float]:
     if kind == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
         return -math.inf, math.inf
@@ -159,6 +183,7 @@ def _limits(limit: ET.Element | None, kind: str, whose: str) -> tuple[float, flo
     )
     if lower > upper:
         raise RobotFileError(
-            f"robot.urdf: {whose}: its lower limit {lower:g} lies above the upper one {upper:g}"
+            f"robot.urdf: {whose}: its lower limit {lower:g} lies above the upper one {upper:g};"
+            " exchange them"
         )
     return lower, upper

@@ -6,6 +6,7 @@ import math
 import tomllib
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,18 @@ from pydantic import ValidationError
 
 from sim.errors import RobotFileError
 from sim.robot.bounds import check_toml
-from sim.robot.chain import chain_of, check_joints
+from sim.robot.chain import chain_of, check_joints, check_owners
 from sim.robot.description import JOINTS_PER_LEG, Contact, Leg, RobotDescription
+from sim.robot.elements import MOST_TURNED
 from sim.robot.inertia import BodyInertia
 from sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
-from sim.robot.toml_errors import first_problem
+from sim.robot.toml_errors import by_leg, first_problem
 from sim.robot.urdf import Urdf, parse_urdf
+from sim.robot.urdf_errors import by_line
 
 Floats = NDArray[np.float64]
+
+_DEGREES: Final = "; it is in degrees, it seems: 45 degrees are 0.7854 rad"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,7 +206,8 @@ def parse_robot(toml: str, urdf: str) -> Robot:
         description = RobotDescription.model_validate(document)
     except ValidationError as error:
         raise RobotFileError(first_problem(error, toml, document)) from error
-    return assembled(description, urdf)
+    with by_leg(toml, [leg.name for leg in description.legs]):
+        return assembled(description, urdf)
 
 
 def assembled(description: RobotDescription, urdf: str) -> Robot:
@@ -217,9 +223,11 @@ def assembled(description: RobotDescription, urdf: str) -> Robot:
     Raises:
         RobotFileError: The URDF cannot be used, or has not the description's legs.
     """
+    check_owners(description.legs)
     tree = parse_urdf(urdf, description.held_joints)
-    legs = tuple(_kinematics(leg, tree) for leg in description.legs)
-    check_joints(tree, description.legs)
+    with by_line(urdf):
+        legs = tuple(_kinematics(leg, tree) for leg in description.legs)
+        check_joints(tree, description.legs)
     return Robot(description, tree, legs)
 
 
@@ -262,6 +270,7 @@ def _check_stance(leg: Leg, stance: Floats, limits: Floats) -> None:
     for name, angle, (lower, upper) in zip(leg.joints, stance, limits, strict=True):
         if not lower <= angle <= upper:
             raise RobotFileError(
-                f"robot.toml: leg {leg.name!r}: its stance has joint {name!r} at {angle:g} rad, but"
-                f" robot.urdf limits it to {lower:g} to {upper:g} rad"
+                f"robot.toml: leg {leg.name!r}: its `stance` has joint {name!r} at {angle:g} rad,"
+                f" but robot.urdf limits it to {lower:g} to {upper:g} rad"
+                + (_DEGREES if abs(angle) > MOST_TURNED else "")
             )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
+from sim.errors import RobotFileError
 from sim.former_names import as_written
 from sim.robot.bounds import shortened
 from sim.robot.description import (
@@ -26,6 +28,9 @@ from sim.wording import message_of, with_known_keys
 _TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
 _KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")
 """Of a line without blanks around it. Possessive: no line takes longer than its length asks for."""
+
+_FIELD: Final = re.compile(r"`(\w+)`")
+"""Of a leg, as messages name it."""
 
 _PARTS: Final[tuple[type[BaseModel], ...]] = (
     RobotDescription,
@@ -64,6 +69,37 @@ def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]
         + f": {message}"
         + (f" ({meaning})" if meaning else "")
     )
+
+
+@contextmanager
+def by_leg(text: str, legs: Sequence[str]) -> Iterator[None]:
+    """Add the line to errors that name a leg or the held joints of a robot.toml.
+
+    Args:
+        text: Of the file.
+        legs: Their names, in its order.
+
+    Yields:
+        Nothing.
+
+    Raises:
+        RobotFileError: The same, with the line.
+    """
+    try:
+        yield
+    except RobotFileError as error:
+        said = str(error)
+        named = [k for k, leg in enumerate(legs) if said.startswith(f"robot.toml: leg {leg!r}: ")]
+        line = None
+        if named:
+            line = line_of(text, ["legs", named[0], *_FIELD.findall(said)[-1:]])
+        elif said.startswith("robot.toml: held_joints"):
+            line = line_of(text, ["held_joints"])
+        if line is None:
+            raise
+        raise RobotFileError(said.replace("robot.toml: ", f"robot.toml, line {line}: ", 1)) from (
+            error.__cause__ or error
+        )
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Literal, cast
+from typing import Final, Literal, cast
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
-from sim.robot.bounds import check_urdf
+from sim.robot.bounds import check_urdf, shortened
 from sim.robot.elements import Origin, numbers_of, origin_of
 from sim.robot.inertia import NO_INERTIA, BodyInertia
 from sim.robot.joints import Joint, joint_of, standardise
-
-if TYPE_CHECKING:
-    pass
+from sim.robot.urdf_errors import by_line
 
 Floats = NDArray[np.float64]
 
@@ -174,27 +172,40 @@ def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
             read, its links are not one tree, or a held joint is not there or does not turn.
     """
     check_urdf(text)
-    try:
-        root = ET.fromstring(text)  # noqa: S314 - it has no entities of its own
-    except ET.ParseError as error:
-        raise RobotFileError(f"robot.urdf: {error}") from error
+    with by_line(text):
+        return _parsed(text, held)
+
+
+def _parsed(text: str, held: Mapping[str, float]) -> Urdf:
+    """The text has kept all bounds, and so is XML."""
+    root = ET.fromstring(text)  # noqa: S314 - it has no entities of its own
+    if root.tag != "robot":
+        raise RobotFileError(
+            f"robot.urdf: its root is <{shortened(root.tag)}>, but a URDF's is <robot>;"
+            " convert SDF, MJCF or another format to URDF first"
+        )
     if standardise(root, held):
         text = ET.tostring(root, encoding="unicode")
-    joints = tuple(joint_of(element) for element in root.findall("joint"))
+    joints: dict[str, Joint] = {}
+    for element in root.findall("joint"):
+        joint = joint_of(element)
+        if joint.name in joints:
+            raise RobotFileError(f"robot.urdf: joint {joint.name!r} is there twice; rename one")
+        joints[joint.name] = joint
     links: dict[str, Link] = {}
     for element in root.findall("link"):
         name = element.get("name", "")
         if name in links:
-            raise RobotFileError(f"robot.urdf: there are two links {name!r}")
+            raise RobotFileError(f"robot.urdf: link {name!r} is there twice; rename one")
         links[name] = Link(name, _inertia(element, f"link {name!r}"), element)
     if not links:
         raise RobotFileError(
             "robot.urdf: there is no <link> in it; of a xacro file, make a URDF first"
             " (`xacro FILE.xacro > FILE.urdf`)"
         )
-    in_order = {name: links[name] for name in _from_the_body(links, joints)}
-    bodies, places = _rigid_bodies(in_order, joints)
-    return Urdf(text, in_order, joints, bodies, places)
+    in_order = {name: links[name] for name in _from_the_body(links, list(joints.values()))}
+    bodies, places = _rigid_bodies(in_order, list(joints.values()))
+    return Urdf(text, in_order, tuple(joints.values()), bodies, places)
 
 
 def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterator[str]:
@@ -205,10 +216,14 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
         for end in (joint.parent, joint.child):
             if end not in links:
                 raise RobotFileError(
-                    f"robot.urdf: joint {joint.name!r} joins a link {end!r} that is not there"
+                    f"robot.urdf: joint {joint.name!r} joins a link {end!r} that is not there;"
+                    " add the link, or name another one as <parent> and <child>"
                 )
         if joint.child in carried:
-            raise RobotFileError(f"robot.urdf: two joints carry the link {joint.child!r}")
+            raise RobotFileError(
+                f"robot.urdf: joint {joint.name!r} carries the link {joint.child!r}, which another"
+                " joint carries already; a URDF is a tree, so cut a closed loop open at one joint"
+            )
         carried.add(joint.child)
         children[joint.parent].append(joint.child)
     generation = [name for name in links if name not in carried]
@@ -217,6 +232,7 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
             "robot.urdf: one link, the body, must hang on no joint; these do:"
             f" {', '.join(map(repr, generation[:5])) or 'none'}"
             + (f" and {len(generation) - 5} more" if len(generation) > 5 else "")
+            + "; a URDF is one tree: join the others to it, cut a closed loop open"
         )
     place = {name: k for k, name in enumerate(links)}
     left = set(links)
@@ -227,7 +243,10 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
             (c for name in generation for c in children[name]), key=place.__getitem__
         )
     if left:
-        raise RobotFileError(f"robot.urdf: link {min(left)!r} hangs on no body")
+        raise RobotFileError(
+            f"robot.urdf: link {min(left)!r} hangs on no body: its joints are a closed loop; a URDF"
+            " is a tree, so cut it open at one joint"
+        )
 
 
 def _rigid_bodies(
@@ -271,5 +290,5 @@ def _inertia(link: ET.Element, whose: str) -> BodyInertia:
     rotational = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
     kilograms = float(numbers_of(mass, "value", whose)[0])
     if kilograms < 0.0:
-        raise RobotFileError(f"robot.urdf: {whose}: a mass must not be less than 0")
+        raise RobotFileError(f"robot.urdf: {whose}: a mass must not be less than 0 [kg]")
     return BodyInertia(kilograms, origin.xyz, rotational)

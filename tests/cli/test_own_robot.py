@@ -137,7 +137,7 @@ def test_a_leg_without_its_joints_is_named(
 ) -> None:
     folder = edited(tmp_path, "robot.toml", "left_rear", "tail")
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
-    assert "leg 'tail' has no joint 'tail_coxa'" in capsys.readouterr().err
+    assert "leg 'tail': robot.urdf has no joint 'tail_coxa'" in capsys.readouterr().err
 
 
 def test_a_leg_joint_with_a_turned_frame_is_named(

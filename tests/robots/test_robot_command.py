@@ -62,7 +62,7 @@ def test_init_overwrites_nothing(folder: Path, capsys: pytest.CaptureFixture[str
     ("text", "said"),
     [
         (dog(joints=2), "legs.urdf: legs of three joints"),
-        ("<robot>", "legs.urdf: no element found"),
+        ("<robot>", "legs.urdf, line 1: not well-formed XML: no element found"),
         (None, "cannot read"),
     ],
     ids=["two joints", "no XML", "no file"],

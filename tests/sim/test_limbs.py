@@ -131,7 +131,7 @@ def test_limbs_about_other_axes_are_of_another_kind() -> None:
 
 PAN = """
   <link name="camera"/>
-  <joint name="pan" type="revolute">
+  <joint name="pan" type="continuous">
     <parent link="body"/><child link="camera"/><axis xyz="0 0 1"/>
   </joint>
 </robot>"""
@@ -160,7 +160,7 @@ FEMUR = '<joint name="right_front_femur" type="revolute">\n    <parent link="'
         (
             '<parent link="right_front_tibia_link"/>\n    <child link="right_front_foot"/>',
             '<parent link="right_front_femur_link"/>\n    <child link="right_front_foot"/>',
-            "foot 'right_front_foot' is not on the last link of leg 'right_front'",
+            "leg 'right_front': its `foot` 'right_front_foot' is not on its last link",
         ),
     ],
     ids=["one more joint", "a joint less", "a slider", "no chain", "a foot on the femur"],
@@ -171,5 +171,5 @@ def test_legs_that_are_no_chains_of_hinges_to_their_feet_are_refused_by_name(
     robot = load_robot("szabadka2")
     assert robot.urdf.text.count(old) == 1
     other = replace(robot, urdf=parse_urdf(robot.urdf.text.replace(old, new)))
-    with pytest.raises(RobotFileError, match=rf"^robot\.urdf: {re.escape(said)}"):
+    with pytest.raises(RobotFileError, match=rf"^robot\.(urdf|toml): {re.escape(said)}"):
         limbs_of(other)

@@ -92,12 +92,27 @@ def inertial(inside: str) -> str:
 @pytest.mark.parametrize(
     ("robot", "said"),
     [
-        ("", "these do: none"),
+        ("", "there is no <link> in it"),
         (A + B, "these do: 'a', 'b'"),
-        (A + A, "there are two links 'a'"),
+        (A + A, "link 'a' is there twice; rename one"),
         (A + joint("j", "a", "b"), "joint 'j' joins a link 'b' that is not there"),
         (A + B + C + joint("j", "b", "c") + joint("k", "c", "b"), "link 'b' hangs on no body"),
-        (A + B + joint("j", "a", "b") + joint("k", "a", "b"), "two joints carry the link 'b'"),
+        (
+            A + B + joint("j", "a", "b") + joint("k", "a", "b"),
+            "joint 'k' carries the link 'b', which another joint carries already",
+        ),
+        (
+            A + B + C + joint("j", "a", "b") + joint("j", "b", "c"),
+            "joint 'j' is there twice; rename one",
+        ),
+        (
+            A + B + joint("j", "a", "b", '<origin rpy="0 90 0"/>'),
+            "joint 'j': rpy='0 90 0' of <origin> are degrees, it seems",
+        ),
+        (
+            A + B + joint("j", "a", "b").replace("<joint", '<joint type="revolute"'),
+            "joint 'j' has no <limit> with effort and velocity",
+        ),
         (inertial('<mass value="1"/>'), "link 'a': its <inertial> needs a <mass> and an <inertia>"),
         (
             inertial(f'<mass value="heavy"/>{TENSOR}'),
@@ -113,7 +128,7 @@ def inertial(inside: str) -> str:
         ),
         (
             A + B + joint("j", "a", "b", '<axis xyz="0 0 0"/>'),
-            "joint 'j': its axis has no direction",
+            "joint 'j': its axis needs a direction",
         ),
         (
             A + B + joint("j", "a", "b", '<axis xyz="0 1"/>'),
@@ -122,7 +137,7 @@ def inertial(inside: str) -> str:
     ],
 )
 def test_what_cannot_be_read_is_named(robot: str, said: str) -> None:
-    with pytest.raises(RobotFileError, match=r"^robot\.urdf: ") as refused:
+    with pytest.raises(RobotFileError, match=r"^robot\.urdf(, line 1)?: ") as refused:
         parse_urdf(f"<robot>{robot}</robot>")
     assert said in str(refused.value)
 
@@ -137,7 +152,7 @@ def test_an_axis_is_made_a_unit_vector_and_a_fixed_joint_needs_none() -> None:
 
 
 def test_what_is_no_xml_is_told_by_line_and_column() -> None:
-    with pytest.raises(RobotFileError, match=r"robot\.urdf: mismatched tag: line 2, column 2"):
+    with pytest.raises(RobotFileError, match=r"robot\.urdf, line 2: .*: mismatched tag \(column 2"):
         parse_urdf("<robot><link>\n</robot>")
 
 

@@ -1,0 +1,79 @@
+"""What is wrong with a robot.urdf, told by the line of the link or joint that is to blame."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+from xml.parsers import expat
+
+from sim.errors import RobotFileError
+
+_PART: Final = re.compile(
+    r"""robot\.urdf: (?P<part>(?P<tag>link|joint)\ (?P<name>'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"))"""
+)
+_INNER: Final = re.compile(r"(?P<attribute>\w+)=(?P<value>'[^']*'|\"[^\"]*\") of <(?P<tag>\w+)>")
+
+
+@contextmanager
+def by_line(text: str) -> Iterator[None]:
+    """Add the line to errors that name a link or a joint of a URDF.
+
+    Args:
+        text: Of the file, which keeps the bounds of `sim.robot.bounds`.
+
+    Yields:
+        Nothing.
+
+    Raises:
+        RobotFileError: The same, with the line.
+    """
+    try:
+        yield
+    except RobotFileError as error:
+        said = str(error)
+        line = _line(text, said)
+        if line is None:
+            raise
+        raise RobotFileError(said.replace("robot.urdf: ", f"robot.urdf, line {line}: ", 1)) from (
+            error.__cause__ or error
+        )
+
+
+def _line(text: str, said: str) -> int | None:
+    """Line of the last part of that name, which is the one too many of two, or of a number of it.
+
+    None if the message names none that is in the text.
+    """
+    part = _PART.match(said)
+    if part is None:
+        return None
+    inner = _INNER.search(said, part.end())
+    depth, inside, line = 0, False, None
+    parser = expat.ParserCreate()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, inside, line
+        depth += 1
+        if depth == 2:
+            inside = tag == part["tag"] and repr(attributes.get("name", "")) == part["name"]
+        found = inside and (
+            depth == 2
+            or (
+                inner is not None
+                and tag == inner["tag"]
+                and repr(attributes.get(inner["attribute"], "")) == inner["value"]
+            )
+        )
+        if found:
+            line = parser.CurrentLineNumber
+
+    def end(_tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.Parse(text, True)
+    return line

@@ -122,14 +122,17 @@ def draw_comparison(figures: Sequence[WalkFigures]) -> Figure:
     return figure
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write in the format of the file's suffix. Raises InvalidRequest."""
+def save(figure: Figure, path: Path, option: str = "output") -> None:
+    """Write in the format of the file's suffix. Raises InvalidRequest.
+
+    option: which option named the path.
+    """
     kind = path.suffix.removeprefix(".").lower()
     if kind not in _FORMATS:
-        raise InvalidRequest(f"{path} must end in .{', .'.join(_FORMATS)}", field="output")
+        raise InvalidRequest(f"{path} must end in .{', .'.join(_FORMATS)}", field=option)
     # Without a date the same picture is the same file.
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with replacing(path, "output") as file:
+    with replacing(path, option) as file:
         figure.savefig(file, format=kind, dpi=150, metadata=metadata)
 
 

@@ -17,7 +17,7 @@ from gaitswarm.errors import simulation_errors
 from gaitswarm.views.robot_check import CheckedLegView, RobotCheckView, StandingView
 from services.optimizer.errors import InvalidRequest
 from sim.errors import RobotFileError
-from sim.gait.trajectory import require_reachable
+from sim.gait.trajectory import desired_angles, require_reachable
 from sim.outcome import Status
 from sim.proposal.document import Proposal, propose_robot
 from sim.proposal.drive import GRAVITY
@@ -25,6 +25,7 @@ from sim.proposal.legs import reach_below
 from sim.robot import Robot, RobotFiles, load_robot, parse_robot
 from sim.robot.bounds import LONGEST_URDF
 from sim.robot.legs import ChainLeg
+from sim.robot.posture import centre_of_mass, leg_points
 from sim.scenario import Scenario
 from sim.simulate import simulate
 
@@ -135,6 +136,8 @@ def check_robot(files: RobotFiles) -> RobotCheckView:
             scenario, "p", list(_STIFF), np.array([list(_STIFF.values())]), robot=robot, log=True
         )
     standing, warnings = _standing(robot, stood)
+    angles = desired_angles(robot, scenario).angles[0]
+    points = leg_points(robot, angles)
     return RobotCheckView(
         name=robot.description.name,
         mass=robot.mass,
@@ -146,12 +149,14 @@ def check_robot(files: RobotFiles) -> RobotCheckView:
                 foot=data.foot,
                 length=sum(leg.lengths),
                 reach=reach_below(robot, number),
+                points=points[number].tolist(),
             )
             for number, (leg, data) in enumerate(
                 zip(robot.legs, robot.description.legs, strict=True)
             )
         ],
         held=dict(robot.description.held_joints),
+        centre_of_mass=centre_of_mass(robot, angles).tolist(),
         standing=standing,
         warnings=[*warnings, *_unphysical(robot)],
     )

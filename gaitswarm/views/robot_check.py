@@ -17,6 +17,9 @@ class CheckedLegView(View):
     reach: float = Field(
         description="How far the foot gets below the highest hip within the joints' limits [m]."
     )
+    points: list[tuple[float, float, float]] = Field(
+        description="Where its joints and its foot are in the body's frame when it stands [m]."
+    )
 
 
 class StandingView(View):
@@ -36,5 +39,8 @@ class RobotCheckView(View):
     joints: int = Field(description="That move.")
     legs: list[CheckedLegView] = Field(description="In the order of robot.toml.")
     held: dict[str, float] = Field(description="Joints of no leg, each with its angle [rad].")
+    centre_of_mass: tuple[float, float, float] = Field(
+        description="In the body's frame when it stands [m]."
+    )
     standing: StandingView = Field(description="How it stands.")
     warnings: list[str] = Field(description="What is unphysical or was guessed badly.")

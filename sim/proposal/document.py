@@ -30,6 +30,10 @@ _LARGEST_CODE: Final = 26000.0
 
 _CONTROLLER: Final = "pid"
 
+_PREFERENCE: Final = "C"
+"""The one without biases, whose size is that of one hexapod's objectives: it ranks walks of robots
+of any size alike."""
+
 _TWO_LEGS: Final = (
     "two legs on point feet do not stand by themselves, and controllers here hold joints, not"
     " balance: expect it to fall"
@@ -91,6 +95,7 @@ def propose_robot(urdf: str, name: str) -> Proposal:
     )
     job = {
         "controller": _CONTROLLER,
+        "preference": _PREFERENCE,
         "scenarios": propose_scenarios(stance, sole.length, len(legs)),
     }
     notes = [_TWO_LEGS] if len(legs) == 2 else []

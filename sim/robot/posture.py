@@ -1,10 +1,14 @@
-"""A robot at rest: forward kinematics of the feet and the height at which it stands."""
+"""A robot at rest: where its legs and its mass are, and the height at which it stands."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.robot.chain import chain_of
 from sim.robot.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -35,6 +39,58 @@ def feet_below_body(robot: Robot, joints: Floats) -> Floats:
         (L,) [m], mostly negative.
     """
     return np.asarray(feet_in_body(robot, joints)[:, 2])
+
+
+def leg_points(robot: Robot, joints: Floats) -> Floats:
+    """Where every leg's joints and its foot are in the body's frame.
+
+    Args:
+        robot: The robot.
+        joints: Angles, (J,) [rad].
+
+    Returns:
+        (L, 4, 3) [m]: three joints from the body on, and the foot.
+    """
+    return np.array([points for points, _ in _chains(robot, joints)])
+
+
+def centre_of_mass(robot: Robot, joints: Floats) -> Floats:
+    """Where the centre of mass of the whole robot without load is in the body's frame.
+
+    Args:
+        robot: The robot.
+        joints: Angles, (J,) [rad].
+
+    Returns:
+        (3,) [m].
+    """
+    moment, mass = robot.body.mass * robot.body.centre, robot.body.mass
+    for _, (of_leg, moment_of_leg) in _chains(robot, joints):
+        mass, moment = mass + of_leg, moment + moment_of_leg
+    return np.asarray(moment / mass)
+
+
+def _chains(robot: Robot, joints: Floats) -> Iterator[tuple[Floats, tuple[float, Floats]]]:
+    """Of each leg its points (4, 3), its mass and its mass times where this is."""
+    for leg, angles in zip(robot.description.legs, joints.reshape(-1, 3), strict=True):
+        chain = chain_of(robot.urdf, leg)
+        rotation, at = np.eye(3), np.zeros(3)
+        points, mass, moment = [], 0.0, np.zeros(3)
+        for place, angle in zip(chain.placements, angles.tolist(), strict=True):
+            at = at + rotation @ place.offset
+            points.append(at)
+            rotation = rotation @ place.rotation @ _turn(place.axis, angle)
+            mass += place.inertia.mass
+            moment = moment + place.inertia.mass * (at + rotation @ place.inertia.centre)
+        points.append(at + rotation @ chain.foot)
+        yield np.array(points), (mass, moment)
+
+
+def _turn(axis: Floats, angle: float) -> Floats:
+    """Rotation about a unit vector, by Rodrigues' formula."""
+    x, y, z = axis.tolist()
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across)
 
 
 def resting_height(robot: Robot, joints: Floats, weight: float) -> float:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+import pinocchio as pin
 import pytest
 
 from cli.main import run
+from sim.robot import parse_robot
 from tests.robots.test_proposal import dog
 
 
@@ -37,6 +40,45 @@ def test_init_writes_a_folder_that_loads_and_stands(
     assert "soles carry" in capsys.readouterr().out
 
 
+def test_check_draws_how_it_stands_and_says_the_same(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["robot", "check", str(folder), "--json"]) == 0
+    said = capsys.readouterr().out
+    for name in ("dog.svg", "dog.png"):
+        assert run(["robot", "check", str(folder), "--json", "--draw", str(tmp_path / name)]) == 0
+        assert capsys.readouterr().out == said
+    assert (tmp_path / "dog.png").read_bytes().startswith(b"\x89PNG")
+    svg = (tmp_path / "dog.svg").read_text(encoding="utf-8")
+    assert svg.startswith("<?xml") and "<!-- FL -->" in svg and "<!-- support polygon -->" in svg
+    assert run(["robot", "check", str(folder), "--draw", str(tmp_path / "dog.gif")]) == 2
+    assert "draw" in (error := capsys.readouterr().err) and ".svg" in error
+
+
+def test_check_tells_where_legs_and_mass_are(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["robot", "check", str(folder), "--json"]) == 0
+    view = json.loads(capsys.readouterr().out)
+    robot = parse_robot(
+        *((folder / f"robot.{kind}").read_text(encoding="utf-8") for kind in ("toml", "urdf"))
+    )
+    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
+    data, q = model.createData(), pin.neutral(model)
+    for leg in robot.description.legs:
+        for name, angle in zip(leg.joints, leg.stance or (), strict=True):
+            q[model.joints[model.getJointId(name)].idx_q] = angle
+    mass = pin.centerOfMass(model, data, q)
+    np.testing.assert_allclose(view["centre_of_mass"], mass, atol=0.01)
+    pin.framesForwardKinematics(model, data, q)
+    for leg, found in zip(robot.description.legs, view["legs"], strict=True):
+        hip = data.oMi[model.getJointId(leg.joints[0])].translation
+        np.testing.assert_allclose(found["points"][0], hip, atol=1e-12)
+        foot = data.oMf[model.getFrameId(leg.foot)].translation
+        # It stands where its gait has it, which the stance's digits are rounded from.
+        np.testing.assert_allclose(found["points"][3], foot, atol=0.01)
+
+
 def test_jobs_of_the_robot_have_its_controller_and_walks_unless_they_say_otherwise(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -46,6 +88,8 @@ def test_jobs_of_the_robot_have_its_controller_and_walks_unless_they_say_otherwi
     job = json.loads(capsys.readouterr().out)
     assert job["controller"] == "pid"
     assert job["scenarios"] == ["slow", "fast"]
+    # Biases of the others are in units of one robot.
+    assert job["spec"]["preference"]["bias"] == [0.0] * 5
     assert run([*command, "--controller", "pi"]) == 0
     assert json.loads(capsys.readouterr().out)["controller"] == "pi"
 

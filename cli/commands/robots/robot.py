@@ -54,12 +54,26 @@ def init(
     )
 
 
-def check(folder: Folder, *, as_json: Json = False) -> None:
+def check(
+    folder: Folder,
+    *,
+    draw: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw how it stands into FILE.png, .svg or .pdf."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Load a robot, let it stand for a second, and say what there is to it."""
     from cli.output import note, print_json, print_text
     from gaitswarm.robots import check_robot
 
     view = check_robot(_files(folder))
+    if draw is not None:
+        from cli.plots import save
+        from cli.robot_picture import draw_robot
+
+        save(draw_robot(view), draw, "draw")
+        note(f"picture written to {draw}")
     if as_json:
         print_json(view)
         return

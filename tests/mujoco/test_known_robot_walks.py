@@ -1,0 +1,53 @@
+"""A quadruped of other people walks a cycle of its proposed gait in MuJoCo, under our forces."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim.outcome import Status
+from sim.proposal.document import propose_robot
+from sim.robot import Robot, RobotFiles, load_robot
+from sim.scenario import Scenario
+from sim.simulate import simulate
+from tests.mujoco.controllers import Pi
+from tests.mujoco.engine import walk_in_mujoco
+from tests.mujoco.walker import walk
+from tests.robots.known import QUADRUPEDS, urdf_of
+
+pytestmark = pytest.mark.slow
+
+DESIGN = {"P": 0.6, "I": 0.5}
+
+
+@pytest.fixture(scope="module")
+def files() -> tuple[RobotFiles, dict[str, Any]]:
+    """Of a1, and the faster of its walks."""
+    text = urdf_of(QUADRUPEDS["a1"]).read_text(encoding="utf-8")
+    proposal = propose_robot(text, "a1")
+    return RobotFiles(toml=proposal.toml, urdf=proposal.urdf), proposal.job["scenarios"][1]
+
+
+def test_a_cycle_of_a1_is_the_same_in_mujoco(
+    files: tuple[RobotFiles, dict[str, Any]],
+) -> None:
+    """To rounding in our own steps, and within two percent in MuJoCo's."""
+    robot: Robot = load_robot(files[0])
+    scenario = Scenario.model_validate(files[1] | {"cycles": 1.0})
+    walked = simulate(
+        scenario, "pi", list(DESIGN), np.array([list(DESIGN.values())]), robot=robot, log=True
+    )
+    assert walked.outcome.statuses.tolist() == [Status.OK]
+    objectives, (log,) = walked.outcome.objectives[0], walked.logs
+    assert log is not None
+    # Every foot is lifted.
+    assert (log.foot_force[:, :, 2].min(axis=0) == 0.0).all()
+    trace = walk(robot, scenario, log, Pi(robot, log, DESIGN))
+    for name in ("base_position", "base_orientation", "joint_angle"):
+        np.testing.assert_allclose(getattr(trace, name), getattr(log, name), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(trace.foot_force, log.foot_force, atol=1e-5)
+    np.testing.assert_allclose(trace.objectives, objectives, rtol=1e-8)
+    found, _ = walk_in_mujoco(files[0], scenario, "pi", DESIGN)
+    np.testing.assert_allclose(found[:5], objectives[:5], rtol=0.02)

@@ -10,7 +10,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.spec import Spec
 from sim.controllers import CONTROLLERS
-from sim.scenario import GAIT_VARIABLE_NAMES
+from sim.gait_variables import GAIT_CATALOGUE
 
 
 def published_beside(spec: Spec) -> dict[str, SimulationView]:
@@ -57,10 +57,12 @@ def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str
     space = spec.design_space()
     searched = {variable.name for variable in space.variables}
     conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
-    held = {name: value for name, value in space.fixed if name in conventions | GAIT_VARIABLE_NAMES}
+    held = {
+        name: value for name, value in space.fixed if name in conventions or name in GAIT_CATALOGUE
+    }
     own = {
         name: value
         for name, value in published.items()
-        if name not in GAIT_VARIABLE_NAMES or name in searched
+        if name not in GAIT_CATALOGUE or name in searched
     }
     return own | held

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 from cli.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
-from sim.scenario import GAIT_VARIABLES
-from sim.variables import Variable
+from sim.gait_variables import GAIT_VARIABLES
+from sim.variables import Variable, VariableCatalogue
 
 if TYPE_CHECKING:
     from services.optimizer.jobs.kinds.tuning import JobSpec
@@ -184,7 +184,7 @@ def _controller_name(name: str) -> ControllerName:
 
 def _checked(values: dict[str, Any], known: Sequence[Variable], field: str) -> dict[str, Any]:
     """Values of known variables, with the index of a choice in place of its name."""
-    variables = {variable.name: variable for variable in known}
+    variables = VariableCatalogue(known)
     checked = dict(values)
     for name, value in values.items():
         if name not in variables:

@@ -39,7 +39,16 @@ from cli.commands.jobs import (
     serve,
     token,
 )
-from cli.commands.robots import calibrate, identify, mjcf, reconstruct, robot, synthesize, validate
+from cli.commands.robots import (
+    calibrate,
+    gaits,
+    identify,
+    mjcf,
+    reconstruct,
+    robot,
+    synthesize,
+    validate,
+)
 from cli.commands.studies import bench, study, tournament
 from cli.exit_codes import ExitCode, exit_code, explanation
 from cli.output import OutputClosed, Stdout, note, replace_closed_streams, warnings_as_notes
@@ -131,6 +140,7 @@ for _module in (
     validate,
     synthesize,
     mjcf,
+    gaits,
     tournament,
     identify,
     calibrate,

@@ -69,8 +69,8 @@ def read_walk(
     """Raises InvalidRequest or SimulationInputError that names what is wrong."""
     from cli.design_file import read_design
     from cli.robots import chosen_robot, chosen_scenarios
+    from sim.gait_variables import GAIT_CATALOGUE, with_gait
     from sim.robot import load_robot
-    from sim.scenario import GAIT_VARIABLE_NAMES, with_gait
     from sim.simulate import check_reach
 
     values = read_design(design, controller, trajectory)
@@ -84,7 +84,7 @@ def read_walk(
     (chosen,) = scenarios
     if cycles is not None:
         chosen = chosen.model_copy(update={"cycles": float(cycles)})
-    gait = {name: value for name, value in values.items() if name in GAIT_VARIABLE_NAMES}
+    gait = {name: value for name, value in values.items() if name in GAIT_CATALOGUE}
     walked = with_gait(chosen, gait)
     machine = load_robot(chosen_robot(robot))
     check_reach(walked, [], [], robot=machine)

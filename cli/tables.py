@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         JobView,
         ObjectiveView,
         OptimizerView,
+        PlannedGaitView,
         RankingView,
         ScenarioResultView,
         SimulatedScenarioView,
@@ -175,6 +176,18 @@ def measurements_table(results: Mapping[str, SimulatedScenarioView]) -> Table:
         values = (getattr(result.measurements, m.name) for m in MEASUREMENTS)
         table.add_row(scenario, *map(number, values))
     return table
+
+
+def gait_in_words(gait: PlannedGaitView) -> str:
+    """What a gait plans: duty factor, feet that stand, static stability."""
+    if gait.margin is None:
+        return f"duty {gait.duty_factor:.2f}, at moments no foot stands: not statically stable"
+    # Zero has a sign that nobody wants to see.
+    margin = round(1000.0 * gait.margin, 1) + 0.0
+    return (
+        f"duty {gait.duty_factor:.2f}, {gait.fewest_feet} feet or more stand, stability margin"
+        f" {margin:.1f} mm: {'' if gait.stable else 'not '}statically stable"
+    )
 
 
 def _objective(name: str, value: float | None) -> str:

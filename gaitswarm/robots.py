@@ -25,7 +25,7 @@ from sim.proposal.legs import reach_below
 from sim.robot import Robot, RobotFiles, load_robot, parse_robot
 from sim.robot.bounds import LONGEST_URDF
 from sim.robot.legs import ChainLeg
-from sim.robot.posture import centre_of_mass, leg_points
+from sim.robot.posture import feet_and_centre_of_mass, leg_points
 from sim.scenario import Scenario
 from sim.simulate import simulate
 
@@ -138,6 +138,7 @@ def check_robot(files: RobotFiles) -> RobotCheckView:
     standing, warnings = _standing(robot, stood)
     angles = desired_angles(robot, scenario).angles[0]
     points = leg_points(robot, angles)
+    mass = feet_and_centre_of_mass(robot, angles[None, :], 0.0)[1][0]
     return RobotCheckView(
         name=robot.description.name,
         mass=robot.mass,
@@ -156,7 +157,7 @@ def check_robot(files: RobotFiles) -> RobotCheckView:
             )
         ],
         held=dict(robot.description.held_joints),
-        centre_of_mass=centre_of_mass(robot, angles).tolist(),
+        centre_of_mass=mass.tolist(),
         standing=standing,
         warnings=[*warnings, *_unphysical(robot)],
     )

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
-from sim.scenario import GAIT_VARIABLES
-from sim.variables import Variable
+from sim.gait_variables import GAIT_VARIABLES
+from sim.variables import VariableCatalogue
 
 
-def design_catalogue(controller: str) -> dict[str, Variable]:
+def design_catalogue(controller: str) -> VariableCatalogue:
     """Everything that a design of a controller may give.
 
     Args:
@@ -21,7 +21,7 @@ def design_catalogue(controller: str) -> dict[str, Variable]:
     """
     family = CONTROLLERS[controller]  # type: ignore[index]
     known = (*family.variables, *family.conventions, *GAIT_VARIABLES)
-    return {variable.name: variable for variable in known}
+    return VariableCatalogue(known)
 
 
 def check_design(controller: str, design: Mapping[str, float | str]) -> None:

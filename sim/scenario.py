@@ -1,9 +1,9 @@
-"""Walking scenarios (thesis table 4.2) and the gait parameters that a design may set."""
+"""Walking scenarios (thesis table 4.2): gait, posture, load and ground of a walk."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal
+from functools import lru_cache
+from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import (
     AfterValidator,
@@ -12,6 +12,7 @@ from pydantic import (
     ConfigDict,
     Field,
     Tag,
+    TypeAdapter,
     ValidationError,
     model_validator,
 )
@@ -20,7 +21,7 @@ from sim import former_names
 from sim.choice import NAME, OWN, alternatives
 from sim.errors import SimulationInputError
 from sim.former_names import current_names
-from sim.variables import Variable
+from sim.variables import VariableName, split_name
 from sim.wording import message_of
 
 ScenarioName = Annotated[
@@ -33,6 +34,30 @@ ScenarioName = Annotated[
         examples=["normal-fast"],
     ),
 ]
+
+GaitName = Literal[
+    "own", "alternating", "tripod", "wave", "ripple", "trot", "pace", "bound", "crawl"
+]
+"""Order of the legs' steps; `own` is that of the robot's description. See `sim.gait.gaits`."""
+
+GAIT_NAMES: Final[tuple[GaitName, ...]] = get_args(GaitName)
+
+CurveName = Literal["quadratic_spline", "half_ellipse", "cycloid"]
+"""Shape of the swing; each is a module of `sim.gait`."""
+
+BY_LEG_GROUP: Final = ("stride", "height", "duty_factor", "start_phase", "radius")
+"""Fields of which groups of legs may have values of their own."""
+
+
+class ValuesByName(dict[str, float]):
+    """Numbers by name that are not changed, so that what has them can be the key of a cache."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(frozenset(self.items()))
+
+
+Phase = Annotated[float, Field(ge=0.0, lt=1.0)]
+LegName = Annotated[str, Field(min_length=1, max_length=60)]
 
 
 class Scenario(BaseModel):
@@ -116,6 +141,28 @@ class Scenario(BaseModel):
         lt=1.0,
         description="Share of the cycle at which the gait begins [1]; 0.5 exchanges the tripods.",
     )
+    gait: GaitName = Field(
+        default="own",
+        description="Order of the legs' steps: own is that of the robot's description; see"
+        " `gaitswarm gaits`.",
+    )
+    phases: (
+        Annotated[dict[LegName, Phase], Field(max_length=32), AfterValidator(ValuesByName)] | None
+    ) = Field(
+        default=None,
+        description="In place of a gait's name: by leg, the share of the cycle since the start of"
+        " its support, when the gait begins [1].",
+        examples=[{"FL": 0.0, "FR": 0.5, "RL": 0.5, "RR": 0.0}],
+    )
+    by_group: (
+        Annotated[dict[VariableName, float], Field(max_length=128), AfterValidator(ValuesByName)]
+        | None
+    ) = Field(
+        default=None,
+        description="Values of groups of legs in place of the scenario's: stride, height,"
+        " duty_factor, start_phase and radius, each as `stride[front]`.",
+        examples=[{"stride[front]": 0.05, "height[hind]": 0.03}],
+    )
     fir_ms: int = Field(
         default=12, ge=0, le=1000, description="Length of the low-pass FIR filter [ms]."
     )
@@ -129,8 +176,27 @@ class Scenario(BaseModel):
         le=500.0,
         description="Rate at which the desired angles are updated [Hz].",
     )
-    curve: Literal["half_ellipse", "quadratic_spline"] = Field(
+    curve: CurveName = Field(
         default="quadratic_spline", description="Shape of the swing; the spline is appendix .2.1's."
+    )
+    sway_lateral: float = Field(
+        default=0.0,
+        ge=-0.3,
+        le=0.3,
+        description="Amplitude of the body's sway to the left and right, once a cycle [m].",
+    )
+    sway_longitudinal: float = Field(
+        default=0.0,
+        ge=-0.3,
+        le=0.3,
+        description="Amplitude of the body's sway along its way, twice a cycle [m].",
+    )
+    sway_phase: float = Field(
+        default=0.5,
+        ge=0.0,
+        lt=1.0,
+        description="Share of the gait's cycle at which the body is furthest to the left and goes"
+        " back [1].",
     )
     cycles: float = Field(
         default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."
@@ -176,6 +242,23 @@ class Scenario(BaseModel):
     def _read_former_names(cls, document: Any) -> Any:
         return current_names(document, former_names.SCENARIO)
 
+    @model_validator(mode="after")
+    def _gait_is_one(self) -> Scenario:
+        if self.phases is not None and self.gait != "own":
+            raise ValueError(f"phases: the gait {self.gait} has its own; leave one of both out")
+        for name, value in (self.by_group or {}).items():
+            base, group = split_name(name)
+            if base not in BY_LEG_GROUP or group is None:
+                raise ValueError(
+                    f"by_group.{name}: not of a group of legs; those are"
+                    f" {', '.join(f'{known}[GROUP]' for known in BY_LEG_GROUP)}"
+                )
+            try:
+                _bounds_of(base).validate_python(value)
+            except ValidationError as error:
+                raise ValueError(f"by_group.{name}: {message_of(error.errors()[0])}") from error
+        return self
+
     @property
     def duration(self) -> float:
         """Simulated time [s]."""
@@ -183,88 +266,41 @@ class Scenario(BaseModel):
 
     @property
     def support_share(self) -> float:
-        """Support's share of the cycle [1]."""
-        return self.duty_factor if self.duty_phase == "support" else 1.0 - self.duty_factor
+        """Support's share of the cycle, of legs whose group has no duty factor of its own [1]."""
+        return self.support_share_of(self.duty_factor)
 
-    def stride_of(self, side: float) -> float:
+    def support_share_of(self, duty_factor: float) -> float:
+        """Support's share of the cycle [1].
+
+        Args:
+            duty_factor: Share of the phase that `duty_phase` names.
+
+        Returns:
+            The share of the support.
+        """
+        return duty_factor if self.duty_phase == "support" else 1.0 - duty_factor
+
+    def stride_of(self, side: float, stride: float | None = None) -> float:
         """Stride of the legs of one side [m].
 
         Args:
             side: 1 for the left legs, -1 for the right ones.
+            stride: Straight ahead [m]; None for the scenario's.
 
         Returns:
-            The scenario's stride, shortened or lengthened by its turn.
+            The stride, shortened or lengthened by the scenario's turn.
         """
         shortened = -side * self.turn
         if self.turn_mode == "inner":
             shortened = max(0.0, shortened)
-        return self.stride * (1.0 - shortened)
+        return (self.stride if stride is None else stride) * (1.0 - shortened)
 
 
-GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
-    Variable(name="cycle_time", low=0.9, high=1.7, unit="s", description="Walking cycle."),
-    Variable(
-        name="stride",
-        low=0.10,
-        high=0.18,
-        unit="m",
-        description="Stroke on the ground.",
-    ),
-    Variable(name="height", low=0.01, high=0.04, unit="m", description="Height of the swing."),
-    Variable(
-        name="duty_factor",
-        low=0.45,
-        high=0.75,
-        unit="1",
-        description="Share of the cycle of the phase that duty_phase names.",
-    ),
-    Variable(
-        name="duty_phase",
-        kind="categorical",
-        choices=("support", "swing"),
-        description="Phase whose share of the cycle duty_factor is.",
-    ),
-    Variable(
-        name="start_phase",
-        low=0.0,
-        high=0.95,
-        unit="1",
-        description="Share of the cycle at which the gait begins: which legs swing first.",
-    ),
-    Variable(
-        name="curve",
-        kind="categorical",
-        choices=("quadratic_spline", "half_ellipse"),
-        description="Shape of the swing.",
-    ),
-    Variable(
-        name="fir_ms",
-        low=4,
-        high=300,
-        unit="ms",
-        kind="integer",
-        description="Low-pass FIR filter of the desired angles.",
-    ),
-    Variable(
-        name="fir_window",
-        kind="categorical",
-        choices=("moving_average", "hamming"),
-        description="Coefficients of the filter: all equal, or those of Matlab's fir1.",
-    ),
-    Variable(
-        name="trajectory_rate",
-        low=20.0,
-        high=500.0,
-        unit="Hz",
-        description="Update rate of the desired angles.",
-    ),
-)
-"""Gait parameters that a design may set beside the controller's, after thesis table 3.2.
+@lru_cache
+def _bounds_of(field: str) -> TypeAdapter[float]:
+    """What a field of a scenario may be."""
+    return TypeAdapter(Annotated[float, Scenario.model_fields[field]])
 
-A value set by a design replaces the scenario's own in every scenario.
-"""
-
-GAIT_VARIABLE_NAMES: Final = frozenset(variable.name for variable in GAIT_VARIABLES)
 
 SCENARIOS: Final[tuple[Scenario, ...]] = (
     Scenario(name="normal-fast", cycle_time=1.5, radius=0.16, hip_height=0.15),
@@ -341,41 +377,6 @@ def find_scenario(name: str) -> Scenario:
             return scenario
     known = ", ".join(f"{k} {s.name}" for k, s in enumerate(PRESETS, start=1))
     raise SimulationInputError(f"unknown scenario {name!r}; known are {known}")
-
-
-def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
-    """A scenario with other gait parameters.
-
-    Args:
-        scenario: The scenario.
-        gait: Values of some of `GAIT_VARIABLES` by name; of a categorical one the index of a
-            choice.
-
-    Returns:
-        The scenario, or a copy of it if the gait changes anything.
-
-    Raises:
-        SimulationInputError: A value is none that a scenario can have; names the field.
-    """
-    if not gait:
-        return scenario
-    values: dict[str, float | str] = dict(gait)
-    for variable in GAIT_VARIABLES:
-        if variable.kind == "categorical" and variable.name in values:
-            try:
-                values[variable.name] = variable.shown(variable.number(values[variable.name]))
-            except ValueError as error:
-                raise SimulationInputError(str(error)) from error
-    if "fir_ms" in values:
-        if not float(values["fir_ms"]).is_integer():
-            raise SimulationInputError(f"fir_ms: {values['fir_ms']:g} is not a whole number of ms")
-        values["fir_ms"] = int(values["fir_ms"])
-    try:
-        return Scenario.model_validate(scenario.model_dump() | values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise SimulationInputError(f"{where}: {message_of(first)}") from error
 
 
 def _preset_exists(name: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -24,7 +24,9 @@ from sim.compiler.target import target
 from sim.controllers import CONTROLLERS, ControlLaw, control_law, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
+from sim.gait.leg_gaits import LegGait, leg_gaits
 from sim.gait.trajectory import desired_angles, require_reachable
+from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Precision, WalkSetup
@@ -32,7 +34,7 @@ from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
 from sim.robot.robot import with_shafts
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+from sim.scenario import Scenario
 
 _PLANS_KEPT: Final = 16
 """Scenarios whose walks are planned once; most take a quarter of a megabyte."""
@@ -74,7 +76,7 @@ def simulate(
         scenario: Gait, posture, load and ground.
         controller: Name of the motor controller, one of `CONTROLLERS`.
         variables: Columns of the designs: all variables of the controller, any of its conventions,
-            and any of `GAIT_VARIABLES`, which replace the scenario's values.
+            and any of `GAIT_CATALOGUE`, which replace the scenario's values.
         designs: (n, len(variables)), in the variables' units.
         robot: A shipped robot by name, a variant of one, or a `Robot` of your own; with backlash
             it is simulated at `BACKLASH_PHYSICS_RATE` at least.
@@ -179,7 +181,7 @@ def _simulating(
     plans: dict[tuple[float, ...], Callable[[ControlLaw], WalkSetup] | None] = {}
     for index, row in enumerate(designs.tolist()):
         design = dict(zip(variables, row, strict=True))
-        gait = {name: design.pop(name) for name in variables if name in GAIT_VARIABLE_NAMES}
+        gait = {name: design.pop(name) for name in variables if name in GAIT_CATALOGUE}
         law = control_law(controller, tuple(design.items()))
         key = tuple(gait.values())
         if key not in plans:
@@ -230,7 +232,7 @@ def check_reach(
     Args:
         scenario: The walk.
         variables: Names of the design's values.
-        design: Values, of which those of `GAIT_VARIABLES` replace the scenario's.
+        design: Values, of which those of `GAIT_CATALOGUE` replace the scenario's.
         robot: The robot that is to walk.
 
     Raises:
@@ -240,11 +242,30 @@ def check_reach(
     machine = load_robot(robot)
     check_stuck_leg(machine, scenario)
     gait = {
-        name: value
-        for name, value in zip(variables, design, strict=True)
-        if name in GAIT_VARIABLE_NAMES
+        name: value for name, value in zip(variables, design, strict=True) if name in GAIT_CATALOGUE
     }
     require_reachable(machine, with_gait(scenario, gait))
+
+
+def check_gait(
+    scenario: Scenario, design: Mapping[str, float], *, robot: RobotChoice
+) -> tuple[LegGait, ...]:
+    """Check that a gait is one for a robot's legs, whether or not they reach it.
+
+    Args:
+        scenario: The walk.
+        design: Values by name, of which those of `GAIT_CATALOGUE` replace the scenario's.
+        robot: The robot that is to walk.
+
+    Returns:
+        What every leg does.
+
+    Raises:
+        SimulationInputError: It is not one for its number of legs, or names a group of legs that it
+            does not have.
+    """
+    gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
+    return leg_gaits(load_robot(robot), with_gait(scenario, gait))
 
 
 def prepare(
@@ -291,9 +312,10 @@ def _check_arguments(
         raise SimulationInputError(
             f"controller: unknown {controller!r}; known are {', '.join(CONTROLLERS)}"
         )
-    known = names_of(CONTROLLERS[controller]) | GAIT_VARIABLE_NAMES
+    own = names_of(CONTROLLERS[controller])
     for name in variables:
-        if name not in known:
+        if name not in own and name not in GAIT_CATALOGUE:
+            known = own | set(GAIT_CATALOGUE)
             raise SimulationInputError(
                 f"{name}: not a variable of {controller}; known are {', '.join(sorted(known))}"
             )

@@ -7,6 +7,8 @@ form that asks for one and the check of a design file all read the same list.
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import (
@@ -27,13 +29,13 @@ VariableName = Annotated[
     str,
     Field(
         min_length=1,
-        max_length=40,
-        pattern=r"^[A-Za-z][A-Za-z0-9_]*$",
-        description="Name of the variable, as in the tables of the thesis.",
+        max_length=102,
+        pattern=r"^[A-Za-z][A-Za-z0-9_]{0,39}(\[[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}\])?$",
+        description="Name of the variable, as in the tables of the thesis; of a gait variable for"
+        " some of the legs with their group, as `stride[front]`.",
         examples=["FI1R"],
     ),
 ]
-
 
 ChoiceName = Annotated[
     str,
@@ -106,6 +108,11 @@ class Variable(BaseModel):
         default=None,
         description="Used where a design does not give the variable; null if a design must, or if"
         " the default depends on something else.",
+    )
+    by_leg_group: bool = Field(
+        default=False,
+        exclude_if=operator.not_,
+        description="Whether groups of legs may have values of their own: `NAME[GROUP]`.",
     )
     description: str = Field(default="", description="What the variable does.")
 
@@ -195,6 +202,54 @@ class Variable(BaseModel):
         if self.kind != "categorical" or math.isnan(number):
             return number
         return self.choices[round(number)]
+
+
+def split_name(name: str) -> tuple[str, str | None]:
+    """A variable's name and the group of legs that it is for: `stride[front]` is `stride`, `front`.
+
+    Args:
+        name: Of a variable.
+
+    Returns:
+        The name without the group; and the group, None where the name has none.
+    """
+    base, bracket, group = name.partition("[")
+    return (base, group[:-1]) if bracket and group.endswith("]") else (name, None)
+
+
+class VariableCatalogue(Mapping[str, Variable]):
+    """Variables by name. Those that groups of legs may have are found under `NAME[GROUP]`, too.
+
+    Iterates over the names without groups. Which groups there are only a robot tells.
+
+    Args:
+        variables: In the catalogue's order.
+    """
+
+    def __init__(self, variables: Iterable[Variable]) -> None:
+        self._variables = {variable.name: variable for variable in variables}
+
+    def __getitem__(self, name: str) -> Variable:
+        found = self._variables.get(name)
+        if found is not None:
+            return found
+        base, group = split_name(name)
+        known = self._variables.get(base)
+        if not group or known is None or not known.by_leg_group:
+            raise KeyError(name)
+        return known.model_copy(update={"name": name})
+
+    def __contains__(self, name: object) -> bool:
+        if name in self._variables:
+            return True
+        base, group = split_name(str(name))
+        return bool(group) and base in self._variables and self._variables[base].by_leg_group
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._variables)
+
+    def __len__(self) -> int:
+        return len(self._variables)
 
 
 VariableChoice = Annotated[

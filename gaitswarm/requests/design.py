@@ -11,6 +11,7 @@ from services.optimizer.errors import InvalidRequest
 from sim.catalogue import check_design, design_numbers
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
+from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.robot import DEFAULT_ROBOT, RobotSource
 from sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
 from sim.simulate import check_reach
@@ -74,6 +75,21 @@ class DesignRequest(BaseModel):
             CONTROLLERS[self.controller].compile(self.numbers)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field="design") from error
+
+    def walked(self, scenario: Scenario) -> Scenario:
+        """A scenario as the design walks through it.
+
+        Args:
+            scenario: The walk, in full.
+
+        Returns:
+            The scenario, with the gait of the design.
+
+        Raises:
+            SimulationInputError: The design gives a value that no scenario can have.
+        """
+        gait = {name: value for name, value in self.numbers.items() if name in GAIT_CATALOGUE}
+        return with_gait(scenario, gait)
 
     def check_reach(self, scenario: Scenario, *, field: str) -> None:
         """Check that the legs reach the gait's trajectory.

@@ -13,7 +13,7 @@ from services.optimizer.errors import InvalidRequest
 from sim.outcome import Status
 from sim.replay import CONTROL_RATE, replay
 from sim.robot import load_robot
-from sim.scenario import GAIT_VARIABLE_NAMES, ScenarioChoice, with_gait
+from sim.scenario import ScenarioChoice
 
 MOST_POSES: Final = 1_000_000
 """Poses of links in a replay; one of 40 s at 500 Hz has half as many of a shipped robot."""
@@ -63,11 +63,10 @@ def run_replay(request: ReplayRequest) -> bytes:
     (log,) = walk.logs
     if log is None:
         raise AssertionError("a gait within reach is walked")
-    gait = {name: v for name, v in request.numbers.items() if name in GAIT_VARIABLE_NAMES}
     return encoded_replay(
         replay(robot, log, rate=request.rate, load=scenario.load),
         robot,
-        with_gait(scenario, gait),
+        request.walked(scenario),
         rate=request.rate,
         status=Status(walk.outcome.statuses[0]),
         objectives=walk.outcome.objectives[0],

@@ -14,6 +14,7 @@ from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from sim.assembly import Backend, check_precision
 from sim.errors import SimulationInputError
+from sim.gait.stability import static_stability
 from sim.kernel.walk import Precision
 from sim.robot import load_robot
 from sim.scenario import Scenario
@@ -155,4 +156,8 @@ def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> 
         objectives=np.concatenate([walk.outcome.objectives for walk in walks]),
         measurements=np.concatenate([walk.measurements.array() for walk in walks]),
         logs=[log for walk in walks for log in walk.logs],
+        gaits=[
+            static_stability(load_robot(request.robot), request.walked(scenario))
+            for scenario in scenarios
+        ],
     )

@@ -48,6 +48,7 @@ from gaitswarm.views.particles import ParticlesHeaderView, encoded_particles
 from gaitswarm.views.problem import FieldErrorView, ProblemView, field_errors
 from gaitswarm.views.simulation import (
     MeasurementsView,
+    PlannedGaitView,
     SimulatedScenarioView,
     SimulationView,
     WalkLogView,
@@ -73,6 +74,7 @@ __all__ = [
     "OptimizerView",
     "PageView",
     "ParticlesHeaderView",
+    "PlannedGaitView",
     "PreferenceView",
     "ProblemView",
     "RankedDesignView",

@@ -17,8 +17,9 @@ from services.optimizer.search.automatic import (
 from services.optimizer.search.registry import METHODS
 from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
+from sim.gait_variables import GAIT_VARIABLES
 from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
-from sim.scenario import GAIT_VARIABLES, PRESETS, Scenario
+from sim.scenario import PRESETS, Scenario
 from sim.variables import Variable
 
 T = TypeVar("T")

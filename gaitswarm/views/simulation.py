@@ -13,6 +13,7 @@ from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ScenarioResultView, case_results
 from services.optimizer.jobs.preference import Preference, figure_of_merit, judge
 from sim.catalogue import design_shown
+from sim.gait.stability import Stability
 from sim.kernel.observation import WalkLog
 from sim.kernel.walk import Precision
 from sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
@@ -119,12 +120,45 @@ class MeasurementsView(View):
         return cls(**dict(zip(MEASUREMENT_NAMES, map(finite, row.tolist()), strict=True)))
 
 
+class PlannedGaitView(View):
+    """What a gait plans, before any step is simulated."""
+
+    duty_factor: float = Field(
+        description="Support's share of the cycle, mean of all legs [1].", examples=[0.56]
+    )
+    fewest_feet: int = Field(description="That stand at any moment.", examples=[3])
+    margin: float | None = Field(
+        description="Static stability margin: least distance of the centre of mass, along gravity,"
+        " from the edge of the polygon of the feet that stand [m]; negative outside of it; null"
+        " while no foot stands.",
+        examples=[0.041],
+    )
+    stable: bool = Field(description="Whether the gait is statically stable: margin above 0.")
+
+    @classmethod
+    def from_stability(cls, stability: Stability) -> PlannedGaitView:
+        """Make a view of a planned gait.
+
+        Args:
+            stability: of it.
+        """
+        return cls(
+            duty_factor=stability.duty_factor,
+            fewest_feet=stability.fewest_feet,
+            margin=stability.margin,
+            stable=stability.stable,
+        )
+
+
 class SimulatedScenarioView(ScenarioResultView):
     """How the design did in one scenario, with its log if it was asked for."""
 
     measurements: MeasurementsView = Field(
         default_factory=MeasurementsView,
         description="Currents, heat, power and speed of the walk.",
+    )
+    gait: PlannedGaitView | None = Field(
+        default=None, description="What the gait plans: duty factor and static stability."
     )
 
     log: WalkLogView | None = Field(
@@ -174,6 +208,7 @@ class SimulationView(View):
         objectives: NDArray[np.float64],
         measurements: NDArray[np.float64],
         logs: Sequence[WalkLog | None],
+        gaits: Sequence[Stability] = (),
     ) -> SimulationView:
         """Make a view of one design's walks, one in each of K scenarios.
 
@@ -188,10 +223,12 @@ class SimulationView(View):
             objectives: (K, 6) raw objectives f1..f6, in their units, NaN where there is none.
             measurements: (K, 5) as in `sim.outcome.MEASUREMENTS`, NaN where there is none.
             logs: K, or none if they were not asked for; None for a robot that never moved.
+            gaits: K planned gaits, or none to leave them out.
         """
         judged = judge(objectives[None], (statuses != Status.OK)[None], preference)
         results = case_results(names, OBJECTIVES, statuses, objectives, judged.log_utilities[0])
         recorded = [None if log is None else WalkLogView.from_log(log) for log in logs]
+        planned = list[PlannedGaitView | None](map(PlannedGaitView.from_stability, gaits))
         return cls(
             robot=robot,
             controller=controller,
@@ -202,10 +239,17 @@ class SimulationView(View):
             figure_of_merit=figure_of_merit(float(judged.fitness[0]), preference),
             scenarios={
                 name: SimulatedScenarioView.model_construct(
-                    **dict(results[name]), measurements=MeasurementsView.from_row(row), log=log
+                    **dict(results[name]),
+                    measurements=MeasurementsView.from_row(row),
+                    gait=gait,
+                    log=log,
                 )
-                for name, row, log in zip(
-                    names, measurements, recorded or [None] * len(names), strict=True
+                for name, row, gait, log in zip(
+                    names,
+                    measurements,
+                    planned or [None] * len(names),
+                    recorded or [None] * len(names),
+                    strict=True,
                 )
             },
         )

@@ -14,11 +14,12 @@ from sim.calibration.catalogue import robot_variables, varied_robot
 from sim.catalogue import design_catalogue
 from sim.controllers import ControllerName, control_law
 from sim.gait.trajectory import desired_angles
+from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.walk import Precision, WalkSetup
 from sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
 from sim.robot import Robot, RobotSource
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+from sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
@@ -113,8 +114,8 @@ class CalibrationWalk:
         self, described: Robot, robot: Robot, drive: Mapping[str, float], timestep: float
     ) -> WalkSetup | None:
         """None for a gait out of the legs' reach."""
-        gait = {name: value for name, value in drive.items() if name in GAIT_VARIABLE_NAMES}
-        gains = tuple((name, v) for name, v in drive.items() if name not in GAIT_VARIABLE_NAMES)
+        gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
+        gains = tuple((name, v) for name, v in drive.items() if name not in GAIT_CATALOGUE)
         scenario = with_gait(self.scenario, gait)
         trajectory = desired_angles(described, scenario)
         plan = plan_walk(robot, scenario, timestep, trajectory=trajectory)

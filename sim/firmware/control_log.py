@@ -12,11 +12,12 @@ from sim.assembly import control_steps, judge, kernel_of, plan_walk
 from sim.controllers import ControlLaw
 from sim.firmware.integers import in_16_bits
 from sim.gait.trajectory import require_reachable
+from sim.gait_variables import with_gait
 from sim.kernel.observation import encoder_angles, split_states
 from sim.kernel.walk import Coding, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot
-from sim.scenario import Scenario, with_gait
+from sim.scenario import Scenario
 
 Codes = NDArray[np.int16]
 

@@ -29,11 +29,12 @@ from sim.firmware.integers import LawIntegers, law_integers
 from sim.firmware.memory import Memory
 from sim.firmware.readme import readme
 from sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
+from sim.gait_variables import GAIT_CATALOGUE
 from sim.kernel.source import control_tick
 from sim.outcome import OBJECTIVE_NAMES
 from sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
 from sim.robot.description import JOINTS_PER_LEG
-from sim.scenario import GAIT_VARIABLE_NAMES, PRESETS, Scenario
+from sim.scenario import PRESETS, Scenario
 
 MANIFEST: Final = "firmware.json"
 """File that says what the others are, by which a folder is known as firmware."""
@@ -116,7 +117,7 @@ def firmware_of(
         SimulationInputError: The design cannot be simulated, or needs integers that the robot does
             not have; names the variable, or scenario and joint.
     """
-    gait = {name: value for name, value in design.items() if name in GAIT_VARIABLE_NAMES}
+    gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     gains = {name: value for name, value in design.items() if name not in gait}
     machine = load_robot(robot)
     usual = control_law(controller, tuple(gains.items()))

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import BeyondJointLimit, UnreachablePose
+from sim.gait.cycloid import cycloid
 from sim.gait.half_ellipse import half_ellipse
 from sim.gait.inverse_kinematics import chain_angles, leg_angles
+from sim.gait.leg_gaits import LegGait, Sway, leg_gaits
 from sim.gait.low_pass import FirWindow, low_pass
 from sim.gait.quadratic_spline import quadratic_spline
 from sim.robot import Robot
@@ -25,7 +27,11 @@ Floats = NDArray[np.float64]
 _DECIMALS: Final = 12
 """Of angles in radians that are kept: a start pose is not coded, and must be the same anywhere."""
 
-_CURVES: Final = {"half_ellipse": half_ellipse, "quadratic_spline": quadratic_spline}
+_CURVES: Final = {
+    "half_ellipse": half_ellipse,
+    "quadratic_spline": quadratic_spline,
+    "cycloid": cycloid,
+}
 
 
 Limits = tuple[tuple[float, float], ...]
@@ -89,29 +95,31 @@ class Trajectory:
 
 @dataclass(frozen=True, slots=True)
 class _Foot:
-    """What any leg's angles depend on besides the gait.
+    """What any leg's angles depend on besides what all legs have in common.
 
-    phase: share of the cycle at the start. stride: [m]. limits: of the joints [rad].
+    limits: of the joints [rad].
     """
 
-    phase: float
-    stride: float
+    gait: LegGait
     limits: Limits
 
 
 @dataclass(frozen=True, slots=True)
 class _KneeUpFoot(_Foot):
     """Of a leg as the thesis's. lengths: of its links. lateral: outward from the coxa's axis.
-    ground: below it [m].
+    ground: below it [m]. side: of the leg, 0 if it makes no difference.
     """
 
     lengths: tuple[float, float, float]
     lateral: float
     ground: float
+    side: float
 
-    def angles(self, forward: Floats, lift: Floats) -> tuple[Floats, Floats]:
+    def angles(self, forward: Floats, left: Floats | None, lift: Floats) -> tuple[Floats, Floats]:
         """Angles (T, 3) [rad], and the miss (T,) [m]."""
         lateral = np.full_like(forward, self.lateral)
+        if left is not None:
+            lateral += self.side * left
         return leg_angles(self.lengths, forward, lateral, lift - self.ground)
 
 
@@ -122,21 +130,21 @@ class _ChainFoot(_Foot):
     leg: ChainLeg
     rest: tuple[float, float, float]
 
-    def angles(self, forward: Floats, lift: Floats) -> tuple[Floats, Floats]:
+    def angles(self, forward: Floats, left: Floats | None, lift: Floats) -> tuple[Floats, Floats]:
         """Angles (T, 3) [rad], and the miss (T,) [m]."""
         x, y, z = self.rest
-        targets = np.stack([x + forward, np.full_like(forward, y), z + lift], axis=1)
+        aside = np.full_like(forward, y) if left is None else y + left
+        targets = np.stack([x + forward, aside, z + lift], axis=1)
         return chain_angles(self.leg, targets)
 
 
 @dataclass(frozen=True, slots=True)
 class _Gait:
-    """What all legs' angles depend on, as the scenario has it. ticks: of the whole walk."""
+    """What all legs have in common, as the scenario has it. ticks: of the whole walk."""
 
     ticks: int
     cycle_time: float
-    height: float
-    support_share: float
+    sway: Sway | None
     curve: str
     backward: bool
     trajectory_rate: float
@@ -148,8 +156,7 @@ class _Gait:
         return cls(
             ticks=n_ticks(scenario),
             cycle_time=scenario.cycle_time,
-            height=scenario.height,
-            support_share=scenario.support_share,
+            sway=Sway.of(scenario),
             curve=scenario.curve,
             backward=scenario.direction == "backward",
             trajectory_rate=scenario.trajectory_rate,
@@ -194,31 +201,28 @@ def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
 
 
 def _feet(robot: Robot, scenario: Scenario) -> tuple[_KneeUpFoot | _ChainFoot, ...]:
-    legs = zip(robot.legs, robot.description.legs, robot.planned_soles(), strict=True)
+    legs = zip(robot.legs, leg_gaits(robot, scenario), robot.planned_soles(), strict=True)
     hips = max(leg.hip[2] for leg in robot.legs)
-    return tuple(
-        _foot(leg, scenario, sole, data.phase + scenario.start_phase, hips)
-        for leg, data, sole in legs
-    )
+    return tuple(_foot(leg, gait, scenario, sole, hips) for leg, gait, sole in legs)
 
 
 def _foot(
-    leg: LegKinematics, scenario: Scenario, sole: float, phase: float, hips: float
+    leg: LegKinematics, gait: LegGait, scenario: Scenario, sole: float, hips: float
 ) -> _KneeUpFoot | _ChainFoot:
     """hips: height of the highest one in the body's frame [m]."""
-    stride, ground = scenario.stride_of(leg.side), scenario.hip_height - sole
+    ground = scenario.hip_height - sole
     limits = tuple((lower, upper) for lower, upper in leg.limits.tolist())
     if isinstance(leg, ChainLeg):
         x, _, _ = leg.foot(leg.stance.tolist())
-        rest = (x, leg.side * scenario.radius, hips - ground)
-        return _ChainFoot(phase=phase, stride=stride, limits=limits, leg=leg, rest=rest)
+        rest = (x, leg.side * gait.radius, hips - ground)
+        return _ChainFoot(gait=gait, limits=limits, leg=leg, rest=rest)
     return _KneeUpFoot(
-        phase=phase,
-        stride=stride,
+        gait=gait,
         limits=limits,
         lengths=leg.lengths,
-        lateral=scenario.radius - abs(leg.hip[1]),
+        lateral=gait.radius - abs(leg.hip[1]),
         ground=ground,
+        side=leg.side if scenario.sway_lateral else 0.0,
     )
 
 
@@ -245,15 +249,21 @@ def _unfiltered(
     foot: _KneeUpFoot | _ChainFoot, gait: _Gait, time: Floats
 ) -> tuple[Floats, float, Floats]:
     """Angles (T, 3) [rad], the largest miss [m], and by joint the largest excess (3,) [rad]."""
+    cycles, own = time / gait.cycle_time, foot.gait
     forward, lift = _CURVES[gait.curve](
-        np.mod(time / gait.cycle_time + foot.phase, 1.0),
-        stride=foot.stride,
-        height=gait.height,
-        duty_factor=gait.support_share,
+        np.mod(cycles + own.phase, 1.0),
+        stride=own.stride,
+        height=own.height,
+        duty_factor=own.support_share,
     )
+    left = None
+    if gait.sway is not None:
+        # Seen from the body, the feet go the other way.
+        ahead, aside = gait.sway.body(cycles)
+        forward, left = forward - ahead, -aside
     if gait.backward:
         forward = -forward
-    angles, miss = foot.angles(forward, lift)
+    angles, miss = foot.angles(forward, left, lift)
     lower, upper = np.array(foot.limits).T
     excess = np.maximum(lower - angles.min(axis=0), angles.max(axis=0) - upper)
     return angles, float(miss.max()), np.maximum(0.0, excess)

@@ -12,6 +12,7 @@ from sim.assembly import control_steps, kernel_of, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
+from sim.gait_variables import with_gait
 from sim.identification.recorded_walk import RecordedWalk
 from sim.kernel.electrical import supply_voltage
 from sim.kernel.observation import sensed_currents, split_states
@@ -20,7 +21,6 @@ from sim.outcome import Objective, Outcome, Status
 from sim.robot import Robot, RobotSource, load_robot
 from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.identifiable import with_parameters
-from sim.scenario import with_gait
 
 Floats = NDArray[np.float64]
 

@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from sim.controllers import CONTROLLERS, ControllerName, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.gait_variables import GAIT_CATALOGUE
 from sim.robot import RobotSource
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
+from sim.scenario import Scenario
 from sim.simulate import check_reach
 from sim.variables import VariableName
 
@@ -71,7 +72,7 @@ class RecordedWalk(BaseModel):
         if missing:
             raise ValueError(f"design: {', '.join(missing)} missing; {self.controller} needs it")
         for name in self.design:
-            if name not in names_of(controller) | GAIT_VARIABLE_NAMES:
+            if name not in names_of(controller) and name not in GAIT_CATALOGUE:
                 raise ValueError(f"design: unknown variable {name!r}")
         last, walked = self.first_tick + len(self.current), self.walked_seconds
         if last > round(walked / CONTROL_PERIOD):
@@ -90,12 +91,12 @@ class RecordedWalk(BaseModel):
     @property
     def gait(self) -> dict[str, float]:
         """The gait variables of the design."""
-        return {name: v for name, v in self.design.items() if name in GAIT_VARIABLE_NAMES}
+        return {name: v for name, v in self.design.items() if name in GAIT_CATALOGUE}
 
     @property
     def gains(self) -> dict[str, float]:
         """The controller's variables of the design."""
-        return {name: v for name, v in self.design.items() if name not in GAIT_VARIABLE_NAMES}
+        return {name: v for name, v in self.design.items() if name not in GAIT_CATALOGUE}
 
     def check_reach(self, robot: RobotSource) -> None:
         """Check that a robot's legs reach all of the walk.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from sim.gait.leg_gaits import leg_gaits
 from sim.gait.trajectory import desired_angles
 from sim.mujoco.mjcf import Rig, Surroundings, mjcf
 from sim.mujoco.model import Feet, even_drags, with_contacts
@@ -44,7 +45,7 @@ def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
         start=np.array([0.0, 0.0, height + scenario.drop, 1.0, 0.0, 0.0, 0.0, *joints]),
     )
     if contacts:
-        standing = scenario.duty_factor * len(robot.legs)
+        standing = sum(gait.support_share for gait in leg_gaits(robot, scenario))
         feet = Feet(even_drags(robot, surroundings, standing))
         rig = with_contacts(robot, surroundings, rig, feet)
     text = mjcf(robot, surroundings, rig)

@@ -162,6 +162,10 @@ class Contact(_Data):
     )
 
 
+GroupName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}$")]
+"""Name of a group of legs, as names of variables may have it."""
+
+
 def _is_none(value: Any) -> bool:
     return value is None
 
@@ -241,6 +245,13 @@ class RobotDescription(_Data):
     sensors: Sensors
     contact: Contact
     legs: tuple[Leg, ...] = Field(min_length=2, max_length=MOST_LEGS)
+    leg_groups: dict[GroupName, tuple[PartName, ...]] = Field(
+        default={},
+        max_length=MOST_LEGS,
+        exclude_if=operator.not_,
+        description="groups of legs for gait parameters, beside front, middle, hind, left, right,"
+        " all and each leg: names of their legs",
+    )
     held_joints: dict[PartName, Number] = Field(
         default={},
         exclude_if=operator.not_,
@@ -271,6 +282,17 @@ class RobotDescription(_Data):
                     raise ValueError(
                         f"legs.{k}.actuators: no actuator {actuator_name!r} is described"
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _groups_are_of_legs(self) -> RobotDescription:
+        names = {leg.name for leg in self.legs}
+        for group, members in self.leg_groups.items():
+            unknown = [member for member in members if member not in names]
+            if unknown:
+                raise ValueError(f"leg_groups.{group}: no leg {unknown[0]!r} is described")
+            if not members or len(set(members)) < len(members):
+                raise ValueError(f"leg_groups.{group}: name one leg at least, and none twice")
         return self
 
     @model_validator(mode="after")

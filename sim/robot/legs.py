@@ -142,16 +142,26 @@ class ChainLeg:
         behind: list[Floats] = []
         for k in (2, 1, 0):
             axis, sine, cosine = self.axes[k], np.sin(angles[:, k]), np.cos(angles[:, k])
-            behind = [_turned(vector, axis, sine, cosine) for vector in behind]
-            point = _turned(point, axis, sine, cosine)
+            behind = [turned(vector, axis, sine, cosine) for vector in behind]
+            point = turned(point, axis, sine, cosine)
             behind.append(np.cross(axis, point))
             behind = [vector @ self.rotations[k].T for vector in behind]
             point = point @ self.rotations[k].T + self.offsets[k]
         return np.asarray(point), np.stack(behind[::-1], axis=-1)
 
 
-def _turned(vector: Floats, axis: Floats, sine: Floats, cosine: Floats) -> Floats:
-    """Vectors (T, 3) turned about an axis, by Rodrigues' formula."""
+def turned(vector: Floats, axis: Floats, sine: Floats, cosine: Floats) -> Floats:
+    """Turn vectors about an axis, by Rodrigues' formula.
+
+    Args:
+        vector: (T, 3), or (3,).
+        axis: Of unit length, (3,).
+        sine: Of the angles, (T,).
+        cosine: Of the angles, (T,).
+
+    Returns:
+        (T, 3).
+    """
     along = (vector @ axis)[:, None] * axis
     across = np.cross(axis, vector)
     return np.asarray(along + cosine[:, None] * (vector - along) + sine[:, None] * across)

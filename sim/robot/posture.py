@@ -1,14 +1,15 @@
-"""A robot at rest: where its legs and its mass are, and the height at which it stands."""
+"""A robot at rest: where its feet and its centre of mass are, and at which height it stands."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.robot.chain import chain_of
+from sim.robot.legs import turned
+from sim.robot.limbs import limbs_of
 from sim.robot.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -51,46 +52,54 @@ def leg_points(robot: Robot, joints: Floats) -> Floats:
     Returns:
         (L, 4, 3) [m]: three joints from the body on, and the foot.
     """
-    return np.array([points for points, _ in _chains(robot, joints)])
-
-
-def centre_of_mass(robot: Robot, joints: Floats) -> Floats:
-    """Where the centre of mass of the whole robot without load is in the body's frame.
-
-    Args:
-        robot: The robot.
-        joints: Angles, (J,) [rad].
-
-    Returns:
-        (3,) [m].
-    """
-    moment, mass = robot.body.mass * robot.body.centre, robot.body.mass
-    for _, (of_leg, moment_of_leg) in _chains(robot, joints):
-        mass, moment = mass + of_leg, moment + moment_of_leg
-    return np.asarray(moment / mass)
-
-
-def _chains(robot: Robot, joints: Floats) -> Iterator[tuple[Floats, tuple[float, Floats]]]:
-    """Of each leg its points (4, 3), its mass and its mass times where this is."""
+    legs = []
     for leg, angles in zip(robot.description.legs, joints.reshape(-1, 3), strict=True):
         chain = chain_of(robot.urdf, leg)
-        rotation, at = np.eye(3), np.zeros(3)
-        points, mass, moment = [], 0.0, np.zeros(3)
+        rotation, at, points = np.eye(3), np.zeros(3), []
         for place, angle in zip(chain.placements, angles.tolist(), strict=True):
             at = at + rotation @ place.offset
             points.append(at)
             rotation = rotation @ place.rotation @ _turn(place.axis, angle)
-            mass += place.inertia.mass
-            moment = moment + place.inertia.mass * (at + rotation @ place.inertia.centre)
-        points.append(at + rotation @ chain.foot)
-        yield np.array(points), (mass, moment)
+        legs.append([*points, at + rotation @ chain.foot])
+    return np.array(legs)
+
+
+def feet_and_centre_of_mass(robot: Robot, joints: Floats, load: float) -> tuple[Floats, Floats]:
+    """Where feet and centre of mass are in many postures.
+
+    Args:
+        robot: The robot.
+        joints: Angles, (T, J) [rad].
+        load: Mass carried on the body [kg].
+
+    Returns:
+        In the body's frame: the feet (T, L, 3) and the centre of mass (T, 3) [m].
+    """
+    body = robot.body
+    at_load = np.array([0.0, 0.0, robot.description.load_height])
+    moment = np.tile(body.mass * body.centre + load * at_load, (len(joints), 1))
+    feet = []
+    for number, limb in enumerate(limbs_of(robot)):
+        angles = joints[:, 3 * number : 3 * number + 3]
+        foot = np.tile(np.array(limb.foot), (len(joints), 1))
+        mass, of_leg = 0.0, np.zeros_like(foot)
+        # From the foot inwards: each joint turns all that is behind it.
+        for joint, angle in zip(reversed(limb.joints), reversed(angles.T), strict=True):
+            mass, of_leg = mass + joint.mass, of_leg + np.array(joint.moment)
+            axis, rotation, offset = map(np.array, (joint.axis, joint.rotation, joint.offset))
+            sine, cosine = np.sin(joint.sign * angle), np.cos(angle)
+            foot = turned(foot, axis, sine, cosine) @ rotation.T + offset
+            of_leg = turned(of_leg, axis, sine, cosine) @ rotation.T + mass * offset
+        moment += of_leg
+        feet.append(foot)
+    return np.stack(feet, axis=1), moment / (robot.mass + load)
 
 
 def _turn(axis: Floats, angle: float) -> Floats:
     """Rotation about a unit vector, by Rodrigues' formula."""
     x, y, z = axis.tolist()
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across)
+    return np.asarray(np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across))
 
 
 def resting_height(robot: Robot, joints: Floats, weight: float) -> float:

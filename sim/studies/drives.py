@@ -12,9 +12,10 @@ import numpy as np
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.gait.driving_2011 import driven_as_in_2011
+from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.outcome import Status
 from sim.robot import DEFAULT_ROBOT, RobotChoice
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+from sim.scenario import Scenario
 from sim.simulate import simulate
 
 
@@ -67,7 +68,7 @@ class WalkFigures:
 def _published(controller: ControllerName, study: str) -> Mapping[str, float]:
     """Without its gait: drives are compared in the scenario's, or in one that they name."""
     design = CONTROLLERS[controller].published[study]
-    return {name: value for name, value in design.items() if name not in GAIT_VARIABLE_NAMES}
+    return {name: value for name, value in design.items() if name not in GAIT_CATALOGUE}
 
 
 DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
@@ -151,7 +152,7 @@ def walk_figures(
     Returns:
         Its figures.
     """
-    gait = {name: v for name, v in drive.design.items() if name in GAIT_VARIABLE_NAMES}
+    gait = {name: v for name, v in drive.design.items() if name in GAIT_CATALOGUE}
     walked = drive.driven(with_gait(scenario, gait))
     names = list(drive.design)
     outcome = simulate(
@@ -194,6 +195,6 @@ def drive_of_design(
     Raises:
         SimulationInputError: The controller cannot have these values.
     """
-    own = {k: v for k, v in design.items() if k not in GAIT_VARIABLE_NAMES}
+    own = {k: v for k, v in design.items() if k not in GAIT_CATALOGUE}
     CONTROLLERS[controller].compile(own)
     return NamedDrive(name, f"{controller} as designed", controller, design)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from sim.controllers import ControlLaw, ControllerName, control_law
+from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Precision, WalkSetup
@@ -26,7 +27,7 @@ from sim.outcome import (
     Status,
 )
 from sim.robot import Robot, RobotSource, load_robot
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+from sim.scenario import Scenario
 from sim.simulate import Simulation
 from sim.worlds.perturbations import check_worlds
 from sim.worlds.perturbed_setup import perturbed_setups
@@ -125,9 +126,7 @@ class PerturbedWalk:
         setups = {}
         for index, row in enumerate(designs.tolist()):
             design = dict(zip(self.variables, row, strict=True))
-            gait = {
-                name: design.pop(name) for name in self.variables if name in GAIT_VARIABLE_NAMES
-            }
+            gait = {name: design.pop(name) for name in self.variables if name in GAIT_CATALOGUE}
             law = control_law(self.controller, tuple(design.items()))
             key = tuple(gait.values())
             if key not in of_gait:

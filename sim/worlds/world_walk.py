@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from sim.controllers import ControllerName, control_law
+from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Kernel, Precision, WalkSetup
@@ -22,7 +23,7 @@ from sim.outcome import (
     Status,
 )
 from sim.robot import RobotSource, load_robot
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario, with_gait
+from sim.scenario import Scenario
 from sim.simulate import Simulation
 from sim.worlds.perturbations import check_worlds
 from sim.worlds.perturbed_setup import perturbed_setups
@@ -141,8 +142,8 @@ class WorldWalk:
     def _setups(self, worlds: Floats, timestep: float) -> list[WalkSetup]:
         """One a world; none at all for a gait out of the legs' reach."""
         robot = load_robot(self.robot)
-        gait = {name: value for name, value in self.design if name in GAIT_VARIABLE_NAMES}
-        gains = tuple((n, value) for n, value in self.design if n not in GAIT_VARIABLE_NAMES)
+        gait = {name: value for name, value in self.design if name in GAIT_CATALOGUE}
+        gains = tuple((n, value) for n, value in self.design if n not in GAIT_CATALOGUE)
         scenario = with_gait(self.scenario, gait)
         law = control_law(self.controller, gains)
         plan = plan_walk(robot, scenario, timestep)

@@ -13,8 +13,9 @@ from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.search.automatic import CHOICES
 from services.optimizer.search.registry import METHODS
 from sim.controllers import CONTROLLERS
+from sim.gait_variables import GAIT_VARIABLES
 from sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
-from sim.scenario import GAIT_VARIABLES, PRESETS, SCENARIOS
+from sim.scenario import PRESETS, SCENARIOS
 
 
 def items(client: httpx2.Client, what: str) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.search.swarm.pso import PsoSettings
 from sim.controllers import CONTROLLERS, ControllerName
-from sim.scenario import GAIT_VARIABLE_NAMES
+from sim.gait_variables import GAIT_CATALOGUE
 from tests.cli.conftest import Gaitswarm, WriteJson
 
 GAIT = {"cycle_time", "stride", "height", "duty_factor", "fir_ms"}
@@ -117,7 +117,7 @@ def test_a_job_whose_controller_was_never_published_is_compared_with_nothing() -
 
 def test_no_published_design_names_anything_but_variables_and_gait() -> None:
     for controller in CONTROLLERS.values():
-        known = {variable.name for variable in controller.variables} | GAIT_VARIABLE_NAMES
+        known = {variable.name for variable in controller.variables} | set(GAIT_CATALOGUE)
         for design in controller.published.values():
             assert design.keys() <= known
 

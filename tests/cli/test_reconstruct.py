@@ -18,7 +18,8 @@ from cli.target_file import read_targets
 from services.optimizer.jobs.preference import PREFERENCES, judge
 from sim.controllers import CONTROLLERS
 from sim.gait.driving_2011 import driven_as_in_2011
-from sim.scenario import SCENARIOS, with_gait
+from sim.gait_variables import with_gait
+from sim.scenario import SCENARIOS
 from tests.cli.conftest import Gaitswarm
 
 TINY = (

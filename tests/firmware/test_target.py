@@ -14,7 +14,7 @@ from gaitswarm.firmware import write_firmware
 from sim.controllers import ControllerName
 from sim.firmware import BUDGET
 from sim.firmware.memory import CODE_BYTES
-from sim.scenario import GAIT_VARIABLE_NAMES
+from sim.gait_variables import GAIT_CATALOGUE
 from tests.examples.walks import short_walk
 from tests.firmware.conftest import TOOLS, make, published, with_changed_cell
 
@@ -62,7 +62,7 @@ def test_a_table_of_64_bits_of_fraction_answers_as_the_simulator(tmp_path: Path)
     folder = tmp_path / "firmware"
     design = published("fuzzy-pi-3", "fuzzy-pso-ps")
     gait = short_walk(cycle_time=0.5, stride=0.04, height=0.02)
-    own = {name: value for name, value in design.items() if name not in GAIT_VARIABLE_NAMES}
+    own = {name: value for name, value in design.items() if name not in GAIT_CATALOGUE}
     write_firmware(own, folder, controller="fuzzy-pi-3", scenarios=gait)
     ran = make(folder, "target")
     assert ran.code == 0, ran.out + ran.err

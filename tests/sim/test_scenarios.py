@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from sim.errors import SimulationInputError, UnreachablePose
+from sim.gait_variables import GAIT_VARIABLES, with_gait
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
-from sim.scenario import GAIT_VARIABLES, SCENARIOS, Scenario, find_scenario, with_gait
+from sim.scenario import SCENARIOS, Scenario, find_scenario
 from sim.simulate import check_reach, simulate
 from tests.examples.robots import with_feet
 from tests.examples.walks import (

@@ -109,7 +109,7 @@ def simulate(
 
 def _show(view: SimulationView, *, as_json: bool) -> None:
     from cli.output import print_text, stdout_console
-    from cli.tables import measurements_table, results_table, worth
+    from cli.tables import gait_in_words, measurements_table, results_table, worth
     from sim.outcome import OBJECTIVES
 
     if as_json:
@@ -120,5 +120,7 @@ def _show(view: SimulationView, *, as_json: bool) -> None:
     console.print(measurements_table(view.scenarios))
     console.print(f"fitness {worth(view)}, in {view.precision} precision", markup=False)
     for name, result in view.scenarios.items():
+        if result.gait is not None:
+            console.print(f"{name}: {gait_in_words(result.gait)}", markup=False)
         if result.status != "ok":
             console.print(f"{name}: {result.explanation}", markup=False)

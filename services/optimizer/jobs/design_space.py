@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.search.space import Axis, Space
 from sim.errors import SimulationInputError
-from sim.variables import Variable
+from sim.variables import Variable, VariableCatalogue
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class DesignSpace:
         Raises:
             ValueError: the choice makes no sense; names the variable and the way out.
         """
-        catalogue = {variable.name: variable for variable in (*required, *optional)}
+        catalogue = VariableCatalogue((*required, *optional))
         known = ", ".join(catalogue)
         held = _held(fixed, catalogue)
         if chosen is None:

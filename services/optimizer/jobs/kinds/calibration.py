@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import Final, Literal
 
 import numpy as np
@@ -22,12 +23,13 @@ from sim.case import Case
 from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
+from sim.gait_variables import GAIT_CATALOGUE, orders_searched
 from sim.identification.recorded_walk import Recordings
 from sim.outcome import Objective
 from sim.robot import RobotSource
 from sim.robot.shipped import RobotName
-from sim.scenario import GAIT_VARIABLE_NAMES, Scenario
-from sim.simulate import check_reach
+from sim.scenario import Scenario
+from sim.simulate import check_gait, check_reach
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]
@@ -178,8 +180,7 @@ class CalibrationSpec(Spec):
         """Any of the catalogue."""
         known, chosen = self.catalogue(), self.variables
         if chosen is None:
-            of_robot = robot_variables(self.described)
-            chosen = tuple(v for v in of_robot if v.name not in self.fixed)
+            chosen = tuple(v for v in robot_variables(self.described) if v.name not in self.fixed)
         return DesignSpace.build(required=(), optional=known, chosen=chosen, fixed=self.fixed)
 
     def _check_every_variable_matters(self) -> None:
@@ -221,14 +222,24 @@ class CalibrationSpec(Spec):
                     CONTROLLERS[case.controller].compile(drive)
                 except SimulationInputError as error:
                     raise InvalidRequest(str(error), field=f"walks.{index}.design") from error
-        searched = {v.name: math.nan for v in space.variables if v.name in GAIT_VARIABLE_NAMES}
+        self._check_gaits(space, cases)
+        searched = {v.name: math.nan for v in space.variables if v.name in GAIT_CATALOGUE}
         for index, case in self._walks(cases):
             drive = case.drive(dict(space.fixed) | searched)
             if not any(map(_is_nan, drive.values())):
                 self._check_reach(index, case, drive)
 
+    def _check_gaits(self, space: DesignSpace, cases: tuple[CalibrationWalk, ...]) -> None:
+        """That the robots have the groups of legs that are named, and legs for every gait."""
+        values, orders = next(space.corners()), orders_searched(space.variables)
+        for order, (_, case), robot in product(orders, self._walks(cases), self.described):
+            try:
+                check_gait(case.scenario, case.drive(values | order), robot=robot)
+            except SimulationInputError as error:
+                raise space.refusal(error) from error
+
     def _check_reach(self, index: int, case: CalibrationWalk, drive: dict[str, float]) -> None:
-        gait = {name: value for name, value in drive.items() if name in GAIT_VARIABLE_NAMES}
+        gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
         for robot in self.described:
             try:
                 check_reach(case.scenario, tuple(gait), tuple(gait.values()), robot=robot)

@@ -19,17 +19,12 @@ from services.optimizer.jobs.preference import PreferenceChoice, objective_vecto
 from services.optimizer.search.registry import METHODS
 from sim.case import Case, Walk
 from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import SimulationInputError
+from sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
+from sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from sim.identification.recorded_walk import Recordings
-from sim.scenario import (
-    GAIT_VARIABLE_NAMES,
-    GAIT_VARIABLES,
-    SCENARIOS,
-    ScenarioChoice,
-    with_gait,
-)
+from sim.scenario import SCENARIOS, ScenarioChoice
 from sim.simulate import check_reach
-from sim.variables import Variable
+from sim.variables import Variable, split_name
 from sim.worlds import check_worlds
 from sim.worlds.perturbed_walk import PerturbedWalk
 
@@ -37,6 +32,10 @@ Floats = NDArray[np.float64]
 
 GAIT_OF_CHAPTER_3: Final = ("cycle_time", "stride", "height", "duty_factor", "fir_ms")
 """The gait variables that chapter 3 optimizes together with a controller's (table 3.2)."""
+
+
+_POSTURE: Final = ("hip_height", "radius")
+"""Gait variables of which no end of the bounds is easier to reach than the other."""
 
 
 class JobSpec(WalksSpec):
@@ -127,11 +126,18 @@ class JobSpec(WalksSpec):
             except SimulationInputError as error:
                 raise space.refusal(error) from error
         self._check_worlds()
-        gait = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)
-        for index, scenario in enumerate(scenarios):
+        searches_posture = any(split_name(v.name)[0] in _POSTURE for v in space.variables)
+        gentlest = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)
+        orders = orders_searched(space.variables)
+        for (index, scenario), order in product(enumerate(scenarios), orders):
+            gait = gentlest | order
             try:
                 check_reach(scenario, tuple(gait), tuple(gait.values()), robot=self.robot)
             except SimulationInputError as error:
+                if str(error).partition(":")[0] in space.names:
+                    raise space.refusal(error) from error
+                if isinstance(error, UnreachablePose | BeyondJointLimit) and searches_posture:
+                    continue
                 raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
 
     def _check_worlds(self) -> None:
@@ -237,10 +243,16 @@ class JobSpec(WalksSpec):
 
 
 def _gait_of(design: Mapping[str, float]) -> dict[str, float]:
-    return {name: value for name, value in design.items() if name in GAIT_VARIABLE_NAMES}
+    return {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
 
 
 def _gentlest_gait(searched: Sequence[Variable]) -> dict[str, float]:
     """Of the gaits that may be searched, the one whose feet stray least: short, flat, smooth."""
-    least = {v.name: v.low for v in searched if v.name in ("stride", "height")}
+    least = {v.name: v.low for v in searched if split_name(v.name)[0] in ("stride", "height")}
+    # Any value tells whether the robot has such a group of legs.
+    least |= {
+        v.name: 0.5 * (v.low + v.high)
+        for v in searched
+        if v.name in _POSTURE or (split_name(v.name)[1] and v.name not in least)
+    }
     return least | {v.name: v.high for v in searched if v.name == "fir_ms"}

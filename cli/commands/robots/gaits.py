@@ -1,0 +1,103 @@
+"""`gaitswarm gaits`: gaits by name, and what they plan for a robot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.options import Json, RobotOption
+
+if TYPE_CHECKING:
+    from gaitswarm.gaits import GaitsView, GaitView
+    from sim.scenario import Scenario
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(gaits)
+
+
+def gaits(
+    gait: Annotated[
+        str | None, typer.Argument(metavar="[GAIT]", help="Draw this one [default: list all].")
+    ] = None,
+    *,
+    robot: RobotOption = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Whose posture, stride and sway are planned: name, number or FILE.json [default:"
+            " the first of the robot's own folder, or normal-slow]."
+        ),
+    ] = None,
+    duty_factor: Annotated[
+        float | None,
+        typer.Option(help="Support's share of the cycle [default: the gait's usual one]."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List gaits: order of footfalls, feet that stand, and whether they are statically stable."""
+    from cli.output import print_json, print_text
+    from cli.robots import chosen_robot
+    from gaitswarm.gaits import planned_gaits
+
+    view = planned_gaits(
+        chosen_robot(robot), _scenario(scenario, robot), name=gait, duty_factor=duty_factor
+    )
+    if as_json:
+        print_json(view)
+        return
+    heading = f"{view.robot} in the scenario {view.scenario}\n\n"
+    print_text(heading + (_list(view) if gait is None else diagram(view.items[0])))
+
+
+def _scenario(given: str | None, robot: str | None) -> Scenario:
+    from cli.robots import chosen_scenarios, folder_defaults
+    from services.optimizer.errors import InvalidRequest
+    from sim.scenario import Scenario, find_scenario
+
+    own = [
+        find_scenario(entry) if isinstance(entry, str) else Scenario.model_validate(entry)
+        for entry in ({} if robot is None else folder_defaults(robot)).get("scenarios", [])
+    ]
+    if given is None:
+        return own[0] if own else find_scenario("normal-slow")
+    named = [scenario for scenario in own if scenario.name == given]
+    chosen = named or chosen_scenarios(given)
+    if len(chosen) != 1:
+        raise InvalidRequest("one scenario, not several", field="scenario")
+    return chosen[0]
+
+
+def _list(view: GaitsView) -> str:
+    lines = []
+    for item in view.items:
+        order = sorted(item.lags, key=lambda leg: item.lags[leg])
+        footfalls = ", ".join(f"{leg} {item.lags[leg]:.2f}" for leg in order)
+        said = footfalls or f"for {' or '.join(map(str, item.legs))} legs"
+        lines += [f"{item.name:12} {item.description}", f"{'':12} {said}"]
+        if item.suits:
+            lines.append(f"{'':12} {_plan(item)}")
+    return "\n".join(lines) + "\n"
+
+
+def diagram(item: GaitView) -> str:
+    """A gait's footfall diagram, as people read it.
+
+    Args:
+        item: The gait.
+
+    Returns:
+        Lines: a leg each with one cycle, and what the gait plans.
+    """
+    if not item.suits:
+        return f"{item.name}: for {' or '.join(map(str, item.legs))} legs\n"
+    lines = [f"{leg:14} {columns}" for leg, columns in item.support.items()]
+    return "\n".join([*lines, "", f"{item.name}: {_plan(item)}", ""])
+
+
+def _plan(item: GaitView) -> str:
+    from cli.tables import gait_in_words
+
+    return "out of the legs' reach" if item.planned is None else gait_in_words(item.planned)

@@ -1,0 +1,142 @@
+"""Gaits by name, and what they plan for a robot's legs. No walk is run."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from pydantic import Field
+
+from gaitswarm.errors import simulation_errors
+from gaitswarm.views.base import View
+from gaitswarm.views.simulation import PlannedGaitView
+from services.optimizer.errors import InvalidRequest
+from sim.errors import BeyondJointLimit, UnreachablePose
+from sim.gait.gaits import GAITS, find_gait, suits
+from sim.gait.leg_gaits import leg_gaits, supporting
+from sim.gait.stability import static_stability
+from sim.robot import Robot, RobotChoice, load_robot
+from sim.scenario import GaitName, Scenario
+
+COLUMNS: Final = 40
+"""Moments of a cycle that a diagram shows."""
+
+_MOST_DUTY: Final = 0.95
+
+_OWN: Final = "of the scenario and the robot's description"
+
+
+class GaitView(View):
+    """A gait, and what it plans for the robot in the scenario."""
+
+    name: GaitName = Field(description="Name, as scenarios have it.", examples=["crawl"])
+    description: str = Field(description="What it is, with its source.")
+    legs: list[int] = Field(
+        description="Numbers of legs that it is defined for; any if empty.", examples=[[4]]
+    )
+    suits: bool = Field(description="Whether it is one for the robot's legs.")
+    lags: dict[str, float] = Field(
+        description="By leg the share of the cycle by which its foot comes down after the first"
+        " one's [1]; empty if the gait is none for the robot.",
+        examples=[{"left_rear": 0.0, "left_front": 0.25}],
+    )
+    planned: PlannedGaitView | None = Field(
+        description="Duty factor and static stability in the scenario; null for a gait that is none"
+        " for the robot, or out of its legs' reach."
+    )
+    support: dict[str, str] = Field(
+        description="Footfall diagram: by leg one cycle in 40 columns, # where the foot stands and"
+        " . where it swings."
+    )
+
+
+class GaitsView(View):
+    """Gaits for a robot."""
+
+    robot: str = Field(description="Name of the robot.", examples=["quadruped"])
+    scenario: str = Field(
+        description="Name of the scenario that posture, stride and sway are of.", examples=["crawl"]
+    )
+    items: list[GaitView] = Field(description="The robot's own gait first.")
+
+
+def planned_gaits(
+    source: RobotChoice,
+    scenario: Scenario,
+    *,
+    name: str | None = None,
+    duty_factor: float | None = None,
+) -> GaitsView:
+    """Look at the gaits of a robot.
+
+    Args:
+        source: The robot.
+        scenario: Whose posture, stride, sway and `own` gait are planned.
+        name: Of the only gait to look at; default all.
+        duty_factor: Support's share of the cycle [1]; default: of `own` the scenario's, of others
+            the one that is usual for the gait.
+
+    Returns:
+        The scenario's own gait, then all that have a name.
+
+    Raises:
+        InvalidRequest: There is no such gait, or the robot cannot be read; names the field.
+    """
+    with simulation_errors("robot"):
+        robot = load_robot(source)
+    if name not in (None, "own"):
+        with simulation_errors("gait"):
+            find_gait(str(name))
+    if duty_factor is not None and not 0.1 <= duty_factor <= _MOST_DUTY:
+        raise InvalidRequest(f"{duty_factor:g} is not 0.1 to {_MOST_DUTY}", field="duty-factor")
+    names: tuple[GaitName, ...] = ("own", *GAITS)
+    items = [
+        _view(robot, scenario, gait, duty_factor) for gait in names if name is None or gait == name
+    ]
+    return GaitsView(robot=robot.description.name, scenario=scenario.name, items=items)
+
+
+def _view(robot: Robot, scenario: Scenario, name: GaitName, duty: float | None) -> GaitView:
+    known = GAITS.get(name)
+    fits = known is None or suits(known, robot.legs)
+    if known is not None and duty is None:
+        duty = min(_MOST_DUTY, known.duty_factor(len(robot.legs)))
+    walked = _walked(scenario, name, duty)
+    with simulation_errors("scenario"):
+        of_legs = leg_gaits(robot, walked) if fits else ()
+        planned = _planned(robot, walked) if fits else None
+    stands = supporting(of_legs, (np.arange(COLUMNS) + 0.5) / COLUMNS)
+    legs_named = [leg.name for leg in robot.legs] if fits else []
+    return GaitView(
+        name=name,
+        description=_OWN if known is None else known.description,
+        legs=[] if known is None else list(known.legs),
+        suits=fits,
+        lags={
+            leg: round(-gait.phase % 1.0, 6) % 1.0
+            for leg, gait in zip(legs_named, of_legs, strict=True)
+        },
+        planned=planned,
+        support={
+            leg: "".join("#" if stood else "." for stood in stands[:, k])
+            for k, leg in enumerate(legs_named)
+        },
+    )
+
+
+def _walked(scenario: Scenario, name: GaitName, duty: float | None) -> Scenario:
+    """The scenario in a gait; in a named one with nothing but its posture, stride and sway."""
+    changes: dict[str, object] = {}
+    if duty is not None:
+        changes |= {"duty_factor": duty, "duty_phase": "support"}
+    if name != "own":
+        changes |= {"gait": name, "phases": None, "start_phase": 0.0, "by_group": None}
+    return scenario.model_copy(update=changes)
+
+
+def _planned(robot: Robot, scenario: Scenario) -> PlannedGaitView | None:
+    """None where a leg does not reach its path."""
+    try:
+        return PlannedGaitView.from_stability(static_stability(robot, scenario))
+    except (UnreachablePose, BeyondJointLimit):
+        return None

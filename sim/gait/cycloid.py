@@ -1,0 +1,36 @@
+"""The foot's closed curve: a straight support phase and a composite cycloid as swing.
+
+Sakakibara, Kan, Hosoda, Hattori and Fujie, "Foot trajectory for a quadruped walking machine", IROS
+1990: no velocity and no acceleration where the foot leaves the ground and comes down.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def cycloid(
+    phase: Floats, *, stride: float, height: float, duty_factor: float
+) -> tuple[Floats, Floats]:
+    """Foot position in its leg's frame.
+
+    Args:
+        phase: Share of the cycle since the start of support, in [0, 1), (...).
+        stride: Length of the support [m].
+        height: Of the swing [m].
+        duty_factor: Support's share of the cycle [1].
+
+    Returns:
+        Forward (...) from +stride/2 to -stride/2 and back, and lift (...) >= 0 [m].
+    """
+    supporting = phase < duty_factor
+    support = phase / duty_factor
+    swing = np.clip((phase - duty_factor) / (1.0 - duty_factor), 0.0, 1.0)
+    travelled = swing - np.sin(2.0 * np.pi * swing) / (2.0 * np.pi)
+    half = 1.0 - np.abs(1.0 - 2.0 * swing)  # up to 1 in mid-swing
+    lifted = half - np.sin(2.0 * np.pi * half) / (2.0 * np.pi)
+    forward = np.where(supporting, 0.5 - support, travelled - 0.5) * stride
+    return forward, np.where(supporting, 0.0, np.maximum(0.0, lifted)) * height

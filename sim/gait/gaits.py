@@ -1,0 +1,238 @@
+"""Gaits by name: when each leg comes down, for the legs that a robot has.
+
+A gait is the order of footfalls: by leg the *lag*, the share of the cycle by which its foot comes
+down after the first one (Hildebrand 1965, "Symmetrical gaits of horses", Science 150; 1989, "The
+quadrupedal gaits of vertebrates", BioScience 39). Which feet stand at a moment depends on the duty
+factor beside it, which is the scenario's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from sim.errors import SimulationInputError
+from sim.robot import Robot
+from sim.robot.leg_groups import rows_of
+from sim.robot.legs import LegKinematics
+from sim.scenario import GaitName, Scenario
+
+Rows = tuple[Sequence[int], Sequence[int]]
+"""Indices of the legs on the left and on the right, from the front."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gait:
+    """An order of footfalls.
+
+    Attributes:
+        name: as scenarios have it.
+        description: what it is, with its source.
+        legs: numbers of legs that it is defined for, the same on both sides; any if empty.
+        lags: from the legs' rows to the lag of each, by its index.
+        duty_factor: from the number of legs to the share of the support at which a foot leaves the
+            ground as soon as another one has come down [1].
+    """
+
+    name: GaitName
+    description: str
+    legs: tuple[int, ...]
+    lags: Callable[[Rows], Mapping[int, float]]
+    duty_factor: Callable[[int], float]
+
+    @property
+    def legs_in_words(self) -> str:
+        """Numbers of legs that it is defined for."""
+        return " or ".join(map(str, self.legs)) if self.legs else "any"
+
+
+def _places(rows: Rows) -> Iterator[tuple[int, int, int, int]]:
+    """Leg, its side (0 left, 1 right), its place from the front, and the legs of its side."""
+    for side, row in enumerate(rows):
+        for place, leg in enumerate(row):
+            yield leg, side, place, len(row)
+
+
+def _alternating(rows: Rows) -> dict[int, float]:
+    return {leg: 0.5 * ((place + side) % 2) for leg, side, place, _ in _places(rows)}
+
+
+def _wave(rows: Rows) -> dict[int, float]:
+    left, right = rows
+    order = [*reversed(left), *reversed(right)]
+    return {leg: k / len(order) for k, leg in enumerate(order)}
+
+
+def _ripple(rows: Rows) -> dict[int, float]:
+    return {
+        leg: (0.5 * side + (row - 1 - place) / row) % 1.0 for leg, side, place, row in _places(rows)
+    }
+
+
+def _pace(rows: Rows) -> dict[int, float]:
+    return {leg: 0.5 * side for leg, side, _, _ in _places(rows)}
+
+
+def _bound(rows: Rows) -> dict[int, float]:
+    return {leg: 0.5 * (row - 1 - place) for leg, _, place, row in _places(rows)}
+
+
+def _half(legs: int) -> float:  # noqa: ARG001 - of any number of legs
+    return 0.5
+
+
+def _one_in_the_air(legs: int) -> float:
+    return 1.0 - 1.0 / legs
+
+
+def _two_in_the_air(legs: int) -> float:
+    return 1.0 - 2.0 / legs
+
+
+_GAITS: Final = (
+    Gait(
+        "alternating",
+        "legs that are neighbours, along a side or across the body, half a cycle apart: the trot of"
+        " four legs, the tripod of six",
+        (),
+        _alternating,
+        _half,
+    ),
+    Gait(
+        "tripod",
+        "front and hind leg of a side with the middle leg of the other, half a cycle apart"
+        " (Wilson 1966)",
+        (6,),
+        _alternating,
+        _half,
+    ),
+    Gait(
+        "wave",
+        "one leg after the other from hind to front, the left side before the right (Wilson 1966;"
+        " Song and Waldron 1987)",
+        (),
+        _wave,
+        _one_in_the_air,
+    ),
+    Gait(
+        "ripple",
+        "a wave from hind to front along each side, half a cycle apart: twice as fast as the wave"
+        " gait (Wilson 1966)",
+        (6, 8, 10, 12),
+        _ripple,
+        _two_in_the_air,
+    ),
+    Gait("trot", "diagonal pairs half a cycle apart (Hildebrand 1965)", (4,), _alternating, _half),
+    Gait(
+        "pace",
+        "the legs of a side together, the sides half a cycle apart (Hildebrand 1965)",
+        (4,),
+        _pace,
+        _half,
+    ),
+    Gait(
+        "bound",
+        "the hind legs together, the front legs half a cycle later (Hildebrand 1989)",
+        (4,),
+        _bound,
+        _half,
+    ),
+    Gait(
+        "crawl",
+        "left hind, left front, right hind, right front, a quarter of a cycle apart: the lateral"
+        " sequence, of all orders the most stable (McGhee and Frank 1968)",
+        (4,),
+        _wave,
+        _one_in_the_air,
+    ),
+)
+
+GAITS: Final[Mapping[GaitName, Gait]] = MappingProxyType({gait.name: gait for gait in _GAITS})
+"""All but `own`, which a robot's description has."""
+
+
+def find_gait(name: str) -> Gait:
+    """A gait that has a name.
+
+    Args:
+        name: One of `GAITS`.
+
+    Returns:
+        The gait.
+
+    Raises:
+        SimulationInputError: There is none; names those that there are.
+    """
+    for gait in _GAITS:
+        if gait.name == name:
+            return gait
+    raise SimulationInputError(f"gait: unknown {name!r}; known are {', '.join(GAITS)}")
+
+
+def suits(gait: Gait, legs: Sequence[LegKinematics]) -> bool:
+    """Whether a gait is defined for a robot's legs.
+
+    Args:
+        gait: The gait.
+        legs: Of the robot.
+
+    Returns:
+        Whether it is.
+    """
+    left, right = rows_of(legs)
+    return not gait.legs or (len(legs) in gait.legs and len(left) == len(right))
+
+
+def lags_of(gait: Gait, legs: Sequence[LegKinematics]) -> tuple[float, ...]:
+    """When each leg of a robot comes down.
+
+    Args:
+        gait: The gait.
+        legs: Of the robot.
+
+    Returns:
+        By leg the share of the cycle after the first footfall, 0 <= lag < 1.
+
+    Raises:
+        SimulationInputError: The gait is not defined for so many legs; names those that are.
+    """
+    if not suits(gait, legs):
+        fitting = ", ".join(name for name, other in GAITS.items() if suits(other, legs))
+        left, right = rows_of(legs)
+        raise SimulationInputError(
+            f"gait: {gait.name} is for {gait.legs_in_words} legs, half of them on each side, not"
+            f" for {len(left)} on the left and {len(right)} on the right; for these there are"
+            f" {fitting}, or phases of your own"
+        )
+    lags = gait.lags(rows_of(legs))
+    return tuple(lags[leg] for leg in range(len(legs)))
+
+
+def phases_of(robot: Robot, scenario: Scenario) -> tuple[float, ...]:
+    """Where each leg is in its cycle when the gait begins, before `start_phase`.
+
+    Args:
+        robot: Whose legs are planned for.
+        scenario: The walk.
+
+    Returns:
+        By leg the share of the cycle since the start of its support, 0 <= phase < 1.
+
+    Raises:
+        SimulationInputError: The gait is not defined for the robot's number of legs, or phases are
+            given for other legs than the robot's; names the field.
+    """
+    if scenario.phases is not None:
+        names = [leg.name for leg in robot.legs]
+        if scenario.phases.keys() != set(names):
+            raise SimulationInputError(
+                f"phases: of {', '.join(scenario.phases)}; {robot.description.name} has the legs"
+                f" {', '.join(names)}, each of which needs one"
+            )
+        return tuple(scenario.phases[name] for name in names)
+    if scenario.gait == "own":
+        return tuple(leg.phase for leg in robot.description.legs)
+    # Whoever comes down later is not as far in its cycle.
+    return tuple((1.0 - lag) % 1.0 for lag in lags_of(GAITS[scenario.gait], robot.legs))

@@ -1,0 +1,129 @@
+"""Static stability of a planned gait: whether its feet hold the centre of mass at every moment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.gait.leg_gaits import leg_gaits, supporting
+from sim.gait.trajectory import desired_angles, require_reachable
+from sim.robot import Robot
+from sim.robot.posture import feet_and_centre_of_mass
+from sim.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+_MOMENTS: Final = 240
+"""Of a cycle that are looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stability:
+    """How well a gait's feet hold the body, were it to stand still at any moment.
+
+    Attributes:
+        margin: least distance of the centre of mass, along gravity, from the edge of the polygon of
+            the feet that stand [m]; negative outside of it, as wherever fewer than three stand. The
+            static stability margin of McGhee and Frank (1968), Mathematical Biosciences 3. None
+            while no foot stands at some moment.
+        fewest_feet: that stand at any moment.
+        duty_factor: mean of the legs' shares of support [1].
+    """
+
+    margin: float | None
+    fewest_feet: int
+    duty_factor: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether the gait is statically stable."""
+        return self.margin is not None and self.margin > 0.0
+
+
+@lru_cache(maxsize=64)
+def static_stability(robot: Robot, scenario: Scenario) -> Stability:
+    """Look at all moments of a cycle as it is planned, without any simulation.
+
+    Args:
+        robot: Whose legs are planned for.
+        scenario: Gait, posture, load and slope.
+
+    Returns:
+        The least stable of them.
+
+    Raises:
+        UnreachablePose: A foot's target lies outside its leg's reach.
+        BeyondJointLimit: A joint would leave its limits.
+        SimulationInputError: The gait is not one for the robot's legs; names the field.
+    """
+    require_reachable(robot, scenario)
+    plan = scenario.model_copy(update={"cycles": 1.0, "fir_ms": 0, "trajectory_rate": 500.0})
+    angles = desired_angles(robot, plan).angles
+    ticks = np.unique(np.linspace(0, len(angles) - 1, _MOMENTS).astype(np.intp))
+    gaits = leg_gaits(robot, scenario)
+    cycles = np.asarray(ticks * CONTROL_PERIOD / scenario.cycle_time, dtype=np.float64)
+    stands = supporting(gaits, cycles)
+    feet, centre = feet_and_centre_of_mass(robot, angles[ticks], scenario.load)
+    duty = float(np.mean([gait.support_share for gait in gaits]))
+    found = Stability(None, int(stands.sum(axis=1).min()), duty)
+    if not found.fewest_feet:
+        return found
+    ground = np.min(np.where(stands, feet[:, :, 2], np.inf), axis=1)
+    downhill = math.radians(scenario.slope_direction) + math.pi
+    lean = (centre[:, 2] - ground) * math.tan(math.radians(scenario.slope))
+    below = centre[:, :2] + lean[:, None] * np.array([math.cos(downhill), math.sin(downhill)])
+    margins = [
+        support_margin(points[standing, :2], at)
+        for points, standing, at in zip(feet, stands, below, strict=True)
+    ]
+    return replace(found, margin=min(margins))
+
+
+def support_margin(feet: Floats, point: Floats) -> float:
+    """Distance of a point from the edge of the feet's convex hull.
+
+    Args:
+        feet: (n, 2) [m], one at least.
+        point: (2,) [m].
+
+    Returns:
+        Positive inside of the hull, negative outside, and where the feet are on one line [m].
+    """
+    hull = _convex_hull([(x, y) for x, y in feet.tolist()])
+    x, y = point.tolist()
+    distances, inside = [], len(hull) > 2
+    for (ax, ay), (bx, by) in zip(hull, hull[1:] + hull[:1], strict=True):
+        along = (bx - ax, by - ay)
+        square = along[0] ** 2 + along[1] ** 2
+        share = ((x - ax) * along[0] + (y - ay) * along[1]) / square if square else 0.0
+        share = min(1.0, max(0.0, share))
+        distances.append(math.hypot(x - ax - share * along[0], y - ay - share * along[1]))
+        inside = inside and along[0] * (y - ay) - along[1] * (x - ax) > 0.0
+    return min(distances) if inside else -min(distances)
+
+
+def _convex_hull(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Its corners, counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(points))
+    if len(ordered) < 3:
+        return ordered
+    halves = []
+    for direction in (ordered, ordered[::-1]):
+        half: list[tuple[float, float]] = []
+        for x, y in direction:
+            while len(half) > 1 and _turn(half[-2], half[-1], (x, y)) <= 0.0:
+                half.pop()
+            half.append((x, y))
+        halves.append(half[:-1])
+    return halves[0] + halves[1]
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Positive where the way from a over b to c turns left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -86,7 +86,7 @@ export const CATALOGUE = {
       variables: [variable('P', 0, 1), variable('FOMF', 1, 3, 'integer')],
       conventions: [{ ...variable('integral_span', 0.5, 4), default: 2 }],
       gait_variables: [
-        variable('stride', 0.1, 0.2),
+        { ...variable('stride', 0.1, 0.2), by_leg_group: true },
         { ...variable('window', 0, 2, 'categorical'), choices: ['flat', 'hamming', 'hann'] },
       ],
       published: { A: { P: 0.45, FOMF: 2 } },

@@ -2,6 +2,7 @@ import { describe, expect, test } from 'vitest'
 import type { JobSpec } from '../src/api/types'
 import { around } from '../src/submission/around-design'
 import { errorsByField, specOf, withKinds } from '../src/submission/build-spec'
+import { ofLegGroups } from '../src/submission/catalogue'
 import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
 import { optimizerDraft, settingsOf, withPreset } from '../src/submission/optimizer'
 import { boundsInWords, fieldsOf } from '../src/submission/schema-fields'
@@ -61,6 +62,32 @@ describe('a draft', () => {
     })
     expect(spec.fixed).toEqual({ P: 0.5 })
     expect(spec.variables).toContainEqual({ name: 'stride', low: 0.12, high: 0.2 })
+  })
+
+  test('keeps variables of leg groups, and offers them for those variables alone', () => {
+    const stride = { name: 'stride[front]', low: 0.1, high: 0.15 }
+    const cloned = draftOf(
+      {
+        variables: [stride],
+        fixed: { P: 0.4, FOMF: 2, 'stride[hind]': 0.12 },
+      } as unknown as JobSpec,
+      CATALOGUE,
+    )
+    const spec = specOf(cloned)
+    expect(spec.variables).toContainEqual(stride)
+    expect(spec.fixed).toMatchObject({ 'stride[hind]': 0.12 })
+    const gait = CATALOGUE.controllers[0].gait_variables
+    const names = ['stride[left_rear]', 'stride', 'window[front]', 'stride[]', 'P[front]']
+    expect(ofLegGroups(gait, names).map(({ name }) => name)).toEqual(['stride[left_rear]'])
+  })
+
+  test('sends objects of a scenario of one’s own as they are written', () => {
+    const [own] = withOwnScenario.own
+    const written = { ...own, by_group: '{"stride[front]": 0.05}', phases: '{"a": ' }
+    const [, sent] = specOf({ ...withOwnScenario, own: [written] }).scenarios ?? []
+    expect(sent).toMatchObject({ by_group: { 'stride[front]': 0.05 }, phases: '{"a": ' })
+    const again = draftOf({ scenarios: [sent] } as unknown as JobSpec, CATALOGUE)
+    expect(again.own[0].by_group).toBe('{"stride[front]":0.05}')
   })
 
   test('sends a categorical variable by the names of its choices', () => {

@@ -5,7 +5,7 @@ import { type Column, Table } from '../components/table'
 import { formatExact, writtenUnit } from '../format/number'
 import { formatExactValue, type Value } from '../format/value'
 import { inWords } from '../format/words'
-import { variablesOf } from '../submission/catalogue'
+import { ofLegGroups, variablesOf } from '../submission/catalogue'
 import type { ResolvedDesign } from '../walk/resolve-design'
 
 interface Row {
@@ -15,7 +15,8 @@ interface Row {
 
 export function DesignCard({ design }: { design: ResolvedDesign }) {
   const { controller } = design
-  const rows = variablesOf(controller)
+  const known = variablesOf(controller)
+  const rows = [...known, ...ofLegGroups(known, Object.keys(design.design))]
     .filter(({ name }) => name in design.design)
     .map((variable): Row => ({ variable, value: design.design[variable.name] }))
   const columns: Column<Row>[] = [

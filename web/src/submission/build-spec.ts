@@ -120,10 +120,20 @@ function scenarioOf(own: Readonly<Record<string, string>>): Scenario {
   return { name, ...numbers(rest) } as unknown as Scenario
 }
 
-/** Numbers where they are, text elsewhere; what was left empty is left out. */
-function numbers(values: Readonly<Record<string, string>>): Record<string, number | string> {
+/** Numbers and objects where they are, text elsewhere; what was left empty is left out. */
+function numbers(values: Readonly<Record<string, string>>): Record<string, unknown> {
   const given = Object.entries(values).filter(([, value]) => value.trim() !== '')
-  return Object.fromEntries(given.map(([name, value]) => [name, number(value)]))
+  return Object.fromEntries(given.map(([name, value]) => [name, object(value) ?? number(value)]))
+}
+
+/** The object that a text is in JSON, if it is one. */
+function object(text: string): unknown {
+  if (!text.trim().startsWith('{')) return null
+  try {
+    return JSON.parse(text)
+  } catch {
+    return null
+  }
 }
 
 function number(text: string): number | string {

@@ -31,6 +31,15 @@ export function variablesOf(controller: Controller | undefined): readonly Variab
   return [...controller.variables, ...controller.conventions, ...controller.gait_variables]
 }
 
+/** Those of the names that are variables of leg groups, as `stride[front]`. */
+export function ofLegGroups(known: readonly Variable[], names: Iterable<string>): Variable[] {
+  return [...names].flatMap((name) => {
+    const base = /^(\w+)\[[^[\]]+\]$/.exec(name)?.[1]
+    const whole = known.find((variable) => variable.name === base && variable.by_leg_group)
+    return whole ? [{ ...whole, name }] : []
+  })
+}
+
 export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
   const [controllers, robots, scenarios, preferences, optimizers, document] = await Promise.all([
     get('/v1/controllers', { signal }),

@@ -1,7 +1,7 @@
 /** A job as it stands in the form: numbers are still text, choices not yet a spec. */
 
 import type { JobSpec, Scenario, Variable } from '../api/types'
-import { type Catalogue, variablesOf } from './catalogue'
+import { type Catalogue, ofLegGroups, variablesOf } from './catalogue'
 import { type OptimizerDraft, optimizerDraft } from './optimizer'
 import type { SchemaField } from './schema-fields'
 import { NO_START, type StartDraft, startDraft } from './start'
@@ -99,20 +99,27 @@ export function defaultVariables(
   const published = found.published.A ?? Object.values(found.published)[0] ?? {}
   const entry = (variable: Variable, mode: VariableMode): [string, VariableDraft] => [
     variable.name,
-    {
-      mode,
-      low: text(variable.low),
-      high: text(variable.high),
-      value:
-        shown(variable, published[variable.name] ?? variable.default ?? undefined) ??
-        text(middle(variable)),
-      choices: variable.choices ?? [],
-    },
+    variableDraft(variable, mode, published[variable.name]),
   ]
   return Object.fromEntries([
     ...found.variables.map((variable) => entry(variable, 'searched')),
     ...[...found.conventions, ...found.gait_variables].map((v) => entry(v, 'default')),
   ])
+}
+
+/** A variable within the catalogue's bounds. value: that it has where it is fixed, if one is known. */
+export function variableDraft(
+  variable: Variable,
+  mode: VariableMode,
+  value?: number | string,
+): VariableDraft {
+  return {
+    mode,
+    low: text(variable.low),
+    high: text(variable.high),
+    value: shown(variable, value ?? variable.default ?? undefined) ?? text(middle(variable)),
+    choices: variable.choices ?? [],
+  }
 }
 
 /** The form of a spec that was submitted before; presets are recognized by their values. */
@@ -194,7 +201,13 @@ function variableDrafts(
 ): Readonly<Record<string, VariableDraft>> {
   const drafts = { ...defaultVariables(catalogue, controller) }
   const known = catalogue.controllers.find(({ name }) => name === controller)
-  const variables = new Map(variablesOf(known).map((v) => [v.name, v]))
+  const own = variablesOf(known)
+  const named = (spec.variables ?? []).map((entry) =>
+    typeof entry === 'string' ? entry : entry.name,
+  )
+  const groups = ofLegGroups(own, [...named, ...Object.keys(spec.fixed ?? {})])
+  for (const variable of groups) drafts[variable.name] = variableDraft(variable, 'default')
+  const variables = new Map([...own, ...groups].map((v) => [v.name, v]))
   if (spec.variables) {
     for (const entry of spec.variables) {
       const name = typeof entry === 'string' ? entry : entry.name
@@ -231,7 +244,7 @@ function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
 function presetOf(scenario: Scenario, catalogue: Catalogue): string | null {
   const fields = [...catalogue.fields.scenario.keys()] as (keyof Scenario)[]
   const same = catalogue.scenarios.find((preset) =>
-    fields.every((field) => preset[field] === scenario[field]),
+    fields.every((field) => text(preset[field]) === text(scenario[field])),
   )
   return same?.name ?? null
 }
@@ -265,5 +278,6 @@ function names(values: unknown): readonly string[] {
 }
 
 function text(value: unknown): string {
-  return value === undefined || value === null ? '' : String(value)
+  if (value === undefined || value === null) return ''
+  return typeof value === 'object' ? JSON.stringify(value) : String(value)
 }

@@ -121,7 +121,7 @@ function PresetTable({
                 const shown = value(scenario, field)
                 return (
                   <td key={field.name} class="numeric">
-                    {typeof shown === 'number' ? formatExact(shown) : inWords(shown ?? '')}
+                    {typeof shown === 'number' ? formatExact(shown) : inWords(String(shown ?? ''))}
                   </td>
                 )
               })}

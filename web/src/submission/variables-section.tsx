@@ -1,9 +1,11 @@
 /** The controller, and what becomes of each of its variables and of the gait's. */
 
+import { useState } from 'preact/hooks'
 import type { Variable } from '../api/types'
 import { inWords } from '../format/words'
 import { errorsUnder, type FieldErrors } from './build-spec'
-import { defaultVariables, type VariableDraft, type VariableMode } from './draft'
+import { ofLegGroups } from './catalogue'
+import { defaultVariables, type VariableDraft, type VariableMode, variableDraft } from './draft'
 import { ChoiceField, Problems } from './number-field'
 import type { SectionProps } from './section'
 
@@ -13,6 +15,8 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
     onChange({
       variables: { ...draft.variables, [name]: { ...draft.variables[name], ...changes } },
     })
+  const gait = controller?.gait_variables ?? []
+  const groups = ofLegGroups(gait, Object.keys(draft.variables))
   const table = (title: string, variables: readonly Variable[], modes: readonly VariableMode[]) => (
     <VariableTable
       title={title}
@@ -51,14 +55,64 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
                 {table('Convention', controller.conventions, ['default', 'searched', 'fixed'])}
               </details>
             )}
-            <details open={anySet(controller.gait_variables, draft.variables)}>
+            <details open={anySet([...gait, ...groups], draft.variables)}>
               <summary>Gait: searched or fixed in place of the scenarios’ own values</summary>
-              {table('Gait', controller.gait_variables, ['default', 'searched', 'fixed'])}
+              {table('Gait', [...gait, ...groups], ['default', 'searched', 'fixed'])}
+              <AddGroup
+                variables={gait.filter((variable) => variable.by_leg_group)}
+                onAdd={(variable) =>
+                  onChange({
+                    variables: {
+                      ...draft.variables,
+                      [variable.name]: variableDraft(variable, 'searched'),
+                    },
+                  })
+                }
+              />
             </details>
           </>
         )}
       </div>
     </section>
+  )
+}
+
+/** A gait parameter for some of the legs: `stride[front]`. */
+function AddGroup({
+  variables,
+  onAdd,
+}: {
+  variables: readonly Variable[]
+  onAdd: (variable: Variable) => void
+}) {
+  const [name, setName] = useState(variables[0]?.name ?? '')
+  const [group, setGroup] = useState('front')
+  const [added] = ofLegGroups(variables, [`${name}[${group.trim()}]`])
+  return (
+    <div class="row">
+      <label class="row">
+        <span class="label">Add</span>
+        <select value={name} onChange={(event) => setName(event.currentTarget.value)}>
+          {variables.map((variable) => (
+            <option key={variable.name} value={variable.name}>
+              {inWords(variable.name)}
+            </option>
+          ))}
+        </select>
+      </label>
+      <label class="row">
+        <span class="label">of the legs</span>
+        <input
+          class="short"
+          value={group}
+          title="front, middle, hind, left, right, a leg’s name, or a group of the robot’s own"
+          onInput={(event) => setGroup(event.currentTarget.value)}
+        />
+      </label>
+      <button type="button" class="compact" disabled={!added} onClick={() => added && onAdd(added)}>
+        Add
+      </button>
+    </div>
   )
 }
 

@@ -65,16 +65,20 @@ def _text(path: Path) -> str:
         raise InvalidRequest(not_utf8(path, error), field="robot") from error
 
 
-def folder_defaults(text: str) -> dict[str, Any]:
+def folder_defaults(text: str, controller: object = None) -> dict[str, Any]:
     """What the folder of a robot says that its jobs have; nothing for other robots.
 
-    Raises InvalidRequest.
+    controller: of the job, if it names one; variables of another one are left out. Raises
+    InvalidRequest.
     """
     if text.lstrip().startswith("{") or not Path(text).is_dir():
         return {}
     from gaitswarm.robots import job_defaults
 
-    return job_defaults(text)
+    defaults = job_defaults(text)
+    if controller in (None, defaults.get("controller")):
+        return defaults
+    return {k: value for k, value in defaults.items() if k not in ("variables", "fixed")}
 
 
 def scenario_data(text: str) -> list[str | dict[str, Any]]:

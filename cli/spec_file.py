@@ -78,7 +78,8 @@ def build_spec(options: SpecOptions) -> AnySpec:
     """
     data = read_json_object(options.spec, "spec") if options.spec is not None else {}
     if options.robot is not None and data.get("kind", "tuning") == "tuning":
-        data = folder_defaults(options.robot) | data
+        controller = options.given.get("controller", data.get("controller"))
+        data = folder_defaults(options.robot, controller) | data
     chosen = {name: value for name, value in options.given.items() if name != "spec"}
     if options.scenarios is not None:
         chosen["scenarios"] = scenario_data(options.scenarios)

@@ -20,7 +20,7 @@ from sim.errors import RobotFileError
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.outcome import Status
 from sim.proposal.document import Proposal, propose_robot
-from sim.proposal.drive import GRAVITY
+from sim.proposal.drive import GRAVITY, ActuatorChoice
 from sim.proposal.legs import reach_below
 from sim.robot import Robot, RobotFiles, load_robot, parse_robot
 from sim.robot.bounds import LONGEST_URDF
@@ -38,7 +38,11 @@ JOB_FILE: Final = "job.json"
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
 _SECONDS: Final = 1.0
-_STIFF: Final = {"P": 1.0}
+_STIFF: Final = 5.0
+"""Stiffness with which torque-controlled joints are held, per torque limit [1/rad]."""
+
+_DAMPED: Final = 0.02
+"""Their damping, per stiffness [s]."""
 
 _OFF: Final = 0.02
 """Share of the weight by which standing forces may be off before that is a warning."""
@@ -58,7 +62,11 @@ class MadeRobot:
 
 
 def init_robot(
-    urdf: str | os.PathLike[str], output: str | os.PathLike[str], *, name: str | None = None
+    urdf: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    actuator: ActuatorChoice = "auto",
 ) -> MadeRobot:
     """Make a robot's folder from a URDF: legs, stance, actuators and two walks are chosen.
 
@@ -66,6 +74,8 @@ def init_robot(
         urdf: File of the robot.
         output: Folder to write, new or empty; as a whole or not at all.
         name: Of the robot; default the file's.
+        actuator: Kind of its actuators: DC motors, torque-controlled ones, or those that the limits
+            of the URDF's joints speak for.
 
     Returns:
         What was made.
@@ -86,7 +96,7 @@ def init_robot(
     chosen = source.stem if name is None else name
     _check_name(chosen)
     try:
-        proposal = propose_robot(text, chosen)
+        proposal = propose_robot(text, chosen, actuator)
         robot = parse_robot(proposal.toml, proposal.urdf)
         for scenario in proposal.job["scenarios"]:
             require_reachable(robot, Scenario.model_validate(scenario))
@@ -132,9 +142,9 @@ def check_robot(files: RobotFiles) -> RobotCheckView:
         robot = load_robot(files)
         scenario = standing_scenario(robot)
         require_reachable(robot, scenario)
-        stood = simulate(
-            scenario, "p", list(_STIFF), np.array([list(_STIFF.values())]), robot=robot, log=True
-        )
+        controller, design = _stiff_drive(robot)
+        values = np.array([list(design.values())])
+        stood = simulate(scenario, controller, list(design), values, robot=robot, log=True)
     standing, warnings = _standing(robot, stood)
     angles = desired_angles(robot, scenario).angles[0]
     points = leg_points(robot, angles)
@@ -189,6 +199,14 @@ def standing_scenario(robot: Robot) -> Scenario:
         stride=1e-9,
         height=0.0,
     )
+
+
+def _stiff_drive(robot: Robot) -> tuple[str, dict[str, float]]:
+    """A controller and its design that hold all joints."""
+    if not robot.is_torque_controlled:
+        return "p", {"P": 1.0}
+    stiffness = _STIFF * float(np.median(robot.actuators().torque_limit))
+    return "joint-pd", {"Kp": stiffness, "Kd": _DAMPED * stiffness, "feed_forward": 0.0}
 
 
 def _standing(robot: Robot, stood: Simulation) -> tuple[StandingView, list[str]]:

@@ -15,9 +15,11 @@ from sim.compiler.toolchain import find_compiler, without_compiler
 from sim.controllers import ControlLaw
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
+from sim.gait.feed_forward import carrying_torques
 from sim.gait.trajectory import Trajectory, desired_angles
 from sim.kernel.native import native_kernel
 from sim.kernel.parameters import (
+    GRAVITY,
     SHOVE_DURATION,
     gravity_on,
     internal_state_size,
@@ -127,7 +129,8 @@ def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Codin
     """How a control tick is divided.
 
     Args:
-        robot: With backlash, or with friction that jumps, it is simulated at a higher rate.
+        robot: With backlash, or with friction that jumps, it is simulated at a higher rate; at a
+            multiple of its actuators' inner rate.
         physics_rate: Physics steps a second [Hz].
 
     Returns:
@@ -137,6 +140,8 @@ def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Codin
         physics_rate = max(physics_rate, BACKLASH_PHYSICS_RATE)
     if robot.description.contact_law == "karnopp":
         physics_rate = max(physics_rate, KARNOPP_PHYSICS_RATE)
+    inner_rate = robot.description.inner_rate
+    physics_rate = inner_rate * math.ceil(physics_rate / inner_rate)
     substeps = round(physics_rate * CONTROL_PERIOD)
     refinement = max(1, math.ceil(LANDING_RATE / physics_rate))
     return Coding.of(robot, substeps, refinement), 1.0 / physics_rate
@@ -202,6 +207,10 @@ def plan_walk(
     displaced = noise is not None and noise.kind == "angle"
     start = np.concatenate([base, joints])
     parameters = pack_parameters(robot, scenario, timestep, start=joints, displaced=displaced)
+    carrying = None
+    if robot.is_torque_controlled:
+        carrying = carrying_torques(robot, trajectory, GRAVITY)
+        carrying.flags.writeable = False
     for shared in (start, internal_state, parameters, codes):
         shared.flags.writeable = False
     return partial(
@@ -217,6 +226,7 @@ def plan_walk(
         current_smoothing=current_smoothing(robot.description.sensors.current_filter, timestep),
         shove_ticks=shove_ticks,
         disturbance=None if noise is None else noise.samples(ticks, n_joints),
+        feed_forward=carrying,
     )
 
 

@@ -28,6 +28,7 @@ from sim.gait.leg_gaits import LegGait, leg_gaits
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.kernel.batch import Walking, WantedWalk, walk_together
+from sim.kernel.gains import NO_JOINT_PD
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Precision, WalkSetup
 from sim.noise import LinkNoise
@@ -266,6 +267,20 @@ def check_gait(
     """
     gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     return leg_gaits(load_robot(robot), with_gait(scenario, gait))
+
+
+def check_drives(law: ControlLaw, robot: RobotChoice) -> None:
+    """Check that a control law can drive a robot's actuators.
+
+    Args:
+        law: Of any design of a controller.
+        robot: The robot that is to walk.
+
+    Raises:
+        SimulationInputError: The law has a joint PD, and the robot has DC motors.
+    """
+    if law.joint_pd is not None and not load_robot(robot).is_torque_controlled:
+        raise SimulationInputError(NO_JOINT_PD)
 
 
 def prepare(

@@ -7,6 +7,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from gaitswarm.errors import simulation_errors
 from services.optimizer.errors import InvalidRequest
 from sim.catalogue import check_design, design_numbers
 from sim.controllers import CONTROLLERS, ControllerName
@@ -14,7 +15,7 @@ from sim.errors import SimulationInputError
 from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.robot import DEFAULT_ROBOT, RobotSource
 from sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
-from sim.simulate import check_reach
+from sim.simulate import check_drives, check_reach
 from sim.variables import VariableName, VariableValue
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
@@ -66,15 +67,17 @@ class DesignRequest(BaseModel):
         )
 
     def check_design(self) -> None:
-        """Check that the controller can have the design's values.
+        """Check that the controller can have the design's values, and drives the robot.
 
         Raises:
-            InvalidRequest: It cannot; its field is `design`.
+            InvalidRequest: It cannot; its field is `design`, or `controller`.
         """
         try:
-            CONTROLLERS[self.controller].compile(self.numbers)
+            law = CONTROLLERS[self.controller].compile(self.numbers)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field="design") from error
+        with simulation_errors("controller"):
+            check_drives(law, self.robot)
 
     def walked(self, scenario: Scenario) -> Scenario:
         """A scenario as the design walks through it.

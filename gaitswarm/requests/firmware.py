@@ -17,7 +17,7 @@ from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from sim.catalogue import design_numbers
 from sim.controllers import ControllerName
-from sim.firmware import Firmware, check_table_bits, firmware_of
+from sim.firmware import Firmware, check_drives_by_pwm, check_table_bits, firmware_of
 
 
 class FirmwareOptions(TypedDict, total=False):
@@ -65,6 +65,8 @@ class FirmwareRequest(ScenariosRequest):
         Raises:
             InvalidRequest: Something cannot be; names the field.
         """
+        with simulation_errors("robot"):
+            check_drives_by_pwm(self.robot)
         self.check_design()
         self.check_gaits()
         if self.table_bits is not None:

@@ -8,9 +8,10 @@ from typing import Final, Literal
 from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, names_of
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.fuzzy_pi_3 import FuzzyPi3
+from sim.controllers.joint_pd import JointPdController
 from sim.controllers.linear import PI, PID, P
 
-ControllerName = Literal["fuzzy-pi", "fuzzy-pi-3", "p", "pi", "pid"]
+ControllerName = Literal["fuzzy-pi", "fuzzy-pi-3", "p", "pi", "pid", "joint-pd"]
 
 CONTROLLERS: Final[dict[ControllerName, Controller]] = {
     "fuzzy-pi": FuzzyPi(),
@@ -18,6 +19,7 @@ CONTROLLERS: Final[dict[ControllerName, Controller]] = {
     "p": P,
     "pi": PI,
     "pid": PID,
+    "joint-pd": JointPdController(),
 }
 """By name, as in job specs and on the command line."""
 

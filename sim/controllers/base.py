@@ -84,9 +84,30 @@ class Response(Protocol):
         """
 
 
+@dataclass(frozen=True, slots=True)
+class JointPd:
+    """What torque-controlled actuators do between control ticks, at their own rate.
+
+    tau = stiffness (q_d - q) + damping (dq_d - dq) + feed_forward tau_ff, beside the torque that
+    the rest of the control law commands.
+
+    Attributes:
+        stiffness: K_p [N m/rad].
+        damping: K_d [N m s/rad].
+        feed_forward: share of the torque with which the joint carries the robot [1].
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+    feed_forward: float = 0.0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlLaw:
     """A controller as it runs on the robot: integers only, errors and PWM in coded counts.
+
+    Full scale of its output is the voltage of a DC motor's bridge, or the torque limit of a
+    torque-controlled actuator.
 
     With change the error's over one tick, the direct part is the sum of error * proportional_gain,
     change * derivative_gain and what `direct` answers, >> 16; the integral part is the sum over
@@ -98,6 +119,7 @@ class ControlLaw:
         derivative_gain: with 16 fraction bits.
         direct: adds to the direct part.
         integrated: adds to the integral part.
+        joint_pd: of torque-controlled actuators, in numbers of any precision; None for none.
     """
 
     proportional_gain: int = 0
@@ -105,6 +127,7 @@ class ControlLaw:
     derivative_gain: int = 0
     direct: Response | None = None
     integrated: Response | None = None
+    joint_pd: JointPd | None = None
 
 
 @dataclass(frozen=True, slots=True)

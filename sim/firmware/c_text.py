@@ -104,6 +104,7 @@ def controller_header(robot: Robot, controller: str, label: str) -> str:
         C text.
     """
     sensors, pwm = robot.description.sensors, robot.description.pwm
+    assert pwm is not None  # noqa: S101 - only DC motors get firmware
     return filled(
         "controller.h",
         label=_remark(label),

@@ -119,6 +119,7 @@ def firmware_of(
     """
     gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     gains = {name: value for name, value in design.items() if name not in gait}
+    check_drives_by_pwm(robot)
     machine = load_robot(robot)
     usual = control_law(controller, tuple(gains.items()))
     law = usual
@@ -183,6 +184,23 @@ def parsed_table_bits(text: str) -> tuple[int, int]:
     if not (error.isascii() and error.isdigit() and current.isascii() and current.isdigit()):
         raise SimulationInputError(f"{text!r} is not like 8x6")
     return int(error), int(current)
+
+
+def check_drives_by_pwm(robot: RobotChoice) -> None:
+    """Check that firmware is what drives a robot.
+
+    Args:
+        robot: The robot.
+
+    Raises:
+        SimulationInputError: Its actuators have controllers of their own.
+    """
+    machine = load_robot(robot)
+    if machine.is_torque_controlled:
+        raise SimulationInputError(
+            f"firmware gives the PWM of DC motors; {machine.description.name} has torque-controlled"
+            " actuators, which take torques or a joint PD's gains from their own interface"
+        )
 
 
 def check_table_bits(controller: ControllerName, bits: tuple[int, int]) -> None:

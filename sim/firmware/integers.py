@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from sim.controllers.base import ControlLaw, LookupTable, Response
 from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS
 from sim.errors import SimulationInputError
-from sim.kernel.walk import CODE_LIMIT, Coding, check_gains
+from sim.kernel.gains import check_gains
+from sim.kernel.walk import CODE_LIMIT, Coding
 
 _INT32: Final = (1 << 31) - 1
 
@@ -82,7 +83,7 @@ def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
         SimulationInputError: It asks for an inference, which no table stands for, or a gain is
             beyond the controllers' integers.
     """
-    check_gains(law)
+    check_gains(law, torque=False)
     direct, integrated = as_table(law.direct), as_table(law.integrated)
     half = 1 << (FRACTION_BITS - 1)
     change = 2 * CODE_LIMIT

@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from sim.controllers import CONTROLLERS, ControllerName, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.errors import SimulationInputError
 from sim.gait_variables import GAIT_CATALOGUE
-from sim.robot import RobotSource
+from sim.robot import RobotSource, load_robot
 from sim.scenario import Scenario
 from sim.simulate import check_reach
 from sim.variables import VariableName
@@ -99,14 +100,20 @@ class RecordedWalk(BaseModel):
         return {name: v for name, v in self.design.items() if name not in GAIT_CATALOGUE}
 
     def check_reach(self, robot: RobotSource) -> None:
-        """Check that a robot's legs reach all of the walk.
+        """Check that a robot's legs reach all of the walk, and that it can be fitted to currents.
 
         Args:
             robot: The robot.
 
         Raises:
             UnreachablePose: A foot's target lies outside its leg's reach.
+            SimulationInputError: The robot's actuators are torque-controlled.
         """
+        if load_robot(robot).is_torque_controlled:
+            raise SimulationInputError(
+                "identification fits DC motors to their currents; those of torque-controlled"
+                " actuators follow from what was commanded"
+            )
         check_reach(self.scenario, tuple(self.design), tuple(self.design.values()), robot=robot)
 
     @cached_property

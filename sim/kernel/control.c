@@ -6,6 +6,7 @@ typedef struct {
   int64_t angle_step, current_step, pwm_step, pwm_counts;
   int64_t substeps;   /* physics steps in a round */
   int64_t refinement; /* rounds in a control tick in which a foot may come down; else one */
+  int64_t inner_ticks; /* of the actuators' joint PD in a control tick */
   const double *robot; /* NR, its constants */
 } Coding;
 
@@ -20,6 +21,7 @@ typedef struct {
 typedef struct {
   int64_t proportional_gain, integral_gain, derivative_gain;
   Table direct, integrated;
+  double stiffness, damping, feed_forward; /* of the joint PD */
 } Law;
 
 static void set_axis(Axis *a, int k, int64_t gain, int64_t middle, int64_t n, int64_t stride)

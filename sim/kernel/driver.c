@@ -22,6 +22,9 @@ typedef struct {
   Past past;
   int filtered, disturbed, shoved; /* whether any lane's current, links or body are */
   vec sensed[NJ], smoothing;
+#if TORQUE
+  Inner inner;
+#endif
   wide sums[N_INTEGRANDS];
   vec peak;
   Sensors sensors; /* the largest, and mostly not used: last */
@@ -55,6 +58,10 @@ static void enter(Lanes *s, int k, Call *call, Walker *w)
   if (w->smoothing[0] < 1.0) s->filtered = 1;
   if (w->disturbance) s->disturbed = 1;
   if (w->shove[1]) s->shoved = 1;
+#if TORQUE
+  OF_LANE(s->inner.stiffness, k) = w->law.stiffness;
+  OF_LANE(s->inner.damping, k) = w->law.damping;
+#endif
 }
 
 static void leave(Lanes *s, int k, int64_t status)
@@ -71,6 +78,15 @@ static void leave(Lanes *s, int k, int64_t status)
 
 static dvec encoder(const Lanes *s, int j, int h) { return BACKLASH ? s->motor[j][h] : s->q[7 + j][h]; }
 
+#if TORQUE
+/* The joint PD of lanes whose inner tick begins. */
+static void inner_tick(Lanes *s, const Coding *c, const divec *begins, const dvec *ago)
+{
+  joint_pd(&s->inner, s->duty, BACKLASH ? s->motor : s->q + 7, BACKLASH ? s->internal + NJ : s->v + 6,
+           c->robot + NJ, begins, ago);
+}
+#endif
+
 /* Lanes that are done with their control ticks begin the next one. */
 static void begin_ticks(Lanes *s, const Coding *c)
 {
@@ -84,6 +100,10 @@ static void begin_ticks(Lanes *s, const Coding *c)
     OF_LANE(s->timestep, k) = w->parameters[TIMESTEP] / (double)s->rounds_left[k];
     s->p[TIMESTEP][k] = (real)OF_LANE(s->timestep, k);
     s->smoothing[k] = (real)w->smoothing[landing];
+#if TORQUE
+    s->inner.period[k] = s->rounds_left[k] * c->substeps / c->inner_ticks;
+    s->inner.left[k] = s->inner.period[k] + 1;
+#endif
     if (!s->shoved) continue;
     const int pushed = w->shove[0] <= s->tick[k] && s->tick[k] < w->shove[1];
     for (int i = PUSH; i < PUSH + 3; i++) s->p[i][k] = pushed ? (real)w->parameters[i] : 0;
@@ -130,8 +150,19 @@ static void control_tick(Lanes *s, const Coding *c)
   for (int j = 0; j < NJ; j++)
     for (int h = 0; h < HALVES; h++) {
       const dvec duty = counts[j][h] * DSPLAT(c->duty_per_count);
+#if TORQUE
+      wide *const commanded = &s->inner.commanded[j];
+      (*commanded)[h] = dvec_select(s->begins[h], duty, (*commanded)[h]);
+#else
       vec_narrow(&s->duty[j], h, dvec_select(s->begins[h], duty, vec_widened(&s->duty[j], h)));
+#endif
     }
+#if TORQUE
+  const wide now = {DSPLAT(0.0)};
+  for (int k = 0; k < LANES; k++)
+    if (OF_LANE(s->begins, k)) set_targets(&s->inner, k, s->walker[k], s->tick[k], c);
+  inner_tick(s, c, s->begins, now);
+#endif
 }
 
 static void write_log(const Lanes *s)
@@ -220,6 +251,15 @@ static void round_of_steps(Lanes *s, const Coding *c)
 #endif
   for (int h = 0; h < HALVES; h++) drift(s, h, 0.5);
   for (int64_t left = c->substeps; left-- > 0;) {
+#if TORQUE
+    divec begins[HALVES];
+    if (due(&s->inner, begins)) {
+      /* Positions are those of the step's middle. */
+      wide ago;
+      for (int h = 0; h < HALVES; h++) ago[h] = DSPLAT(0.5) * s->timestep[h];
+      inner_tick(s, c, begins, ago);
+    }
+#endif
 #ifdef SINGLE
     for (int i = 0; i < NQ; i++)
       for (int h = 0; h < HALVES; h++) vec_narrow(&q[i], h, s->q[i][h]);

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sim.kernel.spatial import Scalar
 from sim.kernel.tree import leaves, mapped
 from sim.robot import Robot
-from sim.robot.limbs import Limb, LimbJoint, limbs_of
+from sim.robot.limbs import Limb, LimbJoint, electrical_constants, limbs_of
 
 
 @lru_cache(maxsize=64)
@@ -24,12 +24,13 @@ def robot_constants(robot: Robot) -> NDArray[np.float64]:
         robot: The robot.
 
     Returns:
-        Motors' conductances and r K_M by joint, then the numbers of every limb; read-only.
+        What the battery's voltage needs, by joint: motors' conductances and r K_M, or R / k^2 and
+        torque limits of torque-controlled actuators. Then the numbers of every limb; read-only.
     """
     limbs = limbs_of(robot)
     joints = [joint for limb in limbs for joint in limb.joints]
     kinds = limb_kinds(limbs)
-    numbers = [joint.conductance for joint in joints] + [joint.torque for joint in joints]
+    numbers = electrical_constants(joints)
     for limb, kind in zip(limbs, kinds, strict=True):
         numbers += kind.numbers_of(limb)
     constants = np.array(numbers)

@@ -17,7 +17,8 @@ import casadi as ca
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.kernel.articulated_body import Link, LinkState, Passed, inward, outward
 from sim.kernel.contact import FRICTION, foot_on_ground
-from sim.kernel.gearhead import shaft_torque, static_friction, static_friction_slope
+from sim.kernel.drives import Drive, at_middle, drive_of, friction_of
+from sim.kernel.gearhead import shaft_torque
 from sim.kernel.inertia import Force, Inertia, Motion, RigidBody
 from sim.kernel.parameters import CONTACT_LAWS
 from sim.kernel.rotation import Rotation
@@ -53,7 +54,7 @@ class LimbState:
     Attributes:
         angles: of the links [rad].
         rates: of the links [rad/s].
-        duty: motor voltage per supply voltage [1].
+        duty: motor voltage per supply voltage, or commanded torque per torque limit [1].
         disturbance: torque on the link [N m], or angle [rad].
         motor_angles: with backlash [rad].
         motor_rates: with backlash [rad/s].
@@ -67,23 +68,6 @@ class LimbState:
     motor_angles: Scalars = ()
     motor_rates: Scalars = ()
     carried: Scalars = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Drive:
-    """A motor with its gearhead in a step.
-
-    Attributes:
-        voltage: [V].
-        current: before the step [A].
-        torque: behind the gearhead's friction, before the step [N m].
-        damping: -d torque / d rate [N m s/rad].
-    """
-
-    voltage: Scalar
-    current: Scalar
-    torque: Scalar
-    damping: Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,16 +245,18 @@ def after(
     links = _links(limb, held.sines, held.cosines, rates)
     turned = outward(links, held.passed, carrier)
     accelerations = tuple(j.sign * a for j, a in zip(limb.joints, turned, strict=True))
-    currents, loads = [], []
+    voltages, currents, loads = [], [], []
     for k, (joint, drive) in enumerate(zip(limb.joints, held.drives, strict=True)):
         spin = held.spins[k] if held.spins else accelerations[k]
-        currents.append(drive.current - (joint.torque * joint.conductance) * (half * spin))
+        voltage, current = at_middle(joint, drive, half * spin)
+        voltages.append(voltage)
+        currents.append(current)
         if held.spins:
             loads.append(held.torques[k])
         else:
             # M_L = r K_M I - B omega - J r^2 domega.
             loads.append(held.torques[k] - held.armature[k] * spin)
-    powers = [d.voltage * current for d, current in zip(held.drives, currents, strict=True)]
+    powers = [voltage * current for voltage, current in zip(voltages, currents, strict=True)]
     sizes = [ca.fabs(current) for current in currents]
     largest = sizes[0]
     for size in sizes[1:]:
@@ -334,18 +320,11 @@ def _body(joint: LimbJoint) -> RigidBody:
 def _drives(
     limb: Limb, state: LimbState, environment: Environment, p: Mapping[str, Scalars]
 ) -> tuple[Drive, ...]:
-    drives = []
     rates = state.motor_rates or state.rates
-    for k, (joint, duty, rate) in enumerate(zip(limb.joints, state.duty, rates, strict=True)):
-        voltage = duty * environment.supply
-        current = (voltage - joint.torque * rate) * joint.conductance
-        torque = joint.torque * current - p["viscous"][k] * rate
-        damping = joint.torque * joint.torque * joint.conductance + p["viscous"][k]
-        if p["static_friction"]:
-            torque = torque + static_friction(rate, p["static_friction"][k])
-            damping = damping + static_friction_slope(rate, p["static_friction"][k])
-        drives.append(Drive(voltage, current, torque, damping))
-    return tuple(drives)
+    return tuple(
+        drive_of(joint, duty, rate, environment.supply, friction_of(k, p))
+        for k, (joint, duty, rate) in enumerate(zip(limb.joints, state.duty, rates, strict=True))
+    )
 
 
 def _behind_backlash(

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from sim.compiler.compilation import load_library
 from sim.compiler.target import Target
-from sim.controllers.base import ControlLaw, LookupTable, Response
+from sim.controllers.base import ControlLaw, JointPd, LookupTable, Response
 from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.derivation import derived_source
+from sim.kernel.gains import check_gains
 from sim.kernel.kinds import robot_constants
 from sim.kernel.lanes import plan_lanes
 from sim.kernel.parameters import Layout, internal_state_size
@@ -31,7 +32,6 @@ from sim.kernel.walk import (
     WalkResult,
     WalkResults,
     WalkSetup,
-    check_gains,
 )
 from sim.outcome import Status
 from sim.robot import Robot
@@ -50,6 +50,7 @@ class _Coding(ctypes.Structure):
         ("pwm_counts", ctypes.c_int64),
         ("substeps", ctypes.c_int64),
         ("refinement", ctypes.c_int64),
+        ("inner_ticks", ctypes.c_int64),
         ("robot", ctypes.c_void_p),
     ]
 
@@ -74,6 +75,9 @@ class _Law(ctypes.Structure):
         ("derivative_gain", ctypes.c_int64),
         ("direct", _Table),
         ("integrated", _Table),
+        ("stiffness", ctypes.c_double),
+        ("damping", ctypes.c_double),
+        ("feed_forward", ctypes.c_double),
     ]
 
 
@@ -94,6 +98,7 @@ class Walker(ctypes.Structure):
         ("parameters", ctypes.c_void_p),
         ("desired", ctypes.c_void_p),
         ("disturbance", ctypes.c_void_p),
+        ("feed_forward", ctypes.c_void_p),
         ("sensors", _SensorErrors),
         ("shove", 2 * ctypes.c_int64),
         ("law", _Law),
@@ -135,6 +140,9 @@ class _Addresses:
             self._arrays[id(array)] = known
         return known[0]
 
+    def if_any(self, array: Floats | None) -> int | None:
+        return None if array is None else self.of(array, np.float64)
+
     def law(self, law: ControlLaw) -> _Law:
         known = self._laws.get(id(law))
         if known is None:
@@ -144,6 +152,7 @@ class _Addresses:
                 law.derivative_gain,
                 self._table(law.direct),
                 self._table(law.integrated),
+                *dataclasses.astuple(law.joint_pd or JointPd()),
             )
             known = self._laws[id(law)] = packed, law
         return known[0]
@@ -185,7 +194,7 @@ class NativeKernel:
         self.lanes = int(library.gaitswarm_lanes())
         self.precision: Precision = "single" if library.gaitswarm_single() else "double"
         self.internal_state_size = internal_state_size(robot)
-        self._joints = robot.n_joints
+        self._joints, self._torque = robot.n_joints, robot.is_torque_controlled
         self._integrands = int(library.gaitswarm_integrands())
         self._log_width = 13 + 4 * self._joints + self.internal_state_size
         self._check(robot.description.name)
@@ -237,7 +246,7 @@ class NativeKernel:
                 a control law asks for an inference rather than a table, or has too large a gain.
         """
         for law in {id(s.control_law): s.control_law for s in setups}.values():
-            check_gains(law)
+            check_gains(law, torque=self._torque)
         for setup in setups:
             setup.check(
                 joints=self._joints,
@@ -257,9 +266,8 @@ class NativeKernel:
             walker.internal_state = addresses.of(setup.internal_state, np.float64)
             walker.parameters = addresses.of(setup.parameters, np.float64)
             walker.desired = addresses.of(setup.desired, np.int32)
-            walker.disturbance = (
-                None if setup.disturbance is None else addresses.of(setup.disturbance, np.float64)
-            )
+            walker.disturbance = addresses.if_any(setup.disturbance)
+            walker.feed_forward = addresses.if_any(setup.feed_forward)
             errors = setup.sensors
             walker.sensors = _SensorErrors(errors.scales, errors.delays, errors.seed)
             walker.shove[:] = setup.shove_ticks

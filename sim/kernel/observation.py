@@ -189,7 +189,11 @@ def sensed_currents(
     smoothing = current_smoothing(robot.description.sensors.current_filter, CONTROL_PERIOD)
     if smoothing >= 1.0:
         return begins
-    ends = np.abs(current[1:] - np.diff(voltage, axis=0) / robot.actuators().resistance)
+    if robot.is_torque_controlled:
+        # Torques follow a PD from inner tick to inner tick, with no great jump at a control tick.
+        ends = begins[1:]
+    else:
+        ends = np.abs(current[1:] - np.diff(voltage, axis=0) / robot.actuators().resistance)
     sensed = np.zeros_like(begins)
     for tick, mean in enumerate(0.5 * (begins[:-1] + ends)):
         sensed[tick + 1] = sensed[tick] + smoothing * (mean - sensed[tick])

@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from sim.kernel.body import body_integrands, body_of, body_state, drifted, pushed, solved
-from sim.kernel.electrical import supply_voltage
+from sim.kernel.drives import battery_voltage
 from sim.kernel.inertia import Force
 from sim.kernel.limb import After, Before, Environment, LimbState, after, before
 from sim.kernel.parameters import Layout, internal_state_size
@@ -26,7 +26,7 @@ from sim.robot import Robot
 from sim.robot.chain import Placement
 from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.inertia import BodyInertia
-from sim.robot.limbs import Limb, limb_of, limbs_of
+from sim.robot.limbs import Limb, electrical_constants, limb_of, limbs_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,9 +35,9 @@ class PhysicsModel:
 
     Their inputs are q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its
     own frame, joint rates; internal_state (I), as `parameters.internal_state_size` says; duty (J):
-    motor voltage per supply voltage; disturbance (J): torque on each link [N m], or, as the
-    parameter `displaced` says, angle [rad] by which its gearhead is turned further; parameters (P),
-    as `parameters.Layout` says.
+    motor voltage per supply voltage, or torque per torque limit; disturbance (J): torque on each
+    link [N m], or, as the parameter `displaced` says, angle [rad] by which its gearhead is turned
+    further; parameters (P), as `parameters.Layout` says.
 
     Attributes:
         kick: to v and internal state after a step at these positions, current (J), integrands (8)
@@ -164,13 +164,13 @@ def _step(
     motors = s.internal_state[: 2 * n] if robot.has_backlash else []
     carried = s.internal_state[len(motors) :]
     joints = [joint for limb in limbs for joint in limb.joints]
-    supply = supply_voltage(
+    supply = battery_voltage(
+        electrical_constants(joints),
         s.duty,
         motors[n:] or s.v[6:],
-        [joint.torque for joint in joints],
-        [joint.conductance for joint in joints],
         s.p["supply_voltage"][0],
         s.p["supply_resistance"][0],
+        torque=robot.is_torque_controlled,
     )
     environment = Environment(timestep, supply, *s.p["displaced"])
     body, own = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)

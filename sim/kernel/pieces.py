@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.kernel.articulated_body import LinkState
 from sim.kernel.body import body_integrands, body_of, body_state, pushed, solved
-from sim.kernel.electrical import supply_voltage
+from sim.kernel.drives import battery_voltage
 from sim.kernel.emit_c import emit_c
 from sim.kernel.inertia import Force, Inertia, Motion
 from sim.kernel.kinds import LimbKind, limb_kinds
@@ -185,13 +185,13 @@ class _Pieces:
             _CONSTANTS: _Input(2 * n, "robot"),
         }
         symbols, s = _symbols(inputs)
-        supply = supply_voltage(
+        supply = battery_voltage(
+            s[_CONSTANTS],
             s["duty"],
             s["rates"],
-            s[_CONSTANTS][n:],
-            s[_CONSTANTS][:n],
             s["source"][0],
             s["internal"][0],
+            torque=self._robot.is_torque_controlled,
         )
         state, body = body_state(s["q"], s["v"], s["gravity"]), body_of(s)
         numbers = [leaf for leaf in leaves(state) if _varies(leaf)]

@@ -18,6 +18,7 @@ typedef struct {
   const double *parameters;     /* NP */
   const int32_t *desired;       /* ticks x NJ, coded angles */
   const double *disturbance;    /* ticks x NJ, torque on the links [N m]; or NULL */
+  const double *feed_forward;   /* ticks x NJ, torque that carries the robot [N m]; or NULL */
   SensorErrors sensors;
   int64_t shove[2]; /* ticks from which on, and up to which, the body is pushed */
   Law law;

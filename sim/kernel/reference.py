@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.control_tick import Past, coded, control, low_pass, padded_states, status_of
+from sim.kernel.gains import check_gains
+from sim.kernel.joint_pd import InnerLoop
 from sim.kernel.physics_step import PhysicsModel, physics_model
 from sim.kernel.sensors import Sensors
 from sim.kernel.walk import (
@@ -24,7 +26,6 @@ from sim.kernel.walk import (
     WalkResult,
     WalkResults,
     WalkSetup,
-    check_gains,
 )
 from sim.outcome import Status
 from sim.robot import Robot
@@ -44,15 +45,14 @@ class ReferenceKernel:
     lanes: Final = 1
 
     def __init__(self, robot: Robot, model: PhysicsModel) -> None:
-        self._model = model
-        self._has_backlash = robot.has_backlash
+        self._model, self._robot = model, robot
         self.layout = model.layout
         self.internal_state_size = model.kick.numel_in(2)
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """All walks, one after the other."""
         for setup in setups:
-            check_gains(setup.control_law)
+            check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
             setup.check(
                 joints=self._model.kick.numel_in(3),
                 internal_state=self.internal_state_size,
@@ -67,15 +67,17 @@ class ReferenceKernel:
         step = Stepper(self._model, setup)
         past, sensors = Past.of(setup.desired.shape[1]), Sensors(setup.sensors)
         sensed = np.zeros(setup.desired.shape[1])
+        inner = InnerLoop(self._robot, setup, coding)
         sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
         status, rounds = Status.OK, 0
         for tick, desired in enumerate(setup.desired):
-            encoder = step.internal_state[: len(desired)] if self._has_backlash else step.q[7:]
+            encoder, turning = step.motors(loose=self._robot.has_backlash)
             readings = sensors.read(encoder, np.abs(sensed))
             error, load = coded(*readings, desired, coding)
             output = control(setup.control_law, coding, error, load, past)
-            step.duty[:] = output * coding.duty_per_count
+            inner.begin(tick, output)
+            step.duty[:] = inner.command(encoder, turning)
             if setup.disturbance is not None:
                 step.disturbance[:] = setup.disturbance[tick]
             if log:
@@ -85,9 +87,16 @@ class ReferenceKernel:
             step.refine(refinement)
             step.push(tick)
             rounds += refinement
-            for _ in range(refinement):
+            period = refinement * coding.substeps // coding.inner_ticks
+            for lap in range(refinement):
                 step.drift(0.5)
                 for left in reversed(range(coding.substeps)):
+                    walked = (lap + 1) * coding.substeps - left - 1
+                    if walked and walked % period == 0:
+                        # Positions are those of the step's middle.
+                        seen, turning = step.motors(loose=self._robot.has_backlash)
+                        ago = 0.5 * step.timestep
+                        step.duty[:] = inner.command(seen - ago * turning, turning)
                     step.kick()
                     step.drift(1.0 if left else 0.5)
                     current = np.abs(step.current)
@@ -135,6 +144,25 @@ class Stepper:
         self._drift = _buffered(model.drift, [*state, self._time], drifted)
         self._kicked = list(zip((self.v, self.internal_state), kicked, strict=True))
         self._drifted = list(zip((self.q, self.internal_state), drifted, strict=True))
+
+    @property
+    def timestep(self) -> float:
+        """Length of the steps that follow [s]."""
+        return float(self.parameters[self._at][0])
+
+    def motors(self, *, loose: bool) -> tuple[Floats, Floats]:
+        """Angles and rates that the encoders see.
+
+        Args:
+            loose: Whether backlash parts motors from links.
+
+        Returns:
+            Views, (J,) [rad] and (J,) [rad/s].
+        """
+        n = len(self.duty)
+        if loose:
+            return self.internal_state[:n], self.internal_state[n : 2 * n]
+        return self.q[7:], self.v[6:]
 
     def push(self, tick: int) -> None:
         """Let the shove's force act, or not.

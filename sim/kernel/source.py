@@ -12,6 +12,7 @@ from sim.compiler.compilation import vector_header
 from sim.kernel.kinds import limb_kinds
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.robot import Robot
+from sim.robot.actuators import CONTROL_RATE
 from sim.robot.limbs import limbs_of
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 _NOT_IN_THE_SOURCE: Final = (
     "batch.py",
     "derivation.py",
+    "gains.py",
+    "joint_pd.py",
     "lanes.py",
     "native.py",
     "observation.py",
@@ -53,6 +56,7 @@ def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
         robot.description.contact_law,
         robot.has_backlash,
         robot.has_static_friction,
+        robot.is_torque_controlled,
     )
     kinds = limb_kinds(limbs_of(robot))
     return hashlib.sha256(_generator() + repr((kinds, options)).encode()).digest()
@@ -80,8 +84,10 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             f"#define NP {layout.size}",
             f"#define NI {internal_state_size(robot)}",
             f"#define BACKLASH {int(robot.has_backlash)}",
+            f"#define TORQUE {int(robot.is_torque_controlled)}",
             f"#define TIMESTEP {layout.slices['timestep'].start}",
             f"#define PUSH {layout.slices['push'].start}",
+            f"#define CONTROL_RATE {CONTROL_RATE}.0",
             *(["#define SINGLE"] if precision == "single" else []),
             vector_header(),
             pieces,
@@ -90,6 +96,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             _own_file("sensors.c"),
             _own_file("control.c"),
             _own_file("pool.c"),
+            *([_own_file("torque.c")] if robot.is_torque_controlled else []),
             _own_file("driver.c"),
         ]
     )

@@ -10,11 +10,12 @@ from typing import Any, Final, Literal, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import ControlLaw, LookupTable
+from sim.controllers.base import ControlLaw
 from sim.errors import SimulationInputError
 from sim.kernel.sensors import NO_ERRORS, SensorErrors
 from sim.outcome import Status
 from sim.robot import Robot
+from sim.robot.actuators import CONTROL_RATE, LARGEST_OUTPUT
 from sim.robot.description import EnergyConvention
 
 Floats = NDArray[np.float64]
@@ -41,11 +42,8 @@ heat R I^2 [W]."""
 CODE_LIMIT = 65535
 """Largest coded error or current; the robot's integers have 16 bits."""
 
-LARGEST_PWM = 32767
+LARGEST_PWM = LARGEST_OUTPUT
 """Largest full scale of the PWM [counts]."""
-
-_LARGEST_TERM = 2**51
-"""Of a control law's sums; the compiled kernel adds up three of them, exactly, in 53 bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,8 @@ class Coding:
     Attributes:
         angle_counts: code of one radian [counts/rad].
         current_counts: code of one ampere [counts/A].
-        duty_per_count: motor voltage per supply voltage of one PWM count [1].
+        duty_per_count: motor voltage per supply voltage, or torque per torque limit, of one count
+            of a controller's output [1].
         angle_step: encoder resolution [counts].
         current_step: resolution of the current's converter [counts].
         pwm_step: resolution of the PWM [counts].
@@ -63,6 +62,7 @@ class Coding:
         substeps: physics steps a control tick.
         refinement: how many times as many of a control tick in which a foot may come down: what
             happens then is faster than a step.
+        inner_ticks: of the actuators' joint PD in a control tick, by which `substeps` is divided.
     """
 
     angle_counts: float
@@ -74,6 +74,7 @@ class Coding:
     pwm_counts: int
     substeps: int
     refinement: int = 1
+    inner_ticks: int = 1
 
     def __post_init__(self) -> None:
         for name in (
@@ -83,11 +84,17 @@ class Coding:
             "pwm_counts",
             "substeps",
             "refinement",
+            "inner_ticks",
         ):
             if getattr(self, name) < 1:
                 raise SimulationInputError(f"{name}: {getattr(self, name)} is less than 1")
         if self.pwm_counts > LARGEST_PWM:
             raise SimulationInputError(f"pwm_counts: {self.pwm_counts} is over {LARGEST_PWM}")
+        if self.substeps % self.inner_ticks:
+            raise SimulationInputError(
+                f"inner_ticks: {self.substeps} physics steps cannot be divided by them,"
+                f" {self.inner_ticks}"
+            )
 
     @classmethod
     def of(cls, robot: Robot, substeps: int, refinement: int = 1) -> Coding:
@@ -102,16 +109,18 @@ class Coding:
             The coding.
         """
         d = robot.description
+        counts, step, per_count = d.output
         return cls(
             angle_counts=d.sensors.angle_counts,
             current_counts=d.sensors.current_counts,
-            duty_per_count=d.pwm.full_scale / (d.supply.nominal_voltage * d.pwm.counts),
+            duty_per_count=per_count,
             angle_step=d.sensors.angle_step,
             current_step=d.sensors.current_step,
-            pwm_step=d.pwm.step,
-            pwm_counts=d.pwm.counts,
+            pwm_step=step,
+            pwm_counts=counts,
             substeps=substeps,
             refinement=refinement,
+            inner_ticks=d.inner_rate // CONTROL_RATE,
         )
 
     def angle_codes(self, angles: Floats) -> Ints:
@@ -142,7 +151,7 @@ class Coding:
         """What the controller gave, of what the motors got.
 
         Args:
-            duty: Motor voltage per supply voltage [1].
+            duty: Motor voltage per supply voltage, or torque per torque limit [1].
 
         Returns:
             As many PWM counts [counts].
@@ -205,6 +214,8 @@ class WalkSetup:
             low-pass of the current goes in a physics step; 1 for no low-pass [1].
         sensors: what they get wrong.
         shove_ticks: control ticks from which on, and up to which, the parameter `push` acts.
+        feed_forward: torques with which the joints carry the robot, of which torque-controlled
+            actuators are given the control law's share, (T, J) [N m]; or None.
     """
 
     start: Floats
@@ -221,6 +232,7 @@ class WalkSetup:
     current_smoothing: float = 1.0
     sensors: SensorErrors = NO_ERRORS
     shove_ticks: tuple[int, int] = (0, 0)
+    feed_forward: Floats | None = None
 
     def smoothing(self, refinement: int) -> float:
         """The analog low-pass over a shorter step.
@@ -258,40 +270,15 @@ class WalkSetup:
             "parameters": (self.parameters, (parameters,)),
             "desired": (self.desired, (ticks, joints)),
         }
-        if self.disturbance is not None:
-            wanted["disturbance"] = (self.disturbance, (ticks, joints))
+        for name in ("disturbance", "feed_forward"):
+            further = getattr(self, name)
+            if further is not None:
+                wanted[name] = (further, (ticks, joints))
         for name, (array, shape) in wanted.items():
             if array.shape != shape:
                 raise SimulationInputError(
                     f"{name}: an array of shape {array.shape}; this kernel and walk need {shape}"
                 )
-
-
-def check_gains(law: ControlLaw) -> None:
-    """Refuse gains with which the compiled kernel's arithmetic is not exact, or leaves a table.
-
-    Args:
-        law: That is to run.
-
-    Raises:
-        SimulationInputError: A gain leads beyond the controllers' integers; the message names it.
-    """
-    largest = {
-        "proportional_gain": law.proportional_gain * CODE_LIMIT,
-        "integral_gain": law.integral_gain * CODE_LIMIT,
-        "derivative_gain": law.derivative_gain * 2 * CODE_LIMIT,
-    }
-    for part, table in (("direct", law.direct), ("integrated", law.integrated)):
-        if isinstance(table, LookupTable):
-            largest |= {
-                f"{part}.output_gain": table.output_gain * 128,
-                f"{part}.error_gain": table.error_gain * CODE_LIMIT,
-                f"{part}.current_gain": table.current_gain * CODE_LIMIT,
-                f"{part}.velocity_gain": table.velocity_gain * 2 * CODE_LIMIT,
-            }
-    for name, term in largest.items():
-        if abs(term) > _LARGEST_TERM:
-            raise SimulationInputError(f"{name}: too large for the controllers' integers")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,6 +19,7 @@ from sim.errors import SimulationInputError
 from sim.measurement.measured_log import ORIGIN, SYNTHETIC, MeasuredLog, Quantity, simulated_log
 from sim.outcome import Status
 from sim.robot import Robot
+from sim.robot.actuators import AnyActuator, TorqueActuator
 from sim.robot.description import Contact
 from sim.robot.identifiable import with_parameters
 from sim.scenario import Scenario
@@ -200,7 +201,9 @@ def perturbed(robot: Robot, change: Perturbation) -> Robot:
                 for name, motor in d.motors.items()
             },
             "actuators": {
-                name: actuator.model_copy(update={"backlash": change.backlash})
+                name: actuator.model_copy(
+                    update={"backlash": change.backlash} | _rubbing(actuator, change)
+                )
                 for name, actuator in d.actuators.items()
             },
             "contact": contact(d.contact),
@@ -211,6 +214,13 @@ def perturbed(robot: Robot, change: Perturbation) -> Robot:
         }
     )
     return with_parameters(replace(robot, description=description), change.parameters)
+
+
+def _rubbing(actuator: AnyActuator, change: Perturbation) -> dict[str, float]:
+    """Friction of an actuator that is not its motor's."""
+    if not isinstance(actuator, TorqueActuator):
+        return {}
+    return {"viscous_friction": actuator.viscous_friction * change.motor_friction}
 
 
 def _listed(values: BaseModel) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -31,7 +32,95 @@ class Drive:
     torque: Floats
 
 
-class Motors:
+class Motors(Protocol):
+    """Motors of either kind, with the friction behind them.
+
+    Attributes:
+        damping: by which torques after friction fall with the rates, static friction left out,
+            (J,) [N m s/rad].
+    """
+
+    damping: Floats
+
+    def __call__(self, duty: Floats, rates: Floats) -> Drive:
+        """The motors at an instant.
+
+        Args:
+            duty: Motor voltage per supply voltage, or torque per torque limit, (J,) [1].
+            rates: Of the motors at the joints, (J,) [rad/s].
+
+        Returns:
+            Voltages, currents and torques.
+        """
+
+    def current_after(self, current: Floats, faster: Floats) -> Floats:
+        """Currents under the same command when the rates have grown.
+
+        Args:
+            current: Before, (J,) [A].
+            faster: By which the rates have grown, (J,) [rad/s].
+
+        Returns:
+            After, (J,) [A].
+        """
+
+
+class _Friction:
+    """Of joints and gears. numbers: as for `DcMotors`."""
+
+    def __init__(self, numbers: Mapping[str, Floats]) -> None:
+        self.viscous = numbers["viscous"]
+        self._static = numbers.get("static_friction", np.empty(0))
+
+    def behind(self, torque: Floats, rates: Floats) -> Floats:
+        """What is left of torques [N m] at rates [rad/s] (J,)."""
+        torque = torque - self.viscous * rates
+        if self._static.size:
+            torque -= self._static * np.clip(rates / STATIC_FRICTION_RATE, -1.0, 1.0)
+        return torque
+
+
+class TorqueMotors:
+    """Torque-controlled actuators: what is commanded, within what the speed leaves of it.
+
+    Args:
+        actuators: Of the robot.
+        numbers: As for `DcMotors`.
+
+    Attributes:
+        damping: by which torques after friction fall with the rates, where speed limits none and
+            static friction is left out, (J,) [N m s/rad].
+    """
+
+    def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
+        self._a, self._friction = actuators, _Friction(numbers)
+        self._source = float(numbers["supply_voltage"][0])
+        self._internal = float(numbers["supply_resistance"][0])
+        self.damping = self._friction.viscous
+
+    def __call__(self, duty: Floats, rates: Floats) -> Drive:
+        """The actuators at an instant."""
+        a, wanted = self._a, duty * self._a.torque_limit
+        power = float(a.resistance @ (wanted / a.torque) ** 2 + wanted @ rates)
+        # U (source - U) / internal = power.
+        square = max(0.25 * self._source**2 - self._internal * power, 0.0)
+        stall = a.stall_torque + a.stall_torque_per_volt * (0.5 * self._source + math.sqrt(square))
+        torque = np.clip(
+            wanted,
+            np.minimum(-stall - a.torque_drop * rates, 0.0),
+            np.maximum(stall - a.torque_drop * rates, 0.0),
+        )
+        current = torque / a.torque
+        voltage = a.resistance * current + a.torque * rates
+        return Drive(voltage, current, self._friction.behind(torque, rates))
+
+    def current_after(self, current: Floats, faster: Floats) -> Floats:
+        """The same: torques are held."""
+        del faster
+        return current
+
+
+class DcMotors:
     """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
 
     Args:
@@ -47,11 +136,10 @@ class Motors:
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
         self._k, self._r = actuators.torque, actuators.resistance
-        self._viscous = numbers["viscous"]
-        self._static = numbers.get("static_friction", np.empty(0))
+        self._friction = _Friction(numbers)
         self._source = float(numbers["supply_voltage"][0])
         self._internal = float(numbers["supply_resistance"][0])
-        self.damping = self._k**2 / self._r + self._viscous
+        self.damping = self._k**2 / self._r + self._friction.viscous
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
         """The motors at an instant.
@@ -72,10 +160,7 @@ class Motors:
         )
         voltage = duty * supply
         current = (voltage - back) / self._r
-        torque = self._k * current - self._viscous * rates
-        if self._static.size:
-            torque -= self._static * np.clip(rates / STATIC_FRICTION_RATE, -1.0, 1.0)
-        return Drive(voltage, current, torque)
+        return Drive(voltage, current, self._friction.behind(self._k * current, rates))
 
     def current_after(self, current: Floats, faster: Floats) -> Floats:
         """Currents at the same voltages when the rates have grown.
@@ -269,13 +354,14 @@ def gears_of(robot: Robot, numbers: Mapping[str, Floats], angles: Floats) -> Gea
 
     Args:
         robot: The robot.
-        numbers: As for `Motors`; of a robot with backlash `backlash` (J,), too.
+        numbers: As for `DcMotors`; of a robot with backlash `backlash` (J,), too.
         angles: (J,) [rad].
 
     Returns:
         Its gears.
     """
-    motors = Motors(robot.actuators(), numbers)
+    kind = TorqueMotors if robot.is_torque_controlled else DcMotors
+    motors = kind(robot.actuators(), numbers)
     if robot.has_backlash:
         return LooseGears(robot, motors, numbers["backlash"], angles)
     return FirmGears(robot, motors)

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.kernel.control_tick import Past, coded, control, low_pass, padded_states, status_of
+from sim.kernel.gains import check_gains
+from sim.kernel.joint_pd import InnerLoop
 from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
 from sim.kernel.sensors import Sensors
 from sim.kernel.walk import (
@@ -27,7 +29,6 @@ from sim.kernel.walk import (
     WalkResult,
     WalkResults,
     WalkSetup,
-    check_gains,
 )
 from sim.mujoco.gears import gears_of
 from sim.mujoco.ground import GROUNDS
@@ -59,6 +60,11 @@ _TICKS_A_GLANCE: Final = 50
 """Between looks at whether anybody waits for the walk."""
 
 
+def _multiple(rate: int, inner: int) -> int:
+    """The least multiple of an inner rate that is a rate at least."""
+    return inner * math.ceil(rate / inner)
+
+
 class WalkStopped(Exception):
     """Nobody waits for a walk any more."""
 
@@ -86,8 +92,9 @@ class MujocoKernel:
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
         self._robot, self._soles, self._should_stop = robot, soles, should_stop
-        self._rate = rate or (BACKLASH_RATE if robot.has_backlash else RATE)
-        self._landing_rate = LANDING_RATE if rate is None else rate
+        inner = robot.description.inner_rate
+        self._rate = _multiple(rate or (BACKLASH_RATE if robot.has_backlash else RATE), inner)
+        self._landing_rate = _multiple(LANDING_RATE if rate is None else rate, inner)
         self._layout = Layout(robot)
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
@@ -106,7 +113,7 @@ class MujocoKernel:
             WalkStopped: `should_stop` has said so.
         """
         for setup in setups:
-            check_gains(setup.control_law)
+            check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
             setup.check(
                 joints=self._robot.n_joints,
                 internal_state=internal_state_size(self._robot),
@@ -120,6 +127,7 @@ class MujocoKernel:
         step = _Stepper(self._robot, setup, self._soles)
         n_joints = setup.desired.shape[1]
         past, sensors, sensed = Past.of(n_joints), Sensors(setup.sensors), np.zeros(n_joints)
+        inner = InnerLoop(self._robot, setup, coding)
         sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
         rows: list[Floats] = []
         status = Status.OK
@@ -128,7 +136,8 @@ class MujocoKernel:
                 raise WalkStopped
             error, load = coded(*sensors.read(step.encoders(), sensed), desired, coding)
             counts = control(setup.control_law, coding, error, load, past)
-            duty = counts.astype(np.float64) * coding.duty_per_count
+            inner.begin(tick, counts)
+            duty = inner.command(*step.motors())
             if log:
                 rows.append(np.concatenate([step.q, step.v, step.internal_state, sensed, duty]))
             begin, end = setup.shove_ticks
@@ -138,7 +147,9 @@ class MujocoKernel:
             share = coding.substeps / substeps
             smoothing = _smoothing(setup.current_smoothing, share)
             step.refine(1.0 / rate)
-            for _ in range(substeps):
+            for walked in range(substeps):
+                if walked and walked % (substeps // coding.inner_ticks) == 0:
+                    duty = inner.command(*step.motors())
                 integrands, current = step.step(duty, further, shoved=begin <= tick < end)
                 sensed = low_pass(sensed, current, smoothing)
                 sums += share * integrands
@@ -205,6 +216,11 @@ class _Stepper:
     def encoders(self) -> Floats:
         """What the encoders see, (J,) [rad]."""
         return self._gears.encoders(self._d.qpos[7:]).copy()
+
+    def motors(self) -> tuple[Floats, Floats]:
+        """Angles [rad] and rates [rad/s] that the encoders see, (J,) each."""
+        rotors = self._gears.memory
+        return (rotors[0], rotors[1]) if rotors else (self._d.qpos[7:], self._d.qvel[6:])
 
     def step(self, duty: Floats, further: Floats | None, *, shoved: bool) -> tuple[Floats, Floats]:
         """One step; `INTEGRANDS` and absolute currents (J,) [A] at its beginning."""

@@ -298,6 +298,22 @@ def _add_sensors(root: ET.Element, sites: Sequence[str]) -> None:
 def _add_motors(root: ET.Element, robot: Robot) -> None:
     actuator = ET.SubElement(root, "actuator")
     actuators = robot.actuators()
+    if robot.is_torque_controlled:
+        for name, limit, friction in zip(
+            robot.joint_names, actuators.torque_limit, actuators.viscous, strict=True
+        ):
+            ET.SubElement(
+                actuator,
+                "general",
+                name=f"{name}_torque",
+                joint=name,
+                ctrllimited="true",
+                ctrlrange=_numbers([-limit, limit]),
+                gainprm="1",
+                biastype="affine",
+                biasprm=_numbers([0.0, 0.0, -friction]),
+            )
+        return
     for name, k, r, b in zip(
         robot.joint_names, actuators.torque, actuators.resistance, actuators.viscous, strict=True
     ):

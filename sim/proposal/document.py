@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -10,25 +9,26 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from sim.proposal.drive import DriveNumbers, SoleNumbers, propose_drives, propose_sole
+from sim.proposal.actuators import (
+    ACTUATOR_NOTES,
+    actuator_tables,
+    drive_names,
+    proposed_control,
+    quoted,
+)
+from sim.proposal.drive import (
+    ActuatorChoice,
+    DriveNumbers,
+    SoleNumbers,
+    chosen_kind,
+    propose_drives,
+    propose_sole,
+)
 from sim.proposal.gait import alternating_phases, propose_scenarios
 from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
 from sim.proposal.stance import Stance, choose_stance
 from sim.robot.urdf import parse_urdf
 from sim.robot.urdf_errors import by_line
-
-VOLTAGE: Final = 24.0
-"""Of a battery that is unknown [V]."""
-
-_RATIO: Final = 9.0
-"""Of a gearhead that is unknown."""
-
-_EFFICIENCY: Final = 0.95
-
-_LARGEST_CODE: Final = 26000.0
-"""Of a current at standstill: some room is left below what 16 bits hold [counts]."""
-
-_CONTROLLER: Final = "pid"
 
 _PREFERENCE: Final = "C"
 """The one without biases, whose size is that of one hexapod's objectives: it ranks walks of robots
@@ -57,12 +57,13 @@ class Proposal:
     guesses: tuple[str, ...]
 
 
-def propose_robot(urdf: str, name: str) -> Proposal:
+def propose_robot(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Proposal:
     """Make a robot of a URDF.
 
     Args:
         urdf: Text of the file.
         name: Of the robot.
+        actuator: Kind of its actuators.
 
     Returns:
         Its files.
@@ -82,25 +83,26 @@ def propose_robot(urdf: str, name: str) -> Proposal:
         for leg, angles in zip(legs, stance.angles, strict=True)
     ]
     drives = propose_drives(tree, joints, legs, stance)
+    kind = chosen_kind(actuator, drives)
     sole, sole_note = propose_sole(tree, legs, stance, [leg.sole for leg in found.legs])
     toml = "\n".join(
         [
             *_head(name, len(legs), tree.total_mass),
-            *_motors(drives),
-            *_electronics(drives),
+            *actuator_tables(kind, drives),
             *_ground(sole, sole_note, stance),
             *_legs(found, feet, stance, alternating_phases(standing), drives),
             *_held(found),
         ]
     )
     job = {
-        "controller": _CONTROLLER,
+        **proposed_control(kind, drives),
         "preference": _PREFERENCE,
         "scenarios": propose_scenarios(stance, sole.length, len(legs)),
     }
     notes = [_TWO_LEGS] if len(legs) == 2 else []
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
+    notes.append(ACTUATOR_NOTES[kind])
     notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
     return Proposal(toml + "\n", text, job, tuple(dict.fromkeys(notes)))
 
@@ -127,68 +129,9 @@ def _head(name: str, legs: int, mass: float) -> list[str]:
         "# What a URDF does not say is guessed here; a comment says how. All fields, with units:",
         "# docs/robots.md.",
         "",
-        f"name = {_quoted(name)}",
-        f"description = {_quoted(f'{legs} legs of three joints, {mass:.3g} kg.')}",
+        f"name = {quoted(name)}",
+        f"description = {quoted(f'{legs} legs of three joints, {mass:.3g} kg.')}",
         "load_height = 0.05                  # m, of a load over the body's origin; guessed",
-    ]
-
-
-def _kinds(drives: Sequence[Sequence[DriveNumbers]]) -> dict[DriveNumbers, str]:
-    """A name for every drive that differs."""
-    kinds = dict.fromkeys(drive for of_leg in drives for drive in of_leg)
-    return {drive: f"drive{number}" for number, drive in enumerate(kinds, start=1)}
-
-
-def _motors(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
-    lines = [
-        "",
-        "# Each drive is a DC motor whose torque falls from standstill to its no-load speed at",
-        f"# {VOLTAGE:g} V; rotors weigh 2 % of a leg's part of the mass at the leg's length.",
-    ]
-    for drive, name in _kinds(drives).items():
-        constant = VOLTAGE / drive.speed / _RATIO
-        resistance = VOLTAGE * constant * _RATIO / drive.torque
-        lines += [
-            "",
-            f"[motors.{name}]                     # {drive.note}",
-            f"torque_constant = {constant:.6g}    # N m/A",
-            f"resistance = {resistance:.6g}       # ohm",
-            "inductance = 1e-4                   # H",
-            f"rotor_inertia = {drive.armature / _RATIO**2:.6g}    # kg m2",
-            "viscous_friction = 0.0              # N m s/rad",
-            "",
-            f"[gearheads.{name}]",
-            f"ratio = {_RATIO}",
-            f"nominal_torque = {drive.torque:.6g}    # N m",
-            f"nominal_speed = {drive.speed * _RATIO:.6g}    # rad/s, motor side",
-            f"efficiency = {_EFFICIENCY}          # guessed",
-            "",
-            f"[actuators.{name}]",
-            f"motor = {_quoted(name)}",
-            f"gearhead = {_quoted(name)}",
-        ]
-    return lines
-
-
-def _electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
-    largest = max(d.torque * d.speed for of_leg in drives for d in of_leg) / VOLTAGE
-    return [
-        "",
-        "[supply]                            # guessed",
-        f"voltage = {VOLTAGE}                 # V, open circuit",
-        "resistance = 0.01                   # ohm",
-        f"nominal_voltage = {VOLTAGE}         # V",
-        "",
-        "[pwm]                               # a fine 10 bits and a sign",
-        "counts = 1023",
-        f"full_scale = {VOLTAGE}              # V",
-        "step = 1",
-        "",
-        "[sensors]                           # 16 bits a turn, 12 bits of current",
-        "angle_counts = 10430.0              # a rad",
-        "angle_step = 1",
-        f"current_counts = {_LARGEST_CODE / largest:.6g}    # an A",
-        "current_step = 16",
     ]
 
 
@@ -212,18 +155,18 @@ def _legs(
     phases: Sequence[float],
     drives: Sequence[Sequence[DriveNumbers]],
 ) -> list[str]:
-    kinds = _kinds(drives)
+    kinds = drive_names(drives)
     lines = ["", "# Neighbours alternate: a trot on four legs, a tripod on six."]
     for k, leg in enumerate(found.legs):
         lines += [
             "",
             "[[legs]]",
-            f"name = {_quoted(_leg_name(leg, k))}",
-            f"joints = [{', '.join(map(_quoted, leg.joints))}]",
-            f"foot = {_quoted(feet[k])}",
+            f"name = {quoted(_leg_name(leg, k))}",
+            f"joints = [{', '.join(map(quoted, leg.joints))}]",
+            f"foot = {quoted(feet[k])}",
             f"stance = [{', '.join(map(repr, stance.angles[k]))}]    # rad, chosen",
             f"phase = {phases[k]}                 # start of support, share of the cycle",
-            f"actuators = [{', '.join(_quoted(kinds[drive]) for drive in drives[k])}]",
+            f"actuators = [{', '.join(quoted(kinds[drive]) for drive in drives[k])}]",
         ]
     return lines
 
@@ -232,7 +175,7 @@ def _held(found: FoundLegs) -> list[str]:
     if not found.held:
         return []
     lines = ["", "[held_joints]                       # of no leg; rad"]
-    return lines + [f"{_quoted(name)} = {float(at)}" for name, at in found.held.items()]
+    return lines + [f"{quoted(name)} = {float(at)}" for name, at in found.held.items()]
 
 
 def _leg_name(leg: FoundLeg, number: int) -> str:
@@ -242,7 +185,3 @@ def _leg_name(leg: FoundLeg, number: int) -> str:
         while not name.startswith(shared):
             shared = shared[:-1]
     return shared.strip("_-. ")[:60] or f"leg{number + 1}"
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

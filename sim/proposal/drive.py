@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal, get_args
 
 import numpy as np
 
 from sim.proposal.stance import Stance
+from sim.robot.actuators import ActuatorKind
 from sim.robot.joints import Joint
 from sim.robot.legs import ChainLeg
 from sim.robot.urdf import Urdf
@@ -39,21 +40,33 @@ _SOLE: Final = 0.05
 """Sole where no sphere says it, as a share of the leg's length."""
 
 
+_DIRECT: Final = 12.0
+"""Rate of the slowest joint from which on drives are taken as quasi-direct: a gear of a hundred or
+more leaves less of a small motor's [rad/s]."""
+
+ActuatorChoice = Literal["auto", "dc", "torque"]
+"""Kind of actuators to be proposed: that which the URDF's limits speak for, or a given one."""
+
+ACTUATOR_CHOICES: Final[tuple[ActuatorChoice, ...]] = get_args(ActuatorChoice)
+
+
 @dataclass(frozen=True, slots=True)
 class DriveNumbers:
-    """A DC motor with its gears at a joint, by what it does there.
+    """What drives a joint, by what it does there.
 
     Attributes:
-        torque: at standstill and full voltage [N m].
-        speed: without load at full voltage [rad/s].
+        torque: at standstill, of a DC motor at full voltage [N m].
+        speed: without load, of a DC motor at full voltage [rad/s].
         armature: inertia of the rotor, seen at the joint [kg m2].
         note: where the numbers come from.
+        believed: whether torque and speed are the URDF's.
     """
 
     torque: float
     speed: float
     armature: float
     note: str
+    believed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +120,24 @@ def propose_drives(
     ]
 
 
+def chosen_kind(choice: ActuatorChoice, drives: Sequence[Sequence[DriveNumbers]]) -> ActuatorKind:
+    """The kind of actuators to propose.
+
+    Args:
+        choice: What is asked for.
+        drives: By leg and joint.
+
+    Returns:
+        With `auto`, torque-controlled ones for a robot whose URDF has torques and rates of every
+        joint that can be meant, and whose rates are those of quasi-direct drives; else DC motors.
+    """
+    if choice != "auto":
+        return choice
+    of_joints = [drive for of_leg in drives for drive in of_leg]
+    direct = all(drive.believed and drive.speed >= _DIRECT for drive in of_joints)
+    return "torque" if direct else "dc"
+
+
 def _drive(joint: Joint, need: float, armature: float) -> DriveNumbers:
     given = _ENOUGH * need <= joint.effort <= _PLAUSIBLE * need
     torque = joint.effort if given else _GUESSED_TORQUE * need
@@ -119,7 +150,8 @@ def _drive(joint: Joint, need: float, armature: float) -> DriveNumbers:
         + (f" (the URDF's {joint.effort:g} N m is not plausible)" if joint.effort else ""),
         "speed of its velocity" if fast else "speed guessed",
     ]
-    return DriveNumbers(_short(torque), _short(speed), _short(armature), "; ".join(sources))
+    numbers = _short(torque), _short(speed), _short(armature)
+    return DriveNumbers(*numbers, "; ".join(sources), believed=given and fast)
 
 
 def propose_sole(

@@ -9,10 +9,21 @@ from __future__ import annotations
 import operator
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from sim import former_names
 from sim.former_names import current_names
+from sim.robot.actuators import (
+    CONTROL_RATE,
+    LARGEST_OUTPUT,
+    Actuator,
+    ActuatorKind,
+    AnyActuator,
+    Data,
+    Gearhead,
+    Motor,
+    TorqueCommand,
+)
 from sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName
 
 JOINTS_PER_LEG = 3
@@ -22,63 +33,8 @@ MOST_COUNTS: Final = 10**8
 """Counts of a unit, at most: codes of some units then fit into 32 bits."""
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Motor(_Data):
-    """A DC motor (thesis 2.2.5)."""
-
-    torque_constant: Number = Field(
-        gt=0.0, description="K_M [N m/A]; also the back-EMF's [V s/rad]"
-    )
-    resistance: Number = Field(gt=0.0, description="R [ohm]")
-    inductance: Number = Field(gt=0.0, description="L [H]")
-    rotor_inertia: Number = Field(gt=0.0, description="J_M [kg m2]")
-    viscous_friction: Number = Field(ge=0.0, description="B_M [N m s/rad], motor side")
-
-
-class Gearhead(_Data):
-    """A planetary gearhead; its losses are viscous and static friction on the output side."""
-
-    ratio: Number = Field(gt=0.0, description="r_G [1]")
-    nominal_torque: Number = Field(gt=0.0, description="M_NG [N m]")
-    nominal_speed: Number = Field(gt=0.0, description="omega_NG [rad/s], motor side")
-    efficiency: Number = Field(gt=0.0, le=1.0, description="eta at the nominal point [1]")
-    static_friction: Number = Field(
-        default=0.0,
-        ge=0.0,
-        description="against the motion at the output, whatever its speed [N m]",
-    )
-
-
-class Actuator(_Data):
-    """Motor, gearhead and bevel gear of one joint, by the names of its parts."""
-
-    motor: PartName
-    gearhead: PartName
-    bevel: Number = Field(default=1.0, gt=0.0, description="ratio of a bevel gear at the joint [1]")
-    backlash: Number = Field(
-        default=0.0,
-        ge=0.0,
-        le=0.5,
-        description="play between gearhead and link, end to end, the thesis's gearlash [rad]",
-    )
-    shaft_stiffness: Number = Field(
-        default=500.0,
-        gt=0.0,
-        description="of the closed play, only with backlash [N m/rad]",
-    )
-    shaft_damping: Number = Field(
-        default=0.5,
-        ge=0.0,
-        description="of the closed play, only with backlash [N m s/rad]",
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_former_names(cls, document: Any) -> Any:
-        return current_names(document, former_names.ACTUATOR)
+def _is_none(value: Any) -> bool:
+    return value is None
 
 
 EnergyConvention = Literal["signed", "positive", "absolute"]
@@ -86,13 +42,16 @@ EnergyConvention = Literal["signed", "positive", "absolute"]
 where it is positive, so that what braking gives back is lost; or its absolute value."""
 
 
-class Supply(_Data):
+class Supply(Data):
     """One battery for all motors."""
 
     voltage: Number = Field(gt=0.0, description="open-circuit voltage [V]")
     resistance: Number = Field(ge=0.0, description="internal resistance [ohm]")
-    nominal_voltage: Number = Field(
-        gt=0.0, description="supply at which the PWM's full scale is given [V]"
+    nominal_voltage: Number | None = Field(
+        default=None,
+        gt=0.0,
+        exclude_if=_is_none,
+        description="supply at which the PWM's full scale is given [V]; for DC motors alone",
     )
     energy: EnergyConvention = Field(
         default="signed",
@@ -101,15 +60,15 @@ class Supply(_Data):
     )
 
 
-class Pwm(_Data):
+class Pwm(Data):
     """Coded control signal: integer counts, full scale at the nominal supply."""
 
-    counts: int = Field(gt=0, le=32767, description="full scale [counts]")
+    counts: int = Field(gt=0, le=LARGEST_OUTPUT, description="full scale [counts]")
     full_scale: Number = Field(gt=0.0, description="motor voltage at full scale [V]")
-    step: int = Field(default=1, ge=1, le=32767, description="resolution [counts]")
+    step: int = Field(default=1, ge=1, le=LARGEST_OUTPUT, description="resolution [counts]")
 
 
-class Sensors(_Data):
+class Sensors(Data):
     """Coded readings (thesis table 4.4): integers, in steps of the converter's resolution."""
 
     angle_counts: Number = Field(
@@ -141,7 +100,7 @@ PlannedSoles = Literal["nominal", "own"]
 """Soles that a gait is planned for: the robot's common one, or each leg's."""
 
 
-class Contact(_Data):
+class Contact(Data):
     """Sole on ground (thesis 2.2.6): spring and damper, and parameters of the friction laws."""
 
     stiffness: Number = Field(gt=0.0, description="k [N/m]")
@@ -166,11 +125,7 @@ GroupName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}$")]
 """Name of a group of legs, as names of variables may have it."""
 
 
-def _is_none(value: Any) -> bool:
-    return value is None
-
-
-class Leg(_Data):
+class Leg(Data):
     """One leg: three joints of the URDF, from the body on, and the frame of its foot."""
 
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
@@ -216,7 +171,15 @@ class Leg(_Data):
         return self.own_foot or f"{self.name}_foot"
 
 
-class RobotDescription(_Data):
+_DEFAULT_COMMAND: Final = TorqueCommand()
+
+
+def _refuse(wrong: bool, field: str, why: str) -> None:
+    if wrong:
+        raise ValueError(f"{field}: {why}")
+
+
+class RobotDescription(Data):
     """All of a robot that its URDF does not say."""
 
     name: PartName
@@ -237,11 +200,18 @@ class RobotDescription(_Data):
         default=False,
         description="whether shafts that yield join motors and links, also where there is no play",
     )
-    motors: dict[PartName, Motor]
-    gearheads: dict[PartName, Gearhead]
-    actuators: dict[PartName, Actuator]
+    motors: dict[PartName, Motor] = Field(default={}, description="of DC actuators, by name")
+    gearheads: dict[PartName, Gearhead] = Field(default={}, description="likewise")
+    actuators: dict[PartName, AnyActuator]
     supply: Supply
-    pwm: Pwm
+    pwm: Pwm | None = Field(
+        default=None, exclude_if=_is_none, description="for DC motors alone, which need it"
+    )
+    torque_command: TorqueCommand | None = Field(
+        default=None,
+        exclude_if=_is_none,
+        description="for torque-controlled actuators alone; default: all of its fields'",
+    )
     sensors: Sensors
     contact: Contact
     legs: tuple[Leg, ...] = Field(min_length=2, max_length=MOST_LEGS)
@@ -267,6 +237,8 @@ class RobotDescription(_Data):
     @model_validator(mode="after")
     def _names_exist(self) -> RobotDescription:
         for name, actuator in self.actuators.items():
+            if not isinstance(actuator, Actuator):
+                continue
             if actuator.motor not in self.motors:
                 raise ValueError(
                     f"actuators.{name}.motor: no motor {actuator.motor!r} is described"
@@ -294,6 +266,58 @@ class RobotDescription(_Data):
             if not members or len(set(members)) < len(members):
                 raise ValueError(f"leg_groups.{group}: name one leg at least, and none twice")
         return self
+
+    def _is_commanded_as_its_actuators_are(self) -> RobotDescription:
+        kinds = {self.actuators[name].kind: name for leg in self.legs for name in leg.actuators}
+        if len(kinds) > 1:
+            raise ValueError(
+                f"actuators: {kinds['dc']!r} is of the kind dc and {kinds['torque']!r} of the kind"
+                " torque; a robot's legs have actuators of one kind"
+            )
+        if self.actuator_kind == "torque":
+            _refuse(self.pwm is not None, "pwm", "is for DC motors; torque_command has its place")
+            _refuse(
+                self.supply.nominal_voltage is not None,
+                "supply.nominal_voltage",
+                "is what the PWM of DC motors is given at; leave it out with torque actuators",
+            )
+        else:
+            _refuse(self.pwm is None, "pwm", "missing; DC motors need it")
+            _refuse(
+                self.supply.nominal_voltage is None,
+                "supply.nominal_voltage",
+                "missing; DC motors need it",
+            )
+            _refuse(
+                self.torque_command is not None,
+                "torque_command",
+                'is for actuators of kind = "torque"',
+            )
+        return self
+
+    @property
+    def actuator_kind(self) -> ActuatorKind:
+        """Kind of all legs' actuators."""
+        return self.actuators[self.legs[0].actuators[0]].kind
+
+    @property
+    def inner_rate(self) -> int:
+        """Ticks a second of the actuators' joint PD [Hz]; DC motors have none but the control's."""
+        if self.actuator_kind == "dc":
+            return CONTROL_RATE
+        return (self.torque_command or _DEFAULT_COMMAND).rate
+
+    @property
+    def output(self) -> tuple[int, int, float]:
+        """A controller's output: full scale [counts], resolution [counts], and the value of a
+        count, motor voltage per supply voltage or torque per torque limit [1].
+        """
+        if self.pwm is None or self.supply.nominal_voltage is None:
+            command = self.torque_command or _DEFAULT_COMMAND
+            return command.counts, command.step, 1.0 / command.counts
+        pwm = self.pwm
+        per_count = pwm.full_scale / (self.supply.nominal_voltage * pwm.counts)
+        return pwm.counts, pwm.step, per_count
 
     @model_validator(mode="after")
     def _dead_zone_lies_below_the_linear_one(self) -> RobotDescription:

@@ -14,6 +14,7 @@ from typing import Final, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from sim.errors import SimulationInputError
+from sim.robot.actuators import Actuator, TorqueActuator
 from sim.robot.description import (
     ContactLaw,
     EnergyConvention,
@@ -122,16 +123,17 @@ def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
     """All parameters in the order of table 2.7, bounds around its trial values and intervals.
 
     Args:
-        robot: Whose joints and legs name them: efficiency_<joint> for every joint; stiffness_,
-            damping_, sole_ and friction_<leg> for every leg.
+        robot: Whose joints and legs name them: efficiency_<joint> for every joint with a gearhead;
+            stiffness_, damping_, sole_ and friction_<leg> for every leg.
 
     Returns:
         The variables.
     """
     legs = robot.description.legs
+    geared = () if robot.is_torque_controlled else robot.joint_names
     return (
         *_WHOLE,
-        *(_named(_EFFICIENCY, joint) for joint in robot.joint_names),
+        *(_named(_EFFICIENCY, joint) for joint in geared),
         *(_named(variable, leg.name) for variable in _CONTACT.values() for leg in legs),
     )
 
@@ -151,6 +153,7 @@ def with_parameters(robot: Robot, values: Mapping[str, float | str]) -> Robot:
         SimulationInputError: No robot can have a value; names it.
     """
     conventions = _conventions(values)
+    _check_gearheads(robot, values)
     numbers = _numbers({name: v for name, v in values.items() if name not in conventions})
     d = _with_conventions(robot.description, conventions)
     mass = numbers.get("body_mass", d.body_mass)
@@ -159,6 +162,18 @@ def with_parameters(robot: Robot, values: Mapping[str, float | str]) -> Robot:
     battery = {field: f"battery_{field}" for field in ("voltage", "resistance")}
     whole = {"body_mass": mass, "supply": _changed(d.supply, battery, numbers)}
     return replace(robot, description=_with_legs(d.model_copy(update=whole), numbers))
+
+
+def _check_gearheads(robot: Robot, values: Mapping[str, float | str]) -> None:
+    """Raises SimulationInputError for an efficiency of actuators that have none."""
+    if not robot.is_torque_controlled:
+        return
+    for name in ("efficiency", *(f"efficiency_{joint}" for joint in robot.joint_names)):
+        if name in values:
+            raise SimulationInputError(
+                f"{name}: torque-controlled actuators have friction, and no gearhead of that"
+                " efficiency"
+            )
 
 
 def _conventions(values: Mapping[str, float | str]) -> dict[str, float | str]:
@@ -195,6 +210,12 @@ def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) ->
             name: changed(gear, "efficiency", "static_friction")
             for name, gear in d.gearheads.items()
         },
+        "actuators": {
+            name: changed(actuator, "static_friction")
+            if isinstance(actuator, TorqueActuator)
+            else actuator
+            for name, actuator in d.actuators.items()
+        },
         "supply": changed(d.supply, "energy"),
         "sensors": changed(d.sensors, "current_filter"),
         "contact": changed(d.contact, "slip_velocity"),
@@ -217,8 +238,9 @@ def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescrip
         names = list(leg.actuators)
         for index, joint in enumerate(leg.joints):
             variable = f"efficiency_{joint}"
-            if variable in values:
-                own, actuator = f"of {joint}", actuators[names[index]]
+            actuator = actuators[names[index]]
+            if variable in values and isinstance(actuator, Actuator):
+                own = f"of {joint}"
                 gearheads[own] = _changed(
                     gearheads[actuator.gearhead], {"efficiency": variable}, values
                 )

@@ -42,6 +42,11 @@ class LimbJoint:
         armature: of the rotor at the joint [kg m2].
         shaft_stiffness: of the closed play [N m/rad].
         shaft_damping: of the closed play [N m s/rad].
+        inverse_torque: 1 / (r K_M) of a torque-controlled actuator; 0 for a DC motor [A/(N m)].
+        torque_limit: of a torque-controlled actuator; 0 for a DC motor [N m].
+        stall_torque: of the line by which speed limits its torque, at rest [N m].
+        stall_torque_per_volt: the same where the battery's voltage makes that line [N m/V].
+        torque_drop: by which that line falls with the rate [N m s/rad].
     """
 
     axis: Vector
@@ -57,6 +62,11 @@ class LimbJoint:
     armature: float
     shaft_stiffness: float
     shaft_damping: float
+    inverse_torque: float = 0.0
+    torque_limit: float = 0.0
+    stall_torque: float = 0.0
+    stall_torque_per_volt: float = 0.0
+    torque_drop: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +141,13 @@ def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Fl
                 armature=armature,
                 shaft_stiffness=float(actuators.shaft_stiffness[index]),
                 shaft_damping=float(actuators.shaft_damping[index]),
+                inverse_torque=1.0 / float(actuators.torque[index])
+                if robot.is_torque_controlled
+                else 0.0,
+                torque_limit=float(actuators.torque_limit[index]),
+                stall_torque=float(actuators.stall_torque[index]),
+                stall_torque_per_volt=float(actuators.stall_torque_per_volt[index]),
+                torque_drop=float(actuators.torque_drop[index]),
             )
         )
     at = _without_noise(foot)
@@ -141,6 +158,35 @@ def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Fl
         for reach, joint in zip(itertools.accumulate(lengths), reversed(joints), strict=True)
     )
     return Limb(tuple(joints), _triple(at), mobility)
+
+
+def is_torque_controlled(joint: LimbJoint) -> bool:
+    """Whether a joint, of numbers or symbols, is driven by a torque-controlled actuator.
+
+    Args:
+        joint: The joint.
+
+    Returns:
+        False for a DC motor.
+    """
+    limit: object = joint.torque_limit
+    return not (isinstance(limit, float) and limit == 0.0)
+
+
+def electrical_constants(joints: Sequence[LimbJoint]) -> list[float]:
+    """What the battery's voltage needs of the actuators.
+
+    Args:
+        joints: Of a robot, all of one kind.
+
+    Returns:
+        By joint, of DC motors the conductance [1/ohm], of others R / k^2 [W/(N m)^2]; then by joint
+        r K_M [N m/A], or the torque limit [N m].
+    """
+    if is_torque_controlled(joints[0]):
+        loss = [joint.resistance * joint.inverse_torque * joint.inverse_torque for joint in joints]
+        return [*loss, *(joint.torque_limit for joint in joints)]
+    return [*(joint.conductance for joint in joints), *(joint.torque for joint in joints)]
 
 
 def _triple(values: Floats) -> Vector:

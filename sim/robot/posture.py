@@ -99,7 +99,8 @@ def _turn(axis: Floats, angle: float) -> Floats:
     """Rotation about a unit vector, by Rodrigues' formula."""
     x, y, z = axis.tolist()
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across))
+    turn = np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across)
+    return np.asarray(turn)
 
 
 def resting_height(robot: Robot, joints: Floats, weight: float) -> float:

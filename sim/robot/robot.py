@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from sim.errors import RobotFileError
+from sim.robot.actuators import Actuator, TorqueActuator
 from sim.robot.bounds import check_toml
 from sim.robot.chain import chain_of, check_joints, check_owners
 from sim.robot.description import JOINTS_PER_LEG, Contact, Leg, RobotDescription
@@ -32,6 +33,8 @@ _DEGREES: Final = "; it is in degrees, it seems: 45 degrees are 0.7854 rad"
 class JointActuators:
     """Motors and gears in joint order, referred to the joint; arrays (J,), read-only.
 
+    What a kind of actuator does not have is 0.
+
     Attributes:
         torque: r K_M [N m/A], also the back-EMF [V s/rad].
         resistance: [ohm].
@@ -44,6 +47,10 @@ class JointActuators:
         backlash: play, end to end [rad].
         shaft_stiffness: of the closed play [N m/rad].
         shaft_damping: of the closed play [N m s/rad].
+        torque_limit: of torque-controlled actuators [N m].
+        stall_torque: of the line by which speed limits their torque, at rest [N m].
+        stall_torque_per_volt: the same where the battery's voltage makes that line [N m/V].
+        torque_drop: by which that line falls with the rate [N m s/rad].
     """
 
     torque: Floats
@@ -57,6 +64,10 @@ class JointActuators:
     backlash: Floats
     shaft_stiffness: Floats
     shaft_damping: Floats
+    torque_limit: Floats
+    stall_torque: Floats
+    stall_torque_per_volt: Floats
+    torque_drop: Floats
 
     @property
     def viscous(self) -> Floats:
@@ -99,6 +110,11 @@ class Robot:
             for leg in self.description.legs
             for name in leg.actuators
         )
+
+    @property
+    def is_torque_controlled(self) -> bool:
+        """Whether controllers command its joints' torques, not its motors' voltages."""
+        return self.description.actuator_kind == "torque"
 
     @property
     def has_static_friction(self) -> bool:
@@ -146,26 +162,55 @@ class Robot:
         for leg in d.legs:
             for name in leg.actuators:
                 actuator = d.actuators[name]
-                motor, gear = d.motors[actuator.motor], d.gearheads[actuator.gearhead]
-                ratio = gear.ratio * actuator.bevel
                 rows.append(
-                    (
-                        ratio * motor.torque_constant,
-                        motor.resistance,
-                        motor.inductance,
-                        motor.rotor_inertia * ratio**2,
-                        motor.viscous_friction * ratio**2,
-                        gear.nominal_torque * gear.ratio / gear.nominal_speed * actuator.bevel**2,
-                        gear.efficiency,
-                        gear.static_friction * actuator.bevel,
-                        actuator.backlash,
-                        actuator.shaft_stiffness,
-                        actuator.shaft_damping,
-                    )
+                    _torque_row(actuator)
+                    if isinstance(actuator, TorqueActuator)
+                    else _dc_row(d, actuator)
                 )
         columns = np.array(rows).T.copy()
         columns.flags.writeable = False
         return JointActuators(*columns)
+
+
+def _dc_row(d: RobotDescription, actuator: Actuator) -> tuple[float, ...]:
+    """Of `JointActuators`, by a motor and a gearhead."""
+    motor, gear = d.motors[actuator.motor], d.gearheads[actuator.gearhead]
+    ratio = gear.ratio * actuator.bevel
+    return (
+        ratio * motor.torque_constant,
+        motor.resistance,
+        motor.inductance,
+        motor.rotor_inertia * ratio**2,
+        motor.viscous_friction * ratio**2,
+        gear.nominal_torque * gear.ratio / gear.nominal_speed * actuator.bevel**2,
+        gear.efficiency,
+        gear.static_friction * actuator.bevel,
+        actuator.backlash,
+        actuator.shaft_stiffness,
+        actuator.shaft_damping,
+        *(0.0,) * 4,
+    )
+
+
+def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
+    """Of `JointActuators`; friction is the joint's, so no gearhead has any."""
+    return (
+        actuator.gear_ratio * actuator.torque_constant,
+        actuator.resistance,
+        0.0,
+        actuator.rotor_inertia * actuator.gear_ratio**2,
+        actuator.viscous_friction,
+        0.0,
+        1.0,
+        actuator.static_friction,
+        actuator.backlash,
+        actuator.shaft_stiffness,
+        actuator.shaft_damping,
+        actuator.torque_limit,
+        actuator.stall_torque,
+        actuator.stall_torque_per_volt,
+        actuator.torque_drop,
+    )
 
 
 def with_shafts(robot: Robot) -> Robot:

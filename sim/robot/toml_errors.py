@@ -11,13 +11,11 @@ from pydantic import BaseModel, ValidationError
 
 from sim.errors import RobotFileError
 from sim.former_names import as_written
+from sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
 from sim.robot.bounds import shortened
 from sim.robot.description import (
-    Actuator,
     Contact,
-    Gearhead,
     Leg,
-    Motor,
     Pwm,
     RobotDescription,
     Sensors,
@@ -37,6 +35,8 @@ _PARTS: Final[tuple[type[BaseModel], ...]] = (
     Motor,
     Gearhead,
     Actuator,
+    TorqueActuator,
+    TorqueCommand,
     Supply,
     Pwm,
     Sensors,
@@ -57,11 +57,11 @@ def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]
         One line for people, which names the field as the file does.
     """
     first = with_known_keys(error.errors(), RobotDescription)[0]
-    location = as_written(document, first["loc"])
+    location = as_written(document, _without_kind(first["loc"]))
     where = shortened(".".join(str(part) for part in location))
     line = line_of(text, [part for part in location if not _is_class(part)])
     message = message_of(first)
-    meaning = _meaning(str(first["loc"][-1])) if first["loc"] else None
+    meaning = _meaning(first["loc"])
     return (
         "robot.toml"
         + (f", line {line}" if line else "")
@@ -141,14 +141,22 @@ def _split(key: str) -> list[str]:
     return [part.strip().strip("\"'") for part in re.findall(r'"[^"]*"|\'[^\']*\'|[^.]+', key)]
 
 
+def _without_kind(location: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    """Pydantic names the kind of an actuator behind its name."""
+    if len(location) > 2 and location[0] in ("actuators", "drives"):
+        return (*location[:2], *location[3:])
+    return location
+
+
 def _is_class(part: str | int) -> bool:
     """Pydantic names the members of unions among the keys."""
     return isinstance(part, str) and part[:1].isupper() and part.isidentifier()
 
 
-def _meaning(field: str) -> str | None:
+def _meaning(location: tuple[str | int, ...]) -> str | None:
     """Description, with unit, of a field of any part of a robot description."""
-    for part in _PARTS:
-        if field in part.model_fields:
-            return part.model_fields[field].description
+    own = (TorqueActuator,) if "torque" in location[2:3] else ()
+    for part in (*own, *_PARTS):
+        if location and location[-1] in part.model_fields:
+            return part.model_fields[str(location[-1])].description
     return None

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 from sim import former_names
 from sim.choice import NAME, alternatives
 from sim.former_names import current_names
+from sim.robot.actuators import AnyActuator
 from sim.robot.bounds import (
     DEEPEST,
     LONGEST_TOML,
@@ -21,7 +22,7 @@ from sim.robot.bounds import (
     MOST_LINKS,
     MOST_VALUES,
 )
-from sim.robot.description import Actuator, ContactLaw, Leg, PlannedSoles
+from sim.robot.description import ContactLaw, Leg, PlannedSoles
 from sim.robot.digests import PASSED, READ, digest_of
 from sim.robot.robot import Robot, parse_robot
 from sim.robot.shipped import DEFAULT_ROBOT, RobotName, shipped_robot
@@ -142,7 +143,7 @@ def _load_variant(variant: RobotVariant) -> Robot:
     chosen = variant.model_dump(include={"contact_law", "planned_soles"}, exclude_none=True)
     description = robot.description.model_copy(update=chosen)
     if any(variant.backlash):
-        actuators: dict[str, Actuator] = {}
+        actuators: dict[str, AnyActuator] = {}
         legs: list[Leg] = []
         for leg in description.legs:
             names = []

@@ -103,6 +103,59 @@ def quadruped_files() -> RobotFiles:
     )
 
 
+def torque_quadruped_files(
+    *, backlash: float = 0.0, line: bool = True, rate: int = 1000
+) -> RobotFiles:
+    """The same robot with torque-controlled actuators.
+
+    backlash: [rad]. line: whether a datasheet's knee limits torques, else the battery's voltage.
+    rate: of the joint PD [Hz].
+    """
+    files = quadruped_files()
+    begin, end = files.toml.index("[motors."), files.toml.index("[sensors]")
+    knee = "speed_limit = 30.0\nknee_speed = 12.0\n" if line else ""
+    actuators = f"""
+[actuators.coxa]
+kind = "torque"
+gear_ratio = 9.0
+torque_constant = 0.06
+resistance = 0.3
+rotor_inertia = 8e-5
+torque_limit = 8.0
+{knee}viscous_friction = 0.02
+backlash = {backlash}
+
+[actuators.femur]
+kind = "torque"
+gear_ratio = 9.0
+torque_constant = 0.06
+resistance = 0.3
+rotor_inertia = 8e-5
+torque_limit = 12.0
+{knee}static_friction = 0.1
+backlash = {backlash}
+
+[actuators.tibia]
+kind = "torque"
+gear_ratio = 12.0
+torque_constant = 0.06
+resistance = 0.25
+rotor_inertia = 8e-5
+torque_limit = 10.0
+{knee}backlash = {backlash}
+
+[supply]
+voltage = 24.0
+resistance = 0.05
+
+[torque_command]
+rate = {rate}
+
+"""
+    toml = files.toml[:begin] + actuators.lstrip() + files.toml[end:]
+    return RobotFiles(toml=toml, urdf=files.urdf)
+
+
 def random_state(rng: np.random.Generator, joints: int) -> tuple[Floats, Floats]:
     """A pose near walking height with any attitude, and violent velocities.
 

@@ -19,8 +19,9 @@ from services.optimizer.jobs.spec import judge_outcomes
 from services.runtime import open_evaluator, open_store, run_embedded
 from sim.assembly import Backend
 from sim.outcome import OBJECTIVE_NAMES, Status
+from sim.robot import load_robot
 from sim.scenario import SCENARIOS, Scenario
-from tests.examples.walks import walk
+from tests.examples.walks import short_walk, torque_quadruped_files, walk
 
 FILE: Final = Path(__file__).with_name("numbers.json")
 
@@ -29,6 +30,13 @@ ITERATIONS: Final = 5
 
 DEMO: Final = JobSpec(preference="A", iterations=25, seed=1)
 """The job of `make demo`, by the default search method: 625 designs."""
+
+TORQUE_WALK: Final = short_walk(cycles=1.0, cycle_time=0.5)
+
+TORQUE_DESIGNS: Final[dict[str, dict[str, float]]] = {
+    "joint-pd": {"Kp": 40.0, "Kd": 1.0, "feed_forward": 0.8},
+    "pid": {"P": 0.5, "I": 0.1, "D": 0.01},
+}
 
 Optimum = dict[str, dict[str, float]]
 """By scenario, by objective."""
@@ -58,9 +66,12 @@ class Best:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """optimum: objectives of design A. iterations: the first of the demo. best: its last word."""
+    """optimum: objectives of design A. torque: objectives of the quadruped with torque-controlled
+    actuators, by controller. iterations: the first of the demo. best: its last word.
+    """
 
     optimum: Optimum
+    torque: Optimum
     iterations: list[DemoIteration]
     best: Best
 
@@ -76,6 +87,16 @@ def objectives_of_the_optimum(
         found[scenario.name] = dict(
             zip(OBJECTIVE_NAMES, outcome.objectives[0].tolist(), strict=True)
         )
+    return found
+
+
+def objectives_with_torque(*, backend: Backend = "native") -> Optimum:
+    """What designs of a robot with torque-controlled actuators are worth."""
+    robot, found = load_robot(torque_quadruped_files()), {}
+    for controller, design in TORQUE_DESIGNS.items():
+        outcome = walk(TORQUE_WALK, design, controller, robot=robot, backend=backend).outcome
+        assert outcome.statuses.tolist() == [Status.OK]
+        found[controller] = dict(zip(OBJECTIVE_NAMES, outcome.objectives[0].tolist(), strict=True))
     return found
 
 
@@ -119,6 +140,7 @@ def measure() -> Numbers:
     design = dict(zip(DEMO.design_space().names, best.design.tolist(), strict=True))
     return Numbers(
         objectives_of_the_optimum(),
+        objectives_with_torque(),
         iterations[:ITERATIONS],
         Best(best.iteration, best.particle, best.fitness, design),
     )
@@ -128,6 +150,7 @@ def write(numbers: Numbers) -> None:
     """Keep them, exact to the bit."""
     document = {
         "optimum": _hex(numbers.optimum),
+        "torque": _hex(numbers.torque),
         "demo": {
             "iterations": [
                 {"designs": iteration.designs, "fitness": _hex(iteration.fitness)}
@@ -150,6 +173,7 @@ def read() -> Numbers:
     best = document["demo"]["best"]
     return Numbers(
         _from_hex(document["optimum"]),
+        _from_hex(document["torque"]),
         [
             DemoIteration(iteration["designs"], _from_hex(iteration["fitness"]))
             for iteration in document["demo"]["iterations"]

@@ -21,6 +21,7 @@ from tests.golden.numbers import (
     ITERATIONS,
     fitness_of,
     objectives_of_the_optimum,
+    objectives_with_torque,
     read,
     run_demo,
 )
@@ -71,6 +72,11 @@ def as_kept(kept: Any, backend: Backend) -> Any:
 def test_the_published_optimum_is_worth_what_it_was(backend: Backend) -> None:
     found = objectives_of_the_optimum(backend=backend)
     assert found == as_kept(GOLDEN.optimum, backend)
+
+
+@pytest.mark.filterwarnings("ignore:no C compiler found")
+def test_torque_controlled_actuators_give_what_they_did(backend: Backend) -> None:
+    assert objectives_with_torque(backend=backend) == as_kept(GOLDEN.torque, backend)
 
 
 @pytest.mark.filterwarnings("ignore:no C compiler found")

@@ -22,6 +22,8 @@ class Coded(ABC):
 
     def __init__(self, robot: Robot, log: WalkLog, design: Mapping[str, float]) -> None:
         d = robot.description
+        assert d.pwm is not None
+        assert d.supply.nominal_voltage is not None
         self._sensors, self._pwm = d.sensors, d.pwm
         self._full_duty = d.pwm.full_scale / d.supply.nominal_voltage
         self._desired = np.rint(log.desired_angle * d.sensors.angle_counts).astype(np.int64)

@@ -12,6 +12,7 @@ import pytest
 from sim.errors import RobotFileError
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.proposal.document import propose_robot
+from sim.proposal.drive import ActuatorChoice
 from sim.proposal.legs import find_legs
 from sim.robot import Robot, parse_robot
 from sim.robot.legs import ChainLeg
@@ -167,28 +168,62 @@ def test_an_arm_is_held_within_its_limits_and_told() -> None:
 
 
 def test_torque_and_speed_are_the_urdfs_where_they_can_be_meant() -> None:
-    said = parse_robot(*_files(dog(effort=30.0))).actuators()
+    said = parse_robot(*_files(dog(effort=30.0), "dc")).actuators()
     stall = said.torque * 24.0 / said.resistance
     np.testing.assert_allclose(stall, 30.0, rtol=1e-4)
     np.testing.assert_allclose(24.0 / said.torque, 20.0, rtol=1e-4)
     for effort in (1000.0, 0.0, 0.1):
-        guessed = parse_robot(*_files(dog(effort=effort))).actuators()
+        guessed = parse_robot(*_files(dog(effort=effort), "dc")).actuators()
         stall = guessed.torque * 24.0 / guessed.resistance
         assert (stall > 1.0).all() and (stall < 100.0).all()
         assert "torque guessed" in propose_robot(dog(effort=effort), "mine").toml
 
 
-def test_every_guess_has_a_comment() -> None:
-    toml = propose_robot(dog(arm=ARM), "mine").toml
-    for field in (
-        "load_height",
-        "efficiency",
-        "voltage",
-        "stiffness",
-        "sole",
-        "friction",
-        "stance",
-    ):
+def test_torque_actuators_have_the_urdfs_limits_and_a_design_space_that_fits_them() -> None:
+    proposal = propose_robot(dog(effort=30.0), "mine", "torque")
+    actuators = parse_robot(proposal.toml, proposal.urdf).actuators()
+    np.testing.assert_allclose(actuators.torque_limit, 30.0)
+    # All of the torque up to half of 20 rad/s, none at 20 rad/s.
+    line = actuators.stall_torque[0], actuators.torque_drop[0]
+    np.testing.assert_allclose([line[0] - rate * line[1] for rate in (10.0, 20.0)], [30.0, 0.0])
+    assert proposal.job["controller"] == "joint-pd"
+    stiffness, damping, feed_forward = proposal.job["variables"]
+    assert stiffness["low"] < 30.0 < stiffness["high"]
+    assert damping["low"] < 1.0 < damping["high"]
+    assert feed_forward == "feed_forward"
+
+
+@pytest.mark.parametrize(
+    ("urdf", "kind"),
+    [
+        (dog(effort=30.0), "torque"),
+        (dog(effort=1000.0), "dc"),
+        (dog(effort=30.0).replace('velocity="20"', 'velocity="6"', 1), "dc"),
+        (HEXAPOD, "dc"),
+    ],
+    ids=[
+        "quasi-direct drives",
+        "no torque that can be meant",
+        "a slow joint",
+        "hexapod of DC motors",
+    ],
+)
+def test_actuators_are_torque_controlled_where_the_urdf_speaks_for_it(urdf: str, kind: str) -> None:
+    assert proposed(urdf).description.actuator_kind == kind
+    assert parse_robot(*_files(urdf, "torque")).description.actuator_kind == "torque"
+    assert parse_robot(*_files(urdf, "dc")).description.actuator_kind == "dc"
+
+
+@pytest.mark.parametrize(
+    ("actuator", "fields"),
+    [
+        ("dc", ["efficiency", "voltage"]),
+        ("torque", ["gear_ratio", "voltage", "rate"]),
+    ],
+)
+def test_every_guess_has_a_comment(actuator: ActuatorChoice, fields: list[str]) -> None:
+    toml = propose_robot(dog(arm=ARM), "mine", actuator).toml
+    for field in ("load_height", *fields, "stiffness", "sole", "friction", "stance"):
         line = next(line for line in toml.splitlines() if line.startswith(f"{field} ="))
         assert "#" in line, line
     assert tomllib.loads(toml)["name"] == "mine"
@@ -217,6 +252,6 @@ def test_what_has_no_such_legs_is_refused_with_the_reason(urdf: str, said: str) 
         propose_robot(urdf, "mine")
 
 
-def _files(urdf: str) -> tuple[str, str]:
-    proposal = propose_robot(urdf, "mine")
+def _files(urdf: str, actuator: ActuatorChoice = "auto") -> tuple[str, str]:
+    proposal = propose_robot(urdf, "mine", actuator)
     return proposal.toml, proposal.urdf

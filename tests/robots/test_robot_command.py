@@ -14,6 +14,27 @@ from sim.robot import parse_robot
 from tests.robots.test_proposal import dog
 
 
+def test_init_makes_the_actuators_that_are_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "dog.urdf").write_text(dog(), encoding="utf-8")
+
+    def made(*options: str) -> tuple[str, str]:
+        output = tmp_path / "-".join(["made", *options[1:]])
+        command = ["robot", "init", str(tmp_path / "dog.urdf"), "--output", str(output), *options]
+        assert run(command) == 0
+        job = json.loads((output / "job.json").read_text(encoding="utf-8"))
+        return (output / "robot.toml").read_text(encoding="utf-8"), job["controller"]
+
+    dc, torque, auto = made("--actuator", "dc"), made("--actuator", "torque"), made()
+    assert "[motors." in dc[0] and dc[1] == "pid"
+    assert 'kind = "torque"' in torque[0] and torque[1] == "joint-pd"
+    assert auto == torque
+    command = ["robot", "init", str(tmp_path / "dog.urdf"), "--output", str(tmp_path / "no")]
+    assert run([*command, "--actuator", "hydraulic"]) == 2
+    assert "auto, dc, torque" in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Made of a dog's URDF by the command."""
@@ -86,7 +107,7 @@ def test_jobs_of_the_robot_have_its_controller_and_walks_unless_they_say_otherwi
     command = ["optimize", "--robot", str(folder), "--db", str(tmp_path / "jobs.db"), *budget]
     assert run(command) == 0
     job = json.loads(capsys.readouterr().out)
-    assert job["controller"] == "pid"
+    assert job["controller"] == "joint-pd"
     assert job["scenarios"] == ["slow", "fast"]
     # Biases of the others are in units of one robot.
     assert job["spec"]["preference"]["bias"] == [0.0] * 5

@@ -102,6 +102,7 @@ def test_all_else_but_friction_and_currents_filter_is_the_datasheet_robots() -> 
 def test_its_battery_gives_less_than_full_scale() -> None:
     supply = identified().description.supply
     assert supply.nominal_voltage == load_robot("szabadka2").description.supply.nominal_voltage
+    assert supply.nominal_voltage is not None
     assert supply.voltage < supply.nominal_voltage
 
 

@@ -248,9 +248,9 @@ def _random_law(rng: np.random.Generator) -> ControlLaw:
         values = rng.integers(-128, 128, size=shape).astype(np.int8)
         return LookupTable(values, gain(44), gain(35), gain(35), gain(34))
 
-    return ControlLaw(
-        gain(35), gain(35), gain(34), *(table() if rng.random() < 0.7 else None for _ in range(2))
-    )
+    gains = gain(35), gain(35), gain(34)
+    direct, integrated = [table() if rng.random() < 0.7 else None for _ in range(2)]
+    return ControlLaw(*gains, direct, integrated)
 
 
 def test_any_control_law_has_the_same_outputs_in_both_kernels(robot: Robot) -> None:

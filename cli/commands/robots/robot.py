@@ -11,6 +11,7 @@ from cli.options import Json
 
 if TYPE_CHECKING:
     from gaitswarm.views.robot_check import RobotCheckView
+    from sim.proposal.drive import ActuatorChoice
     from sim.robot import RobotFiles
 
 Folder = Annotated[
@@ -33,6 +34,14 @@ def init(
         Path, typer.Option("--output", "-o", metavar="FOLDER", help="New, or empty.")
     ],
     name: Annotated[str | None, typer.Option(help="Of the robot [default: the file's].")] = None,
+    actuator: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|dc|torque",
+            help="Kind of its actuators: DC motors with gearheads, or torque-controlled ones; auto"
+            " decides by the torques and rates of the URDF.",
+        ),
+    ] = "auto",
     as_json: Json = False,
 ) -> None:
     """Find legs, choose a stance, propose actuators, and write a robot's folder.
@@ -43,7 +52,7 @@ def init(
     from cli.output import note, print_text
     from gaitswarm.robots import init_robot
 
-    made = init_robot(urdf, output, name=name)
+    made = init_robot(urdf, output, name=name, actuator=_kind(actuator))
     if as_json:
         _print({"folder": str(output), "name": made.name, "guesses": list(made.guesses)})
         return
@@ -80,6 +89,16 @@ def check(
     print_text(_told(view))
     for warning in view.warnings:
         note(f"warning: {warning}")
+
+
+def _kind(text: str) -> ActuatorChoice:
+    from services.optimizer.errors import InvalidRequest
+    from sim.proposal.drive import ACTUATOR_CHOICES
+
+    for kind in ACTUATOR_CHOICES:
+        if kind == text:
+            return kind
+    raise InvalidRequest(f"{text!r} is none of {', '.join(ACTUATOR_CHOICES)}", field="actuator")
 
 
 def _files(folder: Path) -> RobotFiles:

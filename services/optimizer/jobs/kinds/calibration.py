@@ -29,7 +29,7 @@ from sim.outcome import Objective
 from sim.robot import RobotSource
 from sim.robot.shipped import RobotName
 from sim.scenario import Scenario
-from sim.simulate import check_gait, check_reach
+from sim.simulate import check_drives, check_gait, check_reach
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]
@@ -219,7 +219,9 @@ class CalibrationSpec(Spec):
             for index, case in self._walks(cases):
                 drive = case.drive(values)
                 try:
-                    CONTROLLERS[case.controller].compile(drive)
+                    law = CONTROLLERS[case.controller].compile(drive)
+                    for robot in self.described:
+                        check_drives(law, robot)
                 except SimulationInputError as error:
                     raise InvalidRequest(str(error), field=f"walks.{index}.design") from error
         self._check_gaits(space, cases)

@@ -246,9 +246,10 @@ class CertificateSpec(WalksSpec):
         self.check_precision()
         self._check_engines()
         try:
-            CONTROLLERS[self.controller].compile(self.numbers)
+            law = CONTROLLERS[self.controller].compile(self.numbers)
         except SimulationInputError as error:
             raise InvalidRequest(str(error), field="design") from error
+        self.check_drives(law)
         names, values = tuple(self.numbers), tuple(self.numbers.values())
         for index, scenario in enumerate(self.resolved_scenarios()):
             try:

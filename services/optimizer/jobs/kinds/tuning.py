@@ -121,10 +121,11 @@ class JobSpec(WalksSpec):
         space, scenarios = self.design_space(), self.resolved_scenarios()
         for design in space.corners():
             try:
-                CONTROLLERS[self.controller].compile(design)
+                law = CONTROLLERS[self.controller].compile(design)
                 with_gait(scenarios[0], _gait_of(design))
             except SimulationInputError as error:
                 raise space.refusal(error) from error
+            self.check_drives(law)
         self._check_worlds()
         searches_posture = any(split_name(v.name)[0] in _POSTURE for v in space.variables)
         gentlest = _gait_of(dict(space.fixed)) | _gentlest_gait(space.variables)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import (
     PREFERENCES,
@@ -17,8 +18,11 @@ from services.optimizer.jobs.preference import (
     judge,
 )
 from services.optimizer.jobs.spec import Spec
+from sim.controllers import ControlLaw
+from sim.errors import SimulationInputError
 from sim.outcome import OBJECTIVES, Objective
 from sim.scenario import Scenario, ScenarioChoice, find_scenario
+from sim.simulate import check_drives
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +51,20 @@ class WalksSpec(Spec):
     def resolved_preference(self) -> Preference:
         """The preference in full."""
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
+
+    def check_drives(self, law: ControlLaw) -> None:
+        """Check that the controller can drive the robot's actuators.
+
+        Args:
+            law: Of any design of the controller.
+
+        Raises:
+            InvalidRequest: It cannot; its field is `controller`.
+        """
+        try:
+            check_drives(law, self.robot)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field="controller") from error
 
     @property
     def objectives(self) -> tuple[Objective, ...]:

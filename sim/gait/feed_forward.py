@@ -1,0 +1,65 @@
+"""Torques with which the legs that a gait has on the ground carry the robot."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.gait.trajectory import Trajectory
+from sim.robot import Robot
+from sim.robot.description import JOINTS_PER_LEG
+from sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
+
+Floats = NDArray[np.float64]
+
+_ON_THE_GROUND: Final = 0.1
+"""Share of a foot's lift up to which it counts as on the ground: a filter rounds its path."""
+
+
+_DECIMALS: Final = 9
+"""Of torques in N m that are kept: a walk must be the same anywhere."""
+
+
+def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Floats:
+    """Feed-forward of a walk: the feet on the ground share the robot's weight evenly.
+
+    tau = -J^T (0, 0, f), f the weight by the number of feet that are down, J of the desired angles:
+    the static part of the feed-forward of Di Carlo et al. (Dynamic locomotion in the MIT Cheetah 3
+    through convex model-predictive control, 2018), without its optimization. The body is taken as
+    level; loads, which a robot does not know of, are left out.
+
+    Args:
+        robot: The robot.
+        trajectory: Of the walk.
+        gravity: [m/s2].
+
+    Returns:
+        (T, J) [N m].
+    """
+    angles = trajectory.angles
+    height, slopes = np.empty((len(angles), len(robot.legs))), np.empty_like(angles)
+    for number, leg in enumerate(robot.legs):
+        own = slice(JOINTS_PER_LEG * number, JOINTS_PER_LEG * (number + 1))
+        height[:, number], slopes[:, own] = _height(leg, angles[:, own])
+    lowest, highest = height.min(axis=0), height.max(axis=0)
+    down = height <= lowest + _ON_THE_GROUND * (highest - lowest)
+    force = robot.mass * gravity / np.maximum(down.sum(axis=1), 1)
+    forces = np.repeat(down * force[:, np.newaxis], JOINTS_PER_LEG, axis=1)
+    # numpy's functions of angles differ in the last bit between processors.
+    return np.round(-forces * slopes, _DECIMALS)
+
+
+def _height(leg: LegKinematics, angles: Floats) -> tuple[Floats, Floats]:
+    """Of the foot in the body's frame (T,) [m], and its derivatives by angle (T, 3) [m]."""
+    if isinstance(leg, ChainLeg):
+        at, slopes = leg.feet(angles)
+        return at[:, 2], slopes[:, 2, :]
+    assert isinstance(leg, KneeUpLeg)  # noqa: S101
+    _, femur, tibia = leg.lengths
+    first, both = angles[:, 1], angles[:, 1] + angles[:, 2]
+    height = leg.hip[2] + femur * np.sin(first) + tibia * np.sin(both)
+    outward = tibia * np.cos(both)
+    turned = [np.zeros(len(angles)), femur * np.cos(first) + outward, outward]
+    return height, np.stack(turned, axis=1)

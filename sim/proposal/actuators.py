@@ -1,0 +1,207 @@
+"""Proposed actuators as text of a robot.toml, with what controls them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from sim.proposal.drive import DriveNumbers
+from sim.robot.actuators import ActuatorKind
+
+_VOLTAGE: Final = 24.0
+"""Of a battery that is unknown [V]."""
+
+_RATIO: Final = 9.0
+"""Of a gearhead that is unknown."""
+
+_EFFICIENCY: Final = 0.95
+
+_LARGEST_CODE: Final = 26000.0
+"""Of a current at standstill: some room is left below what 16 bits hold [counts]."""
+
+ACTUATOR_NOTES: Final[Mapping[ActuatorKind, str]] = MappingProxyType(
+    {
+        "dc": "actuators are DC motors with gearheads; see --actuator torque",
+        "torque": "actuators are torque-controlled; see --actuator dc",
+    }
+)
+
+_KNEE: Final = 0.5
+"""Share of the speed limit up to which a quasi-direct drive has all of its torque."""
+
+_STIFFNESS, _DAMPING = (0.5, 10.0), (0.005, 0.1)
+"""Bounds of a joint PD's gains per torque limit [1/rad], [s/rad]."""
+
+
+def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
+    """Lines of robot.toml: actuators, battery, command and sensors.
+
+    Args:
+        kind: Of the actuators.
+        drives: By leg and joint.
+
+    Returns:
+        The lines.
+    """
+    if kind == "torque":
+        return [*_torque_actuators(drives), *_torque_electronics(drives)]
+    return [*_dc_motors(drives), *_dc_electronics(drives)]
+
+
+def proposed_control(
+    kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]
+) -> dict[str, Any]:
+    """A controller, and bounds of its variables that follow from the torques.
+
+    Args:
+        kind: Of the actuators.
+        drives: By leg and joint.
+
+    Returns:
+        Fields of a job's spec.
+    """
+    if kind == "dc":
+        return {"controller": "pid"}
+    limit = float(np.median([drive.torque for of_leg in drives for drive in of_leg]))
+
+    def variable(name: str, unit: str, bounds: tuple[float, float]) -> dict[str, Any]:
+        low, high = (float(f"{share * limit:.3g}") for share in bounds)
+        return {"name": name, "low": low, "high": high, "unit": unit}
+
+    return {
+        "controller": "joint-pd",
+        "variables": [
+            variable("Kp", "N m/rad", _STIFFNESS),
+            variable("Kd", "N m s/rad", _DAMPING),
+            "feed_forward",
+        ],
+    }
+
+
+def drive_names(drives: Sequence[Sequence[DriveNumbers]]) -> dict[DriveNumbers, str]:
+    """A name for every drive that differs.
+
+    Args:
+        drives: By leg and joint.
+
+    Returns:
+        By drive.
+    """
+    kinds = dict.fromkeys(drive for of_leg in drives for drive in of_leg)
+    return {drive: f"drive{number}" for number, drive in enumerate(kinds, start=1)}
+
+
+def _dc_motors(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
+    lines = [
+        "",
+        "# Each drive is a DC motor whose torque falls from standstill to its no-load speed at",
+        f"# {_VOLTAGE:g} V; rotors weigh 2 % of a leg's part of the mass at the leg's length.",
+    ]
+    for drive, name in drive_names(drives).items():
+        constant = _VOLTAGE / drive.speed / _RATIO
+        resistance = _VOLTAGE * constant * _RATIO / drive.torque
+        lines += [
+            "",
+            f"[motors.{name}]                     # {drive.note}",
+            f"torque_constant = {constant:.6g}    # N m/A",
+            f"resistance = {resistance:.6g}       # ohm",
+            "inductance = 1e-4                   # H",
+            f"rotor_inertia = {drive.armature / _RATIO**2:.6g}    # kg m2",
+            "viscous_friction = 0.0              # N m s/rad",
+            "",
+            f"[gearheads.{name}]",
+            f"ratio = {_RATIO}",
+            f"nominal_torque = {drive.torque:.6g}    # N m",
+            f"nominal_speed = {drive.speed * _RATIO:.6g}    # rad/s, motor side",
+            f"efficiency = {_EFFICIENCY}          # guessed",
+            "",
+            f"[actuators.{name}]",
+            f"motor = {quoted(name)}",
+            f"gearhead = {quoted(name)}",
+        ]
+    return lines
+
+
+def _torque_actuators(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
+    lines = [
+        "",
+        "# Each actuator has its torque up to half its speed limit, and less from there on.",
+        f"# Guessed: the motor's voltage at the speed limit is {_VOLTAGE:g} V; its heat at the",
+        "# torque limit is the largest power of a line from the one limit to the other; rotors",
+        "# weigh 2 % of a leg's part of the mass at the leg's length; there is no friction.",
+    ]
+    for drive, name in drive_names(drives).items():
+        constant = _VOLTAGE / drive.speed
+        resistance = constant**2 * drive.speed / (4.0 * drive.torque)
+        lines += [
+            "",
+            f"[actuators.{name}]                  # {drive.note}",
+            'kind = "torque"',
+            f"gear_ratio = {_RATIO}              # guessed",
+            f"torque_constant = {constant / _RATIO:.6g}    # N m/A",
+            f"resistance = {resistance:.6g}       # ohm",
+            f"rotor_inertia = {drive.armature / _RATIO**2:.6g}    # kg m2",
+            f"torque_limit = {drive.torque:.6g}   # N m",
+            f"speed_limit = {drive.speed:.6g}     # rad/s",
+            f"knee_speed = {_KNEE * drive.speed:.6g}      # rad/s",
+        ]
+    return lines
+
+
+def _torque_electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
+    return [
+        "",
+        "[supply]                            # guessed",
+        f"voltage = {_VOLTAGE}                 # V, open circuit",
+        "resistance = 0.01                   # ohm",
+        "",
+        "[torque_command]",
+        "rate = 1000                         # Hz, of the joint PD in the actuators; guessed",
+        "",
+        *_sensors(max(d.torque * d.speed for of_leg in drives for d in of_leg) / _VOLTAGE),
+    ]
+
+
+def _dc_electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
+    largest = max(d.torque * d.speed for of_leg in drives for d in of_leg) / _VOLTAGE
+    return [
+        "",
+        "[supply]                            # guessed",
+        f"voltage = {_VOLTAGE}                 # V, open circuit",
+        "resistance = 0.01                   # ohm",
+        f"nominal_voltage = {_VOLTAGE}         # V",
+        "",
+        "[pwm]                               # a fine 10 bits and a sign",
+        "counts = 1023",
+        f"full_scale = {_VOLTAGE}              # V",
+        "step = 1",
+        "",
+        *_sensors(largest),
+    ]
+
+
+def _sensors(largest: float) -> list[str]:
+    """largest: current [A]."""
+    return [
+        "[sensors]                           # 16 bits a turn, 12 bits of current",
+        "angle_counts = 10430.0              # a rad",
+        "angle_step = 1",
+        f"current_counts = {_LARGEST_CODE / largest:.6g}    # an A",
+        "current_step = 16",
+    ]
+
+
+def quoted(text: str) -> str:
+    """Text as a string of TOML.
+
+    Args:
+        text: The text.
+
+    Returns:
+        In quotes.
+    """
+    return json.dumps(text, ensure_ascii=False)

@@ -43,7 +43,7 @@ class InnerLoop:
             tick: Of the walk.
             output: Of the controllers, (J,) [counts].
         """
-        self._commanded = output * self._coding.duty_per_count
+        self._commanded = output.astype(np.float64) * self._coding.duty_per_count
         if self._limit is None:
             return
         desired, carrying = self._setup.desired, self._setup.feed_forward

@@ -18,9 +18,10 @@ from sim.scenario import Scenario
 def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
     """Write a robot in a scenario as MJCF that MuJoCo's viewer opens and steps.
 
-    It has the scenario's load and slope, joints with the motors' voltages as controls [V], shapes
-    to be seen, and a keyframe `start`, the pose in which a walk through the scenario begins.
-    Backlash, the battery's sag and static friction are not in it.
+    It has the scenario's load and slope, joints with the motors' voltages as controls [V], or with
+    torques [N m] where these are controlled, shapes to be seen, and a keyframe `start`, the pose in
+    which a walk through the scenario begins. Backlash, limits of torque by speed, the battery's sag
+    and static friction are not in it.
 
     Args:
         robot: The robot.

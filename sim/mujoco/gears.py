@@ -25,22 +25,17 @@ class Drive:
         voltage: [V].
         current: [A].
         torque: at the gearheads' outputs, after friction [N m].
+        damping: by which these fall as rates grow, static friction left out [N m s/rad].
     """
 
     voltage: Floats
     current: Floats
     torque: Floats
+    damping: Floats
 
 
 class Motors(Protocol):
-    """Motors of either kind, with the friction behind them.
-
-    Attributes:
-        damping: by which torques after friction fall with the rates, static friction left out,
-            (J,) [N m s/rad].
-    """
-
-    damping: Floats
+    """Motors of either kind, with the friction behind them."""
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
         """The motors at an instant.
@@ -53,11 +48,11 @@ class Motors(Protocol):
             Voltages, currents and torques.
         """
 
-    def current_after(self, current: Floats, faster: Floats) -> Floats:
+    def current_after(self, drive: Drive, faster: Floats) -> Floats:
         """Currents under the same command when the rates have grown.
 
         Args:
-            current: Before, (J,) [A].
+            drive: Before.
             faster: By which the rates have grown, (J,) [rad/s].
 
         Returns:
@@ -86,17 +81,12 @@ class TorqueMotors:
     Args:
         actuators: Of the robot.
         numbers: As for `DcMotors`.
-
-    Attributes:
-        damping: by which torques after friction fall with the rates, where speed limits none and
-            static friction is left out, (J,) [N m s/rad].
     """
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
         self._a, self._friction = actuators, _Friction(numbers)
         self._source = float(numbers["supply_voltage"][0])
         self._internal = float(numbers["supply_resistance"][0])
-        self.damping = self._friction.viscous
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
         """The actuators at an instant."""
@@ -105,19 +95,20 @@ class TorqueMotors:
         # U (source - U) / internal = power.
         square = max(0.25 * self._source**2 - self._internal * power, 0.0)
         stall = a.stall_torque + a.stall_torque_per_volt * (0.5 * self._source + math.sqrt(square))
-        torque = np.clip(
-            wanted,
-            np.minimum(-stall - a.torque_drop * rates, 0.0),
-            np.maximum(stall - a.torque_drop * rates, 0.0),
-        )
+        least, most = (sign * stall - a.torque_drop * rates for sign in (-1.0, 1.0))
+        torque = np.clip(wanted, np.minimum(least, 0.0), np.maximum(most, 0.0))
+        on_the_line = (torque == most) | (torque == least)
         current = torque / a.torque
         voltage = a.resistance * current + a.torque * rates
-        return Drive(voltage, current, self._friction.behind(torque, rates))
+        damping = a.torque_drop * on_the_line + self._friction.viscous
+        return Drive(voltage, current, self._friction.behind(torque, rates), damping)
 
-    def current_after(self, current: Floats, faster: Floats) -> Floats:
-        """The same: torques are held."""
-        del faster
-        return current
+    def current_after(self, drive: Drive, faster: Floats) -> Floats:
+        """The same where torques are held, less where speed limits them."""
+        after: Floats = (
+            drive.current - (drive.damping - self._friction.viscous) / (self._a.torque) * faster
+        )
+        return after
 
 
 class DcMotors:
@@ -128,10 +119,6 @@ class DcMotors:
         numbers: `viscous` and, of a robot that has it, `static_friction` (J,), and the battery's
             `supply_voltage` and `supply_resistance` (1,), as `sim.kernel.parameters.Layout` has
             them.
-
-    Attributes:
-        damping: by which torques after friction fall with the rates, static friction left out,
-            (J,) [N m s/rad].
     """
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
@@ -139,7 +126,7 @@ class DcMotors:
         self._friction = _Friction(numbers)
         self._source = float(numbers["supply_voltage"][0])
         self._internal = float(numbers["supply_resistance"][0])
-        self.damping = self._k**2 / self._r + self._friction.viscous
+        self._damping = self._k**2 / self._r + self._friction.viscous
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
         """The motors at an instant.
@@ -160,19 +147,20 @@ class DcMotors:
         )
         voltage = duty * supply
         current = (voltage - back) / self._r
-        return Drive(voltage, current, self._friction.behind(self._k * current, rates))
+        torque = self._friction.behind(self._k * current, rates)
+        return Drive(voltage, current, torque, self._damping)
 
-    def current_after(self, current: Floats, faster: Floats) -> Floats:
+    def current_after(self, drive: Drive, faster: Floats) -> Floats:
         """Currents at the same voltages when the rates have grown.
 
         Args:
-            current: Before, (J,) [A].
+            drive: Before.
             faster: By which the rates have grown, (J,) [rad/s].
 
         Returns:
             After, (J,) [A].
         """
-        after: Floats = current - self._k / self._r * faster
+        after: Floats = drive.current - self._k / self._r * faster
         return after
 
 
@@ -328,7 +316,7 @@ class LooseGears:
 
     def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
         """Motors damp at the given time of the step, shafts at its beginning."""
-        inertia = self._inertia + implicit * timestep * self.motors.damping
+        inertia = self._inertia + implicit * timestep * actuation.drive.damping
         own: Floats = (actuation.drive.torque - actuation.torque) / inertia
         self.rates = self.rates + timestep * own
         return own

@@ -96,7 +96,8 @@ class Rig:
         friction_impedance: MuJoCo's impratio, how much stiffer than a contact's normal constraint
             its tangential one is [1].
         voltage_motors: whether joints have actuators that turn a motor's voltage [V] into its
-            torque, quasi-static, friction included. Else torques come from outside.
+            torque, quasi-static, friction included; those of torque-controlled joints take the
+            torque [N m]. Else torques come from outside.
         looks: links with shapes to be seen; soles are drawn as they are.
         start: positions of a keyframe `start`, as MuJoCo's qpos; None for no keyframe.
     """

@@ -156,7 +156,9 @@ def _is_class(part: str | int) -> bool:
 def _meaning(location: tuple[str | int, ...]) -> str | None:
     """Description, with unit, of a field of any part of a robot description."""
     own = (TorqueActuator,) if "torque" in location[2:3] else ()
-    for part in (*own, *_PARTS):
-        if location and location[-1] in part.model_fields:
-            return part.model_fields[str(location[-1])].description
+    field = str(location[-1]) if location else ""
+    parts: tuple[type[BaseModel], ...] = (*own, *_PARTS)
+    for part in parts:
+        if field in part.model_fields:
+            return part.model_fields[field].description
     return None

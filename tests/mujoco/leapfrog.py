@@ -50,8 +50,6 @@ class Leapfrog:
     ) -> None:
         self._m, self._d, self._robot, self._gears, self._ground = m, d, robot, gears, ground
         self._resistance = Resistance(robot, ground)
-        # Rotors behind backlash are damped by themselves.
-        self._damping = np.zeros(robot.n_joints) if gears.memory else gears.motors.damping
         legs = robot.description.legs
         self._bodies = [int(m.site_bodyid[m.site(leg.foot).id]) for leg in legs]
 
@@ -90,7 +88,7 @@ class Leapfrog:
         inertia = np.zeros((m.nv, m.nv))
         mujoco.mj_fullM(m, d, inertia)
         force = d.qfrc_applied - d.qfrc_bias
-        inertia[range(6, m.nv), range(6, m.nv)] += half * self._damping
+        inertia[range(6, m.nv), range(6, m.nv)] += half * self._damping(actuation)
         for leg in np.flatnonzero(damping.any(axis=(1, 2))).tolist():
             jacobian, gain = self._foot(leg)
             resistance = half * jacobian.T @ damping[leg]
@@ -101,6 +99,11 @@ class Leapfrog:
         own = self._gears.kick(actuation, timestep, implicit=0.5)
         spins = acceleration[6:] if own is None else own
         return self._accelerate(acceleration, actuation, spins, timestep)
+
+    def _damping(self, actuation: Actuation) -> Floats:
+        """Of the motors on the links; rotors behind backlash are damped by themselves."""
+        damping = actuation.drive.damping
+        return np.zeros_like(damping) if self._gears.memory else damping
 
     def _foot(self, leg: int) -> tuple[Floats, Floats]:
         """J of a foot (3, V), and what its velocity gains without accelerations (3,) [m/s2].
@@ -133,8 +136,9 @@ class Leapfrog:
             acceleration=gain + cross(angular + half * turn, middle),
             angular_acceleration=turn,
             attitude=attitude,
-            load=actuation.torque - (half * self._damping + gears.armature) * acceleration[6:],
-            current=gears.motors.current_after(drive.current, half * spins),
+            load=actuation.torque
+            - (half * self._damping(actuation) + gears.armature) * acceleration[6:],
+            current=gears.motors.current_after(drive, half * spins),
             voltage=drive.voltage,
         )
 

@@ -12,9 +12,9 @@ from sim.kernel.physics_step import physics_model
 from sim.mujoco.gears import Gears, LooseGears
 from sim.mujoco.ground import Ground, Stick
 from sim.mujoco.model import model
-from sim.robot import Robot, RobotVariant, load_robot
+from sim.robot import Robot, RobotChoice, RobotFiles, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
-from tests.examples.walks import STEEP, random_state
+from tests.examples.walks import STEEP, random_state, torque_quadruped_files
 from tests.mujoco.leapfrog import Leapfrog
 from tests.mujoco.numbers import even_feet, own_gears, own_ground
 from tests.mujoco.resistance import Floats, apply_forces, feet_of
@@ -22,13 +22,25 @@ from tests.mujoco.walker import LANDING_HORIZON
 
 TIMESTEP = 2e-4
 DATASHEET = RobotVariant(name="szabadka2")
-VARIANTS = {
+
+
+def without_static_friction(files: RobotFiles) -> RobotFiles:
+    """Its slope is not in the leapfrog over here."""
+    return files.model_copy(update={"toml": files.toml.replace("static_friction = 0.1", "")})
+
+
+VARIANTS: dict[str, RobotChoice] = {
     "default": RobotVariant(),
     "linear zone": DATASHEET,
     "karnopp": DATASHEET.model_copy(update={"contact_law": "karnopp"}),
     "dead zone": DATASHEET.model_copy(update={"contact_law": "dead_zone"}),
     "stick": DATASHEET.model_copy(update={"contact_law": "stick"}),
     "default, stick and backlash": RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
+    "torque-controlled": without_static_friction(torque_quadruped_files()),
+    "torque-controlled, limited by voltage": without_static_friction(
+        torque_quadruped_files(line=False)
+    ),
+    "torque-controlled, backlash": without_static_friction(torque_quadruped_files(backlash=0.02)),
 }
 
 

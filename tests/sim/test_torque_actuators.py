@@ -23,6 +23,7 @@ from sim.kernel.physics_step import physics_model
 from sim.kernel.walk import WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot, load_robot
+from sim.robot.actuators import TorqueActuator
 from sim.scenario import SCENARIOS
 from sim.simulate import simulate
 from tests.examples.walks import random_state, short_walk, torque_quadruped_files
@@ -47,7 +48,7 @@ def made(*, line: bool = True, backlash: float = 0.0, rate: int = 1000) -> Robot
 
 
 def law_of(controller: str) -> ControlLaw:
-    return control_law(controller, tuple(DRIVES[controller].items()))  # type: ignore[arg-type]
+    return control_law(controller, tuple(DRIVES[controller].items()))
 
 
 def setup_of(robot: Robot, law: ControlLaw) -> WalkSetup:
@@ -79,7 +80,7 @@ def test_every_controller_walks_and_both_kernels_agree(controller: str) -> None:
 def test_both_kernels_agree_at_any_inner_rate_with_backlash_and_either_limit(
     options: dict[str, float],
 ) -> None:
-    robot = made(**options)  # type: ignore[arg-type]
+    robot = made(**options)
     setup, (coding, _) = setup_of(robot, law_of("joint-pd")), control_steps(robot)
     fast, slow = (
         kernel_of(robot, backend).walk([setup], coding, log=True)[0]
@@ -87,6 +88,8 @@ def test_both_kernels_agree_at_any_inner_rate_with_backlash_and_either_limit(
     )
     assert fast.status is slow.status is Status.OK
     np.testing.assert_allclose(fast.sums, slow.sums, rtol=1e-9)
+    assert fast.states is not None
+    assert slow.states is not None
     np.testing.assert_allclose(fast.states, slow.states, rtol=1e-8, atol=1e-8)
 
 
@@ -142,9 +145,11 @@ def test_single_precision_differs_by_its_rounding() -> None:
 def test_accelerations_agree_with_pinocchio_in_random_states(line: bool) -> None:
     robot = made(line=line)
     model, oracle, a = physics_model(robot), Oracle(robot), robot.actuators()
-    kinds = [
-        robot.description.actuators[n] for leg in robot.description.legs for n in leg.actuators
-    ]
+    kinds = []
+    for name in (name for leg in robot.description.legs for name in leg.actuators):
+        kind = robot.description.actuators[name]
+        assert isinstance(kind, TorqueActuator)
+        kinds.append(kind)
     supply, rng = robot.description.supply, np.random.default_rng(5)
     p = pack_parameters(robot, WALK, 2e-4)
     limited, worst = 0, 0.0

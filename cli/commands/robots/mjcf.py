@@ -31,7 +31,7 @@ def mjcf(
         typer.Option("--output", "-o", metavar="FILE.xml", help="Default: standard output."),
     ] = None,
 ) -> None:
-    """Write a robot as MJCF, which MuJoCo's viewer opens: its controls are the motors' voltages.
+    """Write a robot as MJCF, which MuJoCo's viewer opens: with voltages or torques as controls.
 
     Needs pip install 'gaitswarm[mujoco]'. The viewer comes with pip install mujoco:
     python -m mujoco.viewer --mjcf=FILE.xml.

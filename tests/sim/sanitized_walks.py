@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.assembly import control_steps, plan_walk
 from sim.controllers import CONTROLLERS
+from sim.controllers.base import JointPd
 from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
 from sim.controllers.mamdani import Shape
 from sim.controllers.native_inference import compiled_table
@@ -23,14 +24,16 @@ from sim.kernel.walk import Precision
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
+from tests.examples.walks import torque_quadruped_files
 
 ROBOTS = {
     "plain": load_robot("szabadka2"),
     "karnopp": load_robot(RobotVariant(contact_law="karnopp")),
     "dead zone": load_robot(RobotVariant(contact_law="dead_zone")),
     "all internal state": load_robot(RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0))),
+    "torque": load_robot(torque_quadruped_files()),
 }
-"""One of every law of friction, and one with backlash."""
+"""One of every law of friction, one with backlash, and one with torque-controlled actuators."""
 
 
 def digest_of_walks(
@@ -42,6 +45,8 @@ def digest_of_walks(
 ) -> str:
     """Published optimum A in some scenarios, with a fall and a divergence, an uneven number."""
     law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])
+    if robot.is_torque_controlled:
+        law = dataclasses.replace(law, joint_pd=JointPd(40.0, 1.0, 0.8))
     coding, timestep = control_steps(robot)
     setups = []
     for number, scenario in enumerate(scenarios):

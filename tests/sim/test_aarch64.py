@@ -30,7 +30,13 @@ def emulator() -> Iterator[list[str]]:
 
 @pytest.mark.parametrize(
     ("name", "precision"),
-    [("plain", "double"), ("plain", "single"), ("all internal state", "double")],
+    [
+        ("plain", "double"),
+        ("plain", "single"),
+        ("all internal state", "double"),
+        ("torque", "double"),
+        ("torque", "single"),
+    ],
 )
 def test_walks_and_falls_have_the_same_bits_on_aarch64(
     name: str, precision: Precision, emulator: list[str], tmp_path: Path

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -14,7 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from gaitswarm.errors import simulation_errors
-from gaitswarm.views.robot_check import CheckedLegView, RobotCheckView, StandingView
+from gaitswarm.meshes import find_mesh, mesh_names
+from gaitswarm.views.robot_check import CheckedLegView, MeshView, RobotCheckView, StandingView
 from services.optimizer.errors import InvalidRequest
 from sim.errors import RobotFileError
 from sim.gait.trajectory import desired_angles, require_reachable
@@ -125,11 +127,18 @@ def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
     )
 
 
-def check_robot(files: RobotFiles) -> RobotCheckView:
+def check_robot(
+    files: RobotFiles,
+    *,
+    folder: str | os.PathLike[str] = ".",
+    packages: Sequence[str | os.PathLike[str]] = (),
+) -> RobotCheckView:
     """Load a robot, let it stand, and look for what is unphysical.
 
     Args:
         files: Of the robot.
+        folder: Of its URDF, which paths of meshes are relative to.
+        packages: Folders that `package://` is looked for in, before those of ROS_PACKAGE_PATH.
 
     Returns:
         What was seen.
@@ -169,6 +178,11 @@ def check_robot(files: RobotFiles) -> RobotCheckView:
         held=dict(robot.description.held_joints),
         centre_of_mass=mass.tolist(),
         standing=standing,
+        meshes=[
+            MeshView(name=name, path=None if found is None else str(found))
+            for name in mesh_names(files.urdf)
+            for found in [find_mesh(name, Path(folder), [Path(place) for place in packages])]
+        ],
         warnings=[*warnings, *_unphysical(robot)],
     )
 

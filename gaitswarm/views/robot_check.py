@@ -31,6 +31,15 @@ class StandingView(View):
     height: float = Field(description="Of the body's origin over the ground at the end [m].")
 
 
+class MeshView(View):
+    """A mesh that the URDF names. Pictures could show it; nothing that is simulated needs it."""
+
+    name: str = Field(
+        description="As the URDF has it.", examples=["package://a1_description/meshes/hip.dae"]
+    )
+    path: str | None = Field(description="File that was found; null for none.")
+
+
 class RobotCheckView(View):
     """A robot as it is loaded, and how it stands."""
 
@@ -43,4 +52,5 @@ class RobotCheckView(View):
         description="In the body's frame when it stands [m]."
     )
     standing: StandingView = Field(description="How it stands.")
+    meshes: list[MeshView] = Field(description="That the URDF names, in its order.")
     warnings: list[str] = Field(description="What is unphysical or was guessed badly.")

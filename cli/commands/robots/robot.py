@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from gaitswarm.views.robot_check import RobotCheckView
     from sim.proposal.drive import ActuatorChoice
     from sim.robot import RobotFiles
+
+_NAMED: Final = 5
+"""Missing meshes that are named."""
 
 Folder = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="With robot.toml and robot.urdf.", exists=False)
@@ -70,13 +73,20 @@ def check(
         Path | None,
         typer.Option(metavar="FILE", help="Draw how it stands into FILE.png, .svg or .pdf."),
     ] = None,
+    package_path: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Where package:// of meshes is looked for, before ROS_PACKAGE_PATH; repeatable.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Load a robot, let it stand for a second, and say what there is to it."""
     from cli.output import note, print_json, print_text
     from gaitswarm.robots import check_robot
 
-    view = check_robot(_files(folder))
+    view = check_robot(_files(folder), folder=folder, packages=package_path or [])
     if draw is not None:
         from cli.plots import save
         from cli.robot_picture import draw_robot
@@ -132,6 +142,12 @@ def _told(view: RobotCheckView) -> str:
         stood,
     ]
     lines += [f"held: {name} at {angle:g} rad" for name, angle in view.held.items()]
+    if view.meshes:
+        missing = [mesh.name for mesh in view.meshes if mesh.path is None]
+        lines.append(f"meshes: {len(view.meshes) - len(missing)} of {len(view.meshes)} found")
+        lines += [f"  missing: {name}" for name in missing[:_NAMED]]
+        if len(missing) > _NAMED:
+            lines.append(f"  and {len(missing) - _NAMED} more; name their folder by --package-path")
     return "\n".join(lines) + "\n"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from sim.outcome import Outcome, Status
 
 Floats = NDArray[np.float64]
+
+_PIECE: Final = 4096
+"""Numbers that are converted at once: meanwhile no other thread of Python goes on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,8 +33,12 @@ class Judgement:
     @property
     def utilities(self) -> Floats:
         """(n, K), +inf where the case failed or the number is too great."""
-        rows = [[exponential(u) for u in row] for row in self.log_utilities.tolist()]
-        return np.array(rows, dtype=np.float64).reshape(self.log_utilities.shape)
+        flat = self.log_utilities.reshape(-1)
+        utilities = np.empty(len(flat))
+        for begin in range(0, len(flat), _PIECE):
+            piece = slice(begin, begin + _PIECE)
+            utilities[piece] = [exponential(u) for u in flat[piece].tolist()]
+        return utilities.reshape(self.log_utilities.shape)
 
 
 def exponential(logarithm: float) -> float:

@@ -163,10 +163,14 @@ def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         (n,) fitness, +inf where any walk failed or a double ends.
     """
-    means = [
-        math.inf if math.inf in row else math.fsum(row) / len(row) for row in log_utility.tolist()
-    ]
-    return np.array([exponential(mean) for mean in means], dtype=np.float64)
+    fitness = np.empty(len(log_utility))
+    for begin in range(0, len(log_utility), _PIECE):
+        piece = slice(begin, begin + _PIECE)
+        fitness[piece] = [
+            math.inf if math.inf in row else exponential(math.fsum(row) / len(row))
+            for row in log_utility[piece].tolist()
+        ]
+    return fitness
 
 
 def objective_vectors(

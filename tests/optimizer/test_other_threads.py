@@ -1,0 +1,81 @@
+"""Questions about long histories let other threads of Python go on, a server's event loop first.
+
+While one call of a function in C has the interpreter's lock, all others wait.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+from services.optimizer.analysis.robustness.certificate import certificate
+from services.optimizer.jobs.judgement import Judgement
+from services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
+from tests.certificate.examples import columns, small
+
+WORLDS = 20_000
+
+
+@contextmanager
+def without_collection() -> Iterator[None]:
+    """Garbage of other tests is not to be looked for meanwhile."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def longest_call(compute: Callable[[], object]) -> float:
+    """Share of the processor's time that the longest call of a built-in function takes [1]."""
+    begun: list[float] = []
+    longest = 0.0
+
+    def note(_frame: Any, event: str, _function: Any) -> None:
+        nonlocal longest
+        if event == "c_call":
+            begun.append(time.thread_time())
+        elif event in ("c_return", "c_exception") and begun:
+            longest = max(longest, time.thread_time() - begun.pop())
+
+    compute()
+    with without_collection():
+        before = time.thread_time()
+        compute()
+        total = time.thread_time() - before
+        # Again, for to be told of every call takes longer than most of them.
+        sys.setprofile(note)
+        try:
+            compute()
+        finally:
+            sys.setprofile(None)
+    return longest / total
+
+
+LOGARITHMS = np.random.default_rng(1).random((WORLDS, 8))
+
+
+@pytest.mark.parametrize(
+    "compute",
+    [
+        lambda: geometric_mean(LOGARITHMS),
+        lambda: Judgement(LOGARITHMS[:, 0], LOGARITHMS).utilities,
+        lambda: judge(LOGARITHMS[:, :, None].repeat(6, axis=2), LOGARITHMS < 0, PREFERENCES["A"]),
+    ],
+    ids=["fitness", "utilities", "judgement"],
+)
+def test_designs_are_judged_in_parts(compute: Callable[[], object]) -> None:
+    assert longest_call(compute) < 0.1
+
+
+def test_a_certificate_is_summed_up_in_parts() -> None:
+    spec = small(worlds=WORLDS)
+    walked = columns(spec, np.random.default_rng(1).uniform(5.0, 9.0, (WORLDS + 1, 2)))
+    assert longest_call(lambda: certificate(spec, walked)) < 0.1

@@ -8,7 +8,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Annotated, Final
 
 from anyio.to_thread import run_sync
-from fastapi import Depends, Request, Response
+from fastapi import Depends, Header, Request, Response
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -20,6 +20,7 @@ from services.optimizer.access import Scope as TokenScope
 from services.optimizer.access import Token, Tokens
 from services.optimizer.errors import Forbidden, StoreUnavailable
 from services.optimizer.jobs.audit import LOCAL
+from services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
 from services.optimizer.jobs.quota import Quota
 
 COOKIE: Final = "gaitswarm-token"
@@ -212,6 +213,53 @@ async def quota_of(token: Asking, settings: ServerSettings) -> Quota | None:
         return None
     return Quota(settings.api_max_unfinished_jobs, settings.api_max_unfinished_seconds)
 
+
+def check_may_prioritize(token: Token | None, priority: int) -> None:
+    """Refuse whoever may not put a job before those of others.
+
+    Args:
+        token: of the request; None without one, who may.
+        priority: that is asked for; 0 and less is for everybody who may command the job.
+
+    Raises:
+        Forbidden: the token is of another scope than `admin`.
+    """
+    if priority > DEFAULT and token is not None and not token.scope.allows(TokenScope.ADMIN):
+        raise Forbidden(
+            f"the token {token.name!r} of scope `{token.scope}` may not give a priority above"
+            f" {DEFAULT}, which puts a job before those of others; use one of scope `admin`"
+        )
+
+
+async def job_priority(
+    token: Asking,
+    priority: Annotated[
+        int,
+        Header(
+            alias="Job-Priority",
+            ge=LOWEST,
+            le=HIGHEST,
+            description="How urgent it is: of waiting jobs the one of highest priority is run"
+            " first, and of running jobs one that is a step higher has twice the share of the"
+            " workers. Above 0 it needs a token of scope `admin`, where tokens are required.",
+            examples=[0],
+        ),
+    ] = DEFAULT,
+) -> int:
+    """The priority that a new job is to have.
+
+    Args:
+        token: of the request.
+        priority: as it was sent.
+
+    Raises:
+        Forbidden: the token is of another scope than the priority needs.
+    """
+    check_may_prioritize(token, priority)
+    return priority
+
+
+NewPriority = Annotated[int, Depends(job_priority)]
 
 OwnersQuota = Annotated[Quota | None, Depends(quota_of)]
 

@@ -15,6 +15,25 @@ JobId = Annotated[str, typer.Argument(metavar="ID", help="Identifier of the job.
 
 JobName = Annotated[str | None, typer.Option(help="Name of the job, for people.")]
 
+Priority = Annotated[
+    int,
+    typer.Option(
+        min=-10,
+        max=10,
+        help="How urgent it is: of waiting jobs the highest is run first, and of running jobs one"
+        " that is a step higher has twice the share of the workers. No result depends on it.",
+    ),
+]
+
+Notify = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL",
+        help="Where a JSON document is sent when the job has ended, by a server or runner that"
+        " allows the URL's host.",
+    ),
+]
+
 Server = Annotated[
     str | None,
     typer.Option(metavar="URL", help="Ask this server. [env: GAITSWARM_SERVER]"),

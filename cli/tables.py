@@ -56,12 +56,16 @@ SHORT: Final = {
 
 def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
     """One row a job."""
-    table = Table("id", "name", "state", "iterations", "best fitness", "submitted (UTC)", box=None)
+    table = Table("id", "name", "state", box=None)
+    table.add_column("priority", justify="right")
+    for column in ("iterations", "best fitness", "submitted (UTC)"):
+        table.add_column(column)
     for job in jobs:
         table.add_row(
             job.id,
             _name(job),
             Text(job.state.value, style=_STYLES.get(job.state.value, "")),
+            str(job.priority),
             _spent(job),
             number(job.best_fitness),
             f"{job.created_at:%Y-%m-%d %H:%M}",
@@ -247,6 +251,7 @@ def print_job(job: JobView) -> None:
         "name": job.name or MISSING,
         "state": job.state.value,
         "waiting": job.waiting,
+        "priority": str(job.priority) if job.priority else None,
         "error": job.error,
         "lineage": None if job.lineage is None else lineage_line(job.lineage),
         "iterations": _iterations(job),

@@ -7,7 +7,15 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Depends, Header, Query, Request, Response, status
 
-from api.access import Actor, Owner, OwnersQuota, may_command
+from api.access import (
+    Actor,
+    Asking,
+    NewPriority,
+    Owner,
+    OwnersQuota,
+    check_may_prioritize,
+    may_command,
+)
 from api.bodies import validated
 from api.dependencies import Analysing, JobId, JobIdText, ServerSettings, Service, Slots
 from api.documentation import problems
@@ -18,6 +26,7 @@ from gaitswarm.views import (
     JobSummaryView,
     JobView,
     PageView,
+    PriorityRequest,
     ResumeRequest,
 )
 from services.optimizer.jobs.documents import AnySpec
@@ -99,6 +108,7 @@ def submit_job(
     quota: OwnersQuota,
     sent: Annotated[Any, Depends(request_document)],
     notify: NotifyUrl,
+    priority: NewPriority,
     idempotency_key: IdempotencyKey = None,
 ) -> JobView:
     """Check that the job can be simulated and queue it.
@@ -114,6 +124,7 @@ def submit_job(
         owner=owner,
         notify_url=notify,
         quota=quota,
+        priority=priority,
     )
     if not new:
         response.status_code = status.HTTP_200_OK
@@ -145,6 +156,7 @@ def fork_job(
     quota: OwnersQuota,
     sent: Annotated[Any, Depends(request_document)],
     notify: NotifyUrl,
+    priority: NewPriority,
     idempotency_key: IdempotencyKey = None,
 ) -> JobView:
     """Queue a job that begins with iterations of this one, of which nothing is changed.
@@ -163,6 +175,7 @@ def fork_job(
         owner=owner,
         notify_url=notify,
         quota=quota,
+        priority=priority,
     )
     if not new:
         response.status_code = status.HTTP_200_OK
@@ -309,6 +322,27 @@ def cancel_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     409 if it has ended.
     """
     return _in_full(service, service.command(job_id, Command.CANCEL, actor=actor))
+
+
+@router.put(
+    "/jobs/{job_id}/priority",
+    operation_id="prioritize_job",
+    dependencies=[Depends(may_command)],
+    summary="Give a job another priority",
+    responses=problems(400, 403, 404, 409, 413, 422),
+)
+def prioritize_job(
+    wanted: PriorityRequest, job_id: JobId, service: Service, actor: Actor, token: Asking
+) -> JobView:
+    """Of waiting jobs the one of highest priority is run first, the oldest among equals. Running
+    jobs share the workers: one that is a step higher has twice the share, from its next iteration
+    on. None is interrupted for another.
+
+    No result depends on it. Above 0 it needs a token of scope `admin`, where tokens are required.
+    409 if the job has ended.
+    """
+    check_may_prioritize(token, wanted.priority)
+    return _in_full(service, service.prioritize(job_id, wanted.priority, actor=actor))
 
 
 @router.put(

@@ -74,6 +74,8 @@ class AsyncJobs(ABC):
         spec: SpecInput | None = None,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[SpecOptions],
     ) -> JobView:
         """Check that a job can be simulated, and queue it."""
@@ -85,6 +87,8 @@ class AsyncJobs(ABC):
         from_iteration: int,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[ForkOptions],
     ) -> JobView:
         """Queue a job that begins with iterations of another one."""
@@ -148,6 +152,10 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def evaluations(self, job_id: str) -> EvaluationTable:
         """Take every evaluation of a job at once, as arrays."""
+
+    @abstractmethod
+    async def prioritize(self, job_id: str, priority: int) -> JobView:
+        """Give a job that has not ended another priority."""
 
     @abstractmethod
     async def keep(self, job_id: str, *, kept: bool = True) -> JobView:

@@ -52,6 +52,8 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         spec: SpecInput | None = None,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[SpecOptions],
     ) -> JobView:
         """Check that a job can be simulated, and queue it.
@@ -60,13 +62,19 @@ class Jobs(Findings, Tournaments, Walks, ABC):
             spec: What to do, as `JobSpec`, `IdentificationSpec`, or a document as in docs/api.md;
                 None for the defaults, those of the thesis's chapter 4.
             idempotency_key: A text of your own. The same key and job again make no second job.
+            priority: From -10 to 10: of waiting jobs the one of highest priority is run first, and
+                of running jobs one that is a step higher has twice the share of the workers. No
+                result depends on it.
+            notify_url: Where a JSON document is sent when the job has ended, by a server or runner
+                that allows the URL's host.
             **options: Fields laid over the spec, see `SpecOptions`, such as `controller="pi"`.
 
         Returns:
             The queued job, or the one that the key made before.
 
         Raises:
-            InvalidRequest: It makes no sense or cannot be simulated; names the field.
+            InvalidRequest: It makes no sense or cannot be simulated, or a server does not send to
+                that URL; names the field.
             IdempotencyConflict: The key was used before for another job.
         """
 
@@ -77,6 +85,8 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         from_iteration: int,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[ForkOptions],
     ) -> JobView:
         """Queue a job that begins with iterations of another one, its parent.
@@ -91,6 +101,8 @@ class Jobs(Findings, Tournaments, Walks, ABC):
             from_iteration: First iteration that is the fork's own, counted from 0: it begins with
                 those before it, 0 to `from_iteration` - 1.
             idempotency_key: A text of your own. The same key and fork again make no second job.
+            priority: As for `submit`; the parent's is not taken over.
+            notify_url: As for `submit`.
             **options: What is to be different, see `ForkOptions`, such as `preference="B"`.
 
         Returns:
@@ -227,6 +239,24 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         Raises:
             Conflict: It was cancelled.
             InvalidRequest: The budget is spent already, or too large.
+        """
+
+    @abstractmethod
+    def prioritize(self, job_id: str, priority: int) -> JobView:
+        """Give a job that has not ended another priority.
+
+        A runner that has the job shares its workers accordingly from the next iteration on.
+
+        Args:
+            job_id: Identifier of the job.
+            priority: As for `submit`.
+
+        Returns:
+            The job as it is then.
+
+        Raises:
+            Conflict: It has ended.
+            InvalidRequest: The priority is out of bounds.
         """
 
     @abstractmethod

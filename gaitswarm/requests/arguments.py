@@ -26,6 +26,8 @@ from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.analysis.robustness.certificate import MOST_WORST
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.notification import unusable_url
+from services.optimizer.jobs.priority import check_priority
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.kernel.walk import Precision
 
@@ -76,6 +78,42 @@ def command(text: Command | str) -> Command:
         InvalidRequest: There is none of this name.
     """
     return _one_of(Command, text, "command")
+
+
+def priority(value: int) -> int:
+    """A job's priority.
+
+    Args:
+        value: The higher, the sooner.
+
+    Returns:
+        The same.
+
+    Raises:
+        InvalidRequest: It is no integer, or out of bounds.
+    """
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise InvalidRequest(f"must be an integer, it is {value!r}", field="priority")
+    check_priority(value)
+    return value
+
+
+def notify_url(url: str) -> str:
+    """Where the end of a job is told.
+
+    Args:
+        url: The URL.
+
+    Returns:
+        The same; whether its host is allowed is the matter of whoever sends.
+
+    Raises:
+        InvalidRequest: It is none to which anything could be sent.
+    """
+    reason = unusable_url(url)
+    if reason is not None:
+        raise InvalidRequest(reason, field="notify_url")
+    return url
 
 
 def controller(name: str) -> ControllerName:

@@ -12,7 +12,7 @@ from gaitswarm.views.analysis import (
     RankingRequest,
     RankingView,
 )
-from gaitswarm.views.base import View, finite
+from gaitswarm.views.base import PageView, View, finite
 from gaitswarm.views.budget import EstimateView
 from gaitswarm.views.catalogue import (
     CatalogueView,
@@ -39,7 +39,7 @@ from gaitswarm.views.job import (
     ExtensionRequest,
     JobSummaryView,
     JobView,
-    PageView,
+    PriorityRequest,
     ResumeRequest,
     StateView,
 )
@@ -76,6 +76,7 @@ __all__ = [
     "ParticlesHeaderView",
     "PlannedGaitView",
     "PreferenceView",
+    "PriorityRequest",
     "ProblemView",
     "RankedDesignView",
     "RankingRequest",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Any, Final
+from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
+
+T = TypeVar("T")
 
 
 class View(BaseModel):
@@ -32,6 +34,35 @@ def listing_name(params: tuple[type[Any], ...], kind: str) -> str:
         The name, as clients see it.
     """
     return "".join(param.__name__.removesuffix("View") for param in params) + kind
+
+
+class PageView(View, Generic[T]):
+    """A page of a list. The list is complete when `next` is null."""
+
+    # A parametrized generic does not inherit its docstring.
+    model_config = ConfigDict(
+        json_schema_extra={
+            "description": "A page of a list. The list is complete when `next` is null."
+        }
+    )
+
+    items: list[T] = Field(description="The items, in the list's order.")
+    next: str | None = Field(
+        description="Give it as `after` to get the following page; null on the last page.",
+        examples=["24"],
+    )
+
+    @classmethod
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
+        """Name the schema of a page.
+
+        Args:
+            params: type of the items, as pydantic gives it.
+
+        Returns:
+            The name, as clients see it.
+        """
+        return listing_name(params, "Page")
 
 
 def finite(value: float | None) -> float | None:

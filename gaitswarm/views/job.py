@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Any, Generic, Literal, TypeVar
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gaitswarm.views.base import View, finite, listing_name
+from gaitswarm.views.base import View, finite
 from gaitswarm.views.budget import Spent, budget_spent
 from gaitswarm.views.evaluation import BestView, ObjectiveView
 from gaitswarm.views.links import job_links
@@ -22,42 +22,12 @@ from services.optimizer.jobs.job import (
     UnreadableSpec,
 )
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.priority import HIGHEST, LOWEST
 from services.optimizer.jobs.provenance import ProvenanceRecord
 from services.optimizer.jobs.time_left import time_left
 from sim.kernel.walk import Precision
 
 JobKind = Literal["tuning", "identification", "calibration", "tournament", "certificate"]
-
-T = TypeVar("T")
-
-
-class PageView(View, Generic[T]):
-    """A page of a list. The list is complete when `next` is null."""
-
-    # A parametrized generic does not inherit its docstring.
-    model_config = ConfigDict(
-        json_schema_extra={
-            "description": "A page of a list. The list is complete when `next` is null."
-        }
-    )
-
-    items: list[T] = Field(description="The items, in the list's order.")
-    next: str | None = Field(
-        description="Give it as `after` to get the following page; null on the last page.",
-        examples=["24"],
-    )
-
-    @classmethod
-    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """Name the schema of a page.
-
-        Args:
-            params: type of the items, as pydantic gives it.
-
-        Returns:
-            The name, as clients see it.
-        """
-        return listing_name(params, "Page")
 
 
 class JobSummaryView(View):
@@ -171,6 +141,12 @@ class JobSummaryView(View):
         examples=["ci"],
     )
     kept: bool = Field(default=False, description="Whether it is protected from deletion.")
+    priority: int = Field(
+        default=0,
+        description="How urgent it is: of waiting jobs the one of highest priority is run first,"
+        " and of running jobs one that is a step higher has twice the share of the workers [1].",
+        examples=[0],
+    )
     created_at: datetime = Field(description="When it was submitted, UTC.")
     updated_at: datetime = Field(description="When its state or progress last changed, UTC.")
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
@@ -180,8 +156,8 @@ class JobSummaryView(View):
         " `best`, `distribution`, `particles`, `export`; for a job that tunes a drive `ranking`"
         " (POST) and, once it has a best design, `scenarios`, `preferences` (POST), `firmware`;"
         " `evidence` and `verify` (POST) once an iteration is committed; `parent` of a fork; those"
-        " of `pause`, `resume`, `cancel`, `extend`, `fork` (POST), `keep` (PUT, DELETE) and"
-        " `delete` (DELETE) that its state allows.",
+        " of `pause`, `resume`, `cancel`, `extend`, `fork` (POST), `keep` (PUT, DELETE),"
+        " `priority` (PUT) and `delete` (DELETE) that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -307,6 +283,16 @@ class ResumeRequest(BaseModel):
     )
 
 
+class PriorityRequest(BaseModel):
+    """Another priority for a job."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    priority: int = Field(
+        ge=LOWEST, le=HIGHEST, description="The higher, the sooner; 0 is usual [1].", examples=[5]
+    )
+
+
 class StateView(View):
     """A change of a job's state, as the event stream tells it."""
 
@@ -361,6 +347,7 @@ def _summary(job: Job) -> dict[str, object]:
         "lineage": job.lineage,
         "owner": job.owner,
         "kept": job.kept,
+        "priority": job.priority,
         "created_at": job.created_at,
         "updated_at": job.updated_at,
         "started_at": job.started_at,

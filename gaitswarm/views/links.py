@@ -49,6 +49,8 @@ def job_links(job: Job) -> dict[str, str]:
         resources["verify"] = f"{here}/verify"
         commands["fork"] = f"{here}/fork"
     commands["keep"] = f"{here}/keep"
+    if not job.state.terminal:
+        commands["priority"] = f"{here}/priority"
     if job.state in DELETABLE and not job.kept:
         commands["delete"] = here
     if job.lineage is not None:

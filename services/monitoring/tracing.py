@@ -18,7 +18,7 @@ from opentelemetry.trace import Span, Status, StatusCode, set_span_in_context
 
 from services.optimizer.errors import LeaseLost
 from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, JobState
+from services.optimizer.jobs.job import Claim, JobState, Renewal
 from services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
 from services.optimizer.store.base import Store
 from sim.outcome import Outcome
@@ -217,9 +217,9 @@ class _TracedStore:
             self._tracing.job_begins(claim)
         return claim
 
-    def renew(self, claim: Claim, **kwargs: Any) -> JobState:
-        state: JobState = self._held(claim, lambda: self._inner.renew(claim, **kwargs))
-        return state
+    def renew(self, claim: Claim, **kwargs: Any) -> Renewal:
+        renewal: Renewal = self._held(claim, lambda: self._inner.renew(claim, **kwargs))
+        return renewal
 
     def commit(self, claim: Claim, done: CompletedIteration, following: Any) -> JobState:
         state: JobState = self._held(claim, lambda: self._inner.commit(claim, done, following))

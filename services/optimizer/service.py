@@ -12,13 +12,15 @@ import numpy as np
 from services.optimizer.analysis.fork import Parent, check_begun, forked
 from services.optimizer.analysis.questions import Questions
 from services.optimizer.analysis.start import started
+from services.optimizer.commands import Commands
 from services.optimizer.deletion import Deletion
 from services.optimizer.errors import ProvenanceChanged
 from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, checked_length, estimate
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.iteration import Evaluation, Iteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
+from services.optimizer.jobs.job import Claim, Job, JobOrder, JobState, refusal
+from services.optimizer.jobs.priority import check_priority
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
@@ -32,7 +34,7 @@ _EARLIER: Final = 50
 
 
 @dataclass(frozen=True, slots=True)
-class JobService(Questions, Deletion):
+class JobService(Questions, Commands, Deletion):
     """Jobs as their users see them. Thread-safe, as the store is.
 
     Attributes:
@@ -61,6 +63,7 @@ class JobService(Questions, Deletion):
         owner: str | None = None,
         notify_url: str | None = None,
         quota: Quota | None = None,
+        priority: int = 0,
     ) -> tuple[Job, bool]:
         """Check that the job can be simulated and queue it.
 
@@ -74,15 +77,18 @@ class JobService(Questions, Deletion):
             owner: Name of the token that the request came with, if any.
             notify_url: Where its end is told, if anywhere; checked.
             quota: What the owner's unfinished jobs may come to; None for no limit.
+            priority: From -10 to 10; the higher, the sooner.
 
         Returns:
             The job, and whether it is new.
 
         Raises:
-            InvalidRequest: It cannot be simulated; names the field.
+            InvalidRequest: It cannot be simulated, or the priority is out of bounds; names the
+                field.
             IdempotencyConflict: The key was used before, for another job.
             QuotaExceeded: The owner has too much under way.
         """
+        check_priority(priority)
         seconds = self._check(spec)
         if request is None:
             request = spec.model_dump(mode="json", exclude_unset=True)
@@ -95,6 +101,7 @@ class JobService(Questions, Deletion):
             notify_url=notify_url,
             seconds=seconds,
             quota=quota,
+            priority=priority,
         )
 
     def fork(
@@ -107,6 +114,7 @@ class JobService(Questions, Deletion):
         owner: str | None = None,
         notify_url: str | None = None,
         quota: Quota | None = None,
+        priority: int = 0,
     ) -> tuple[Job, bool]:
         """Queue a job that begins with iterations of another one.
 
@@ -119,6 +127,7 @@ class JobService(Questions, Deletion):
             owner: name of the token that the request came with, if any.
             notify_url: where its end is told, if anywhere; checked.
             quota: what the owner's unfinished jobs may come to; None for no limit.
+            priority: from -10 to 10; the higher, the sooner. The parent's is not taken over.
 
         Returns:
             The fork, whose `lineage` says what it took over, and whether it is new.
@@ -133,6 +142,7 @@ class JobService(Questions, Deletion):
             IdempotencyConflict: the key was used before, for another job.
             QuotaExceeded: the owner has too much under way.
         """
+        check_priority(priority)
         job = self.job(job_id)
         check_begun(job, request.from_iteration)
         columns = self.columns(job)
@@ -158,6 +168,7 @@ class JobService(Questions, Deletion):
             notify_url=notify_url,
             seconds=seconds,
             quota=quota,
+            priority=priority,
         )
 
     def submit_embedded(self, spec: Spec) -> Claim:
@@ -274,37 +285,6 @@ class JobService(Questions, Deletion):
             order=order,
             after=after,
             limit=limit,
-        )
-
-    def command(
-        self,
-        job_id: str,
-        command: Command,
-        *,
-        accept_changes: bool = False,
-        actor: str = LOCAL,
-        quota: Quota | None = None,
-    ) -> Job:
-        """Pause, resume or cancel a job.
-
-        Args:
-            job_id: id of the job.
-            command: what to do with it.
-            accept_changes: for a job that is resumed, whether whoever takes it up may go on
-                although what its numbers depend on has changed.
-            actor: name of the token that the request came with, if any; for the audit log.
-            quota: what the unfinished jobs of the job's owner may come to; None for no limit.
-
-        Returns:
-            The job as it is then.
-
-        Raises:
-            NotFound: no job of that id.
-            Conflict: not possible in its state; says what is.
-            QuotaExceeded: it had ended, and its owner has too much under way.
-        """
-        return self.store.command(
-            job_id, command, accept_changes=accept_changes, actor=actor, quota=quota
         )
 
     def check_unchanged(self, job: Job) -> None:

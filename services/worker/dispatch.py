@@ -17,7 +17,7 @@ from services.worker.durations import CaseTime, Durations, costs_of
 from services.worker.failures import killed_workers, misshapen, unlike
 from services.worker.fair_queue import FairQueue
 from services.worker.pace import Pace, TaskTime
-from services.worker.tasks import Answer, Task, TaskTotals
+from services.worker.tasks import Answer, Load, Task, TaskTotals
 from services.worker.tries import Running, Tries, Verdict, straggler
 from sim.case import LongCase, WalkingCase
 from sim.kernel.walk import Precision
@@ -101,21 +101,6 @@ class Work:
         return Task.of(request.cases, request.designs, self.chunk.parts, request.provenance)
 
 
-@dataclass(frozen=True, slots=True)
-class Load:
-    """What workers have to do.
-
-    Attributes:
-        slots: Tasks that can run at the same time.
-        used: Slots that have a task.
-        waiting: Tasks that wait for a slot.
-    """
-
-    slots: int = 0
-    used: int = 0
-    waiting: int = 0
-
-
 @dataclass(slots=True, eq=False)
 class Dispatcher:
     """Hands the chunks of all requests to whoever takes them, and puts results where they belong.
@@ -162,7 +147,7 @@ class Dispatcher:
         with self._changed:
             self._refuse_if_closed()
             for chunk in chunks:
-                self._queue.push(request.job_id, chunk.cost, Work(batch, chunk))
+                self._queue_up(Work(batch, chunk))
             self._changed.notify_all()
         self._await(batch, should_stop)
         self._note_pace(batch)
@@ -266,7 +251,7 @@ class Dispatcher:
             if verdict is Verdict.GIVEN_UP:
                 self._end(batch, killed_workers(batch.request, chunk, batch.tries[chunk].killed))
             elif verdict is Verdict.AGAIN:
-                self._queue.push(batch.request.job_id, chunk.cost, Work(batch, chunk))
+                self._queue_up(Work(batch, chunk))
                 self._changed.notify_all()
 
     def fail(self, work: Work, error: BaseException) -> None:
@@ -337,8 +322,13 @@ class Dispatcher:
                 del self._paces[next(iter(self._paces))]
                 del self._durations[next(iter(self._durations))]
 
+    def _queue_up(self, work: Work) -> None:
+        """For a worker; the caller holds the lock, and so do those of the next three."""
+        request = work.batch.request
+        self._queue.push(request.job_id, work.chunk.cost / request.weight, work)
+
     def _hand_out(self, work: Work) -> None:
-        """To a worker; the caller holds the lock, and so do those of the next two."""
+        """To a worker."""
         work.taken = self.clock()
         tries = work.batch.tries
         tries[work.chunk] = tries.get(work.chunk, Tries()).sent()

@@ -20,6 +20,8 @@ class _Flow(Generic[T]):
 class FairQueue(Generic[T]):
     """Start-time fair queuing: flows share the workers equally by cost, whatever their length.
 
+    A flow whose costs are divided by a weight gets that many times the share of one of weight 1.
+
     Each flow has a clock that advances by the cost of its tasks; the flow that is least advanced
     is next, the one that came first among equals. A flow that was idle starts at the present, so
     that waiting earns no credit. Within a flow, tasks leave in the order they came in.

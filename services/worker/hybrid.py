@@ -10,10 +10,10 @@ from typing import Final
 
 from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
 from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.dispatch import Load
 from services.worker.in_process import InProcessEvaluator
 from services.worker.preparation import KernelBuilder
 from services.worker.ray_evaluator import RayEvaluator
+from services.worker.tasks import Load
 from sim.outcome import Outcome
 
 LONG_JOB_SECONDS: Final = 60.0

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from functools import partial
 
 from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.dispatch import Dispatcher, Load, Work
+from services.worker.dispatch import Dispatcher, Work
 from services.worker.preparation import KernelBuilder
-from services.worker.tasks import TaskTotals
+from services.worker.tasks import Load, TaskTotals
 from sim import simulate
 from sim.outcome import Outcome
 

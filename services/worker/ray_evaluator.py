@@ -13,10 +13,10 @@ from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStoppe
 from services.worker.cluster.nodes import Nodes, OwnNode
 from services.worker.cluster.pump import Pump
 from services.worker.cluster.ray_nodes import ClusterNodes
-from services.worker.dispatch import Dispatcher, Load
+from services.worker.dispatch import Dispatcher
 from services.worker.preparation import KernelBuilder, awaited
 from services.worker.ray_session import open_ray
-from services.worker.tasks import TaskTotals
+from services.worker.tasks import Load, TaskTotals
 from sim import simulate
 from sim.outcome import Outcome
 

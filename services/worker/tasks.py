@@ -175,6 +175,21 @@ class TaskTotals:
 
 
 @dataclass(frozen=True, slots=True)
+class Load:
+    """What workers have to do.
+
+    Attributes:
+        slots: Tasks that can run at the same time.
+        used: Slots that have a task.
+        waiting: Tasks that wait for a slot.
+    """
+
+    slots: int = 0
+    used: int = 0
+    waiting: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Failure:
     """What the simulation raised, on its way back from another process.
 

@@ -123,6 +123,34 @@ def test_a_token_to_submit_commands_its_own_jobs_and_no_others(
     assert "nobody's" in refused.json()["detail"]
 
 
+def test_only_a_token_of_all_rights_puts_a_job_before_those_of_others(
+    guarded: httpx2.Client, bearer: Bearer, spec: JobSpec
+) -> None:
+    own, every = bearer(Scope.SUBMIT), bearer(Scope.ADMIN)
+    document = spec.model_dump(mode="json")
+
+    def submitted(headers: dict[str, str], priority: int) -> httpx2.Response:
+        headers = headers | {"Job-Priority": str(priority)}
+        return guarded.post("/v1/jobs", json=document, headers=headers)
+
+    def changed(headers: dict[str, str], job_id: str, priority: int) -> int:
+        path = f"/v1/jobs/{job_id}/priority"
+        return guarded.put(path, json={"priority": priority}, headers=headers).status_code
+
+    refused = submitted(own, 1)
+    assert refused.status_code == 403 and "may not give a priority above 0" in refused.text
+    job = submitted(own, -1).json()
+    assert job["priority"] == -1
+    assert [changed(own, job["id"], priority) for priority in (-5, 0, 1)] == [200, 200, 403]
+    assert changed(every, job["id"], 1) == 200
+    # What an administrator has raised, its owner can lower, and not raise again.
+    assert [changed(own, job["id"], priority) for priority in (0, 1)] == [200, 403]
+    urgent = submitted(every, 10).json()
+    assert urgent["priority"] == 10
+    assert changed(own, urgent["id"], -1) == 403
+    assert changed(bearer(Scope.READ), job["id"], -1) == 403
+
+
 def test_a_token_of_all_rights_commands_every_job(
     guarded: httpx2.Client, bearer: Bearer, store: SqlStore, spec: JobSpec
 ) -> None:

@@ -39,6 +39,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"post {job}/fork",
         f"post {job}/cancel",
         f"delete {job}",
+        f"put {job}/priority",
         f"put {job}/keep",
         f"delete {job}/keep",
         f"get {job}/notifications",

@@ -319,6 +319,33 @@ def test_a_budget_that_makes_no_sense_is_refused_by_name(
     assert answer.json()["errors"][0]["field"] == "iterations"
 
 
+def test_a_job_has_a_priority_which_its_link_changes(client: httpx2.Client) -> None:
+    answer = client.post("/v1/jobs", json=SPEC, headers={"Job-Priority": "-4"})
+    assert answer.json()["priority"] == -4
+    link = answer.json()["links"]["priority"]
+
+    changed = client.put(link, json={"priority": 6})
+
+    assert (changed.status_code, changed.json()["priority"]) == (200, 6)
+    assert client.get("/v1/jobs").json()["items"][0]["priority"] == 6
+    client.post(answer.json()["links"]["cancel"])
+    ended = client.put(link, json={"priority": 0})
+    assert ended.status_code == 409 and "it has ended" in ended.json()["detail"]
+
+
+@pytest.mark.parametrize("priority", [11, -11, 0.5, "many", None])
+def test_what_is_no_priority_is_refused_by_name(
+    client: httpx2.Client, job: Job, priority: object
+) -> None:
+    refused = client.put(f"/v1/jobs/{job.id}/priority", json={"priority": priority})
+    assert refused.status_code == 422
+    assert [error["field"] for error in refused.json()["errors"]] == ["priority"]
+
+    refused = client.post("/v1/jobs", json=SPEC, headers={"Job-Priority": str(priority)})
+    assert refused.status_code == 422
+    assert [error["field"] for error in refused.json()["errors"]] == ["Job-Priority"]
+
+
 def test_a_cancelled_job_cannot_be_extended(client: httpx2.Client, job: Job) -> None:
     view = client.post(f"/v1/jobs/{job.id}/cancel").json()
 

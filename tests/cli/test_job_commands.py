@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from services.optimizer.store.sql_store import open_store
 from tests.cli.conftest import Finished, Gaitswarm
 
 pytestmark = pytest.mark.slow
@@ -202,6 +203,36 @@ def test_a_job_that_succeeded_is_extended_and_queued(
         *("optimize", "--resume", finished.id, "--db", db, "--evaluator", "in-process", "--json")
     ).json
     assert (done["state"], done["iterations"]) == ("succeeded", 4)
+
+
+def test_a_job_has_a_priority_that_can_be_changed(
+    gaitswarm: Gaitswarm, db: Path, small_spec: Path, place: Place, queued: str
+) -> None:
+    where = place(db)
+    low = gaitswarm("submit", "--spec", small_spec, "--priority", "-3", *where).out.strip()
+    changed = gaitswarm("prioritize", queued, "--priority", "2", *where)
+    assert changed.out == f"job {queued} is queued, with priority 2\n"
+    listed = gaitswarm("list", *where, "--json").json
+    assert {job["id"]: job["priority"] for job in listed} == {queued: 2, low: -3}
+    table = gaitswarm("list", *where).out.splitlines()
+    assert [line.split()[3:5] for line in table if low in line] == [["-3", "0/2"]]
+    assert gaitswarm("submit", "--spec", small_spec, "--priority", "11", *where).code == 2
+    gaitswarm("cancel", queued, *where)
+    assert gaitswarm("prioritize", queued, "--priority", "0", *where).code == 4
+
+
+def test_who_is_told_of_a_jobs_end_is_said_at_submission(
+    gaitswarm: Gaitswarm, db: Path, small_spec: Path, place: Place
+) -> None:
+    where = place(db)
+    submit = ("submit", "--spec", small_spec, *where)
+    job = gaitswarm(*submit, "--notify", "https://ci.example/hook").out.strip()
+    assert gaitswarm("cancel", job, *where).code == 0
+    store = open_store(str(db))
+    assert [sent.url for sent in store.outbox.about(job)] == ["https://ci.example/hook"]
+    store.close()
+    refused = gaitswarm(*submit, "--notify", "ci.example/hook")
+    assert refused.code == 2 and "must be a URL such as" in refused.err
 
 
 def test_the_list_can_be_searched_and_sorted(

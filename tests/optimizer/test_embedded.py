@@ -13,7 +13,7 @@ import pytest
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, JobState
+from services.optimizer.jobs.job import Claim, Command, JobState, Renewal
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
 from services.optimizer.run.execution import Surroundings, run_claim
@@ -124,10 +124,10 @@ def test_a_job_is_kept_while_its_workers_are_opened_however_long_that_takes(
 
         def renew(
             self, claim: Claim, *, lease_seconds: float, waiting: str | None = None
-        ) -> JobState:
-            state = store.renew(claim, lease_seconds=lease_seconds, waiting=waiting)
+        ) -> Renewal:
+            renewal = store.renew(claim, lease_seconds=lease_seconds, waiting=waiting)
             renewed.set()
-            return state
+            return renewal
 
     def opened() -> Evaluator:
         for _ in range(2):

@@ -440,6 +440,32 @@ def test_recorded_designs_are_what_was_evaluated(store: Store) -> None:
     np.testing.assert_array_equal(recorded, np.concatenate(evaluator.designs))
 
 
+def test_a_change_of_priority_reaches_the_workers_and_changes_no_bit(store: Store) -> None:
+    whole = queue(store)
+    run(store, FormulaEvaluator())
+    job, _ = store.create_job(SPEC, priority=-1)
+    given: list[float] = []
+
+    class Prioritized(FormulaEvaluator):
+        def evaluate(
+            self, request: EvaluationRequest, should_stop: Callable[[], bool]
+        ) -> tuple[Outcome, ...]:
+            given.append(request.weight)
+            return super().evaluate(request, should_stop)
+
+    def prioritize(done: CompletedIteration, _state: JobState) -> None:
+        if done.iteration == 0:
+            store.prioritize(job.id, 4)
+            # Of the next iterations, one begins after a heartbeat that has heard of it.
+            evaluator.hold.set()
+            threading.Timer(0.5, evaluator.hold.clear).start()
+
+    evaluator = Prioritized()
+    assert run(store, evaluator, on_commit=prioritize).state is JobState.SUCCEEDED
+    assert (given[0], given[-1]) == (0.5, 16.0)
+    assert history(store, job.id) == history(store, whole)
+
+
 def test_a_drained_job_does_not_wait_for_workers_out_of_reach(store: Store) -> None:
     job_id = queue(store)
     drain = threading.Event()

@@ -64,7 +64,7 @@ def test_a_job_that_is_created_claimed_is_nobody_elses_while_its_lease_lives(
 def test_a_job_that_is_created_claimed_is_run_with_its_claim(store: SqlStore) -> None:
     claim = store.create_claimed_job(spec(iterations=1), "runner-a", lease_seconds=LEASE)
     store.begin(claim, ask(0))
-    assert store.renew(claim, lease_seconds=LEASE) is JobState.RUNNING
+    assert store.renew(claim, lease_seconds=LEASE).state is JobState.RUNNING
     assert store.commit(claim, completed(0), None) is JobState.SUCCEEDED
 
 
@@ -77,7 +77,7 @@ def test_a_job_is_nobody_elses_while_its_lease_lives(store: SqlStore, clock: Clo
 def test_a_heartbeat_prolongs_the_lease(store: SqlStore, clock: Clock) -> None:
     claim = begun(store)
     clock.advance(LEASE - 1.0)
-    assert store.renew(claim, lease_seconds=LEASE) is JobState.RUNNING
+    assert store.renew(claim, lease_seconds=LEASE).state is JobState.RUNNING
     clock.advance(LEASE - 1.0)
     assert store.claim("runner-b", lease_seconds=LEASE) is None
 

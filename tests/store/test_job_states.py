@@ -110,7 +110,7 @@ def test_pausing_a_job_whose_runner_has_gone_needs_nobody_to_complete_it(
 def test_a_pause_takes_effect_when_the_iteration_is_committed(store: SqlStore) -> None:
     claim = begun(store)
     store.command(claim.job.id, Command.PAUSE)
-    assert store.renew(claim, lease_seconds=LEASE) is JobState.PAUSING
+    assert store.renew(claim, lease_seconds=LEASE).state is JobState.PAUSING
     assert store.commit(claim, completed(0), ask(1)) is JobState.PAUSED
     assert store.claim("runner-b", lease_seconds=LEASE) is None
 

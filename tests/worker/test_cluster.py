@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.priority import weight
 from services.runtime import open_evaluator
 from services.worker.cluster.handshake import Introduction, fingerprint, introducer
 from services.worker.cluster.nodes import Wanted
@@ -204,6 +205,10 @@ def test_shares_are_in_proportion_to_jobs_and_leave_no_slot_idle(
     slots: int, own: float, total: float, expected: int
 ) -> None:
     assert share(slots, own, total) == expected
+
+
+def test_a_job_that_is_three_steps_higher_has_eight_times_the_share_of_a_cluster() -> None:
+    assert [share(9, weight(own), weight(0) + weight(3)) for own in (0, 3)] == [1, 8]
 
 
 def test_a_runner_that_is_silent_for_long_has_no_share() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import KilledWorker, ProvenanceChanged
+from services.optimizer.jobs.priority import weight
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.cutting import Part
 from services.worker.dispatch import Dispatcher, Work
@@ -18,7 +20,8 @@ from sim.case import Case, Walk
 from sim.kernel.walk import Precision
 from sim.outcome import N_OBJECTIVES, Outcome, Status
 from sim.provenance import provenance_of
-from tests.worker.requests import request, walked_at_once
+from tests.examples.processes import eventually
+from tests.worker.requests import SCENARIOS, request, walked_at_once
 
 LANES = 4
 COUNT = 8 * LANES
@@ -299,6 +302,25 @@ def test_with_fewer_slots_than_cases_a_task_holds_walks_of_all_cases() -> None:
 def test_with_as_many_slots_as_cases_a_task_is_of_one_case() -> None:
     works = chunks_of(Dispatcher(slots=2, lanes=lambda _: LANES), request(3))
     assert {work.chunk.parts for work in works} == {(Part(0, 0, 3),), (Part(1, 0, 3),)}
+
+
+def test_of_two_jobs_one_that_is_a_step_higher_has_twice_the_share_of_the_slots(
+    dispatcher: Dispatcher,
+) -> None:
+    usual = request(16 * COUNT, job_id="usual", scenarios=SCENARIOS[:1])
+    with ThreadPoolExecutor(2) as pool:
+        try:
+            pool.submit(dispatcher.evaluate, usual, lambda: False)
+            eventually(lambda: dispatcher.load.waiting > 0)
+            chunks = dispatcher.load.waiting
+            urgent = replace(usual, job_id="urgent", weight=weight(1))
+            pool.submit(dispatcher.evaluate, urgent, lambda: False)
+            eventually(lambda: dispatcher.load.waiting == 2 * chunks)
+            works = [dispatcher.take(0.0) for _ in range(12)]
+        finally:
+            dispatcher.close("the test has ended")
+    taken = Counter(work.batch.request.job_id for work in works if work is not None)
+    assert taken == {"urgent": 8, "usual": 4}
 
 
 def test_cases_without_walks_to_share_have_tasks_of_their_own() -> None:

@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import AcceptChanges, Db, JobId, JobName, Json, RobotOption, Server
+from cli.options import (
+    AcceptChanges,
+    Db,
+    JobId,
+    JobName,
+    Json,
+    Notify,
+    Priority,
+    RobotOption,
+    Server,
+)
 
 if TYPE_CHECKING:
     from gaitswarm.specs import ForkOptions
@@ -62,6 +72,8 @@ def fork(
     idempotency_key: Annotated[
         str | None, typer.Option(help="The same key and fork again make no second job.")
     ] = None,
+    priority: Priority = 0,
+    notify: Notify = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
@@ -86,7 +98,14 @@ def fork(
     }
     options: ForkOptions = {k: v for k, v in given.items() if v is not None}  # type: ignore[assignment]
     with open_jobs(server, db) as jobs:
-        job = jobs.fork(job_id, from_iteration, idempotency_key=idempotency_key, **options)
+        job = jobs.fork(
+            job_id,
+            from_iteration,
+            idempotency_key=idempotency_key,
+            priority=priority,
+            notify_url=notify,
+            **options,
+        )
         if as_json:
             print_json(job)
             return

@@ -1,4 +1,4 @@
-"""Commands about jobs: submit, list, status, watch, pause, resume, extend, cancel."""
+"""Commands about jobs: submit, list, status, watch, and those that change one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from cli.options import AcceptChanges, Db, JobId, Json, Server, SpecOptions, with_groups
+from cli.options import (
+    AcceptChanges,
+    Db,
+    JobId,
+    Json,
+    Notify,
+    Priority,
+    Server,
+    SpecOptions,
+    with_groups,
+)
 
 S = TypeVar("S", bound=StrEnum)
 
@@ -21,6 +31,7 @@ def register(app: typer.Typer) -> None:
     app.command()(pause)
     app.command()(resume)
     app.command()(extend)
+    app.command()(prioritize)
     app.command()(cancel)
 
 
@@ -30,6 +41,8 @@ def submit(
     idempotency_key: Annotated[
         str | None, typer.Option(help="The same key and spec again make no second job.")
     ] = None,
+    priority: Priority = 0,
+    notify: Notify = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
@@ -41,7 +54,9 @@ def submit(
 
     asked = build_spec(options)
     with open_jobs(server, db, create=True) as jobs:
-        job = jobs.submit(asked, idempotency_key=idempotency_key)
+        job = jobs.submit(
+            asked, idempotency_key=idempotency_key, priority=priority, notify_url=notify
+        )
         if as_json:
             print_json(job)
             return
@@ -154,6 +169,27 @@ def extend(
         stdout_console().print(
             f"job {job.id} is {job.state}, with {job.spent}",
             markup=False,
+        )
+
+
+def prioritize(
+    job_id: JobId,
+    priority: Priority,
+    server: Server = None,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
+    """Give a job that waits or runs another priority."""
+    from cli.output import print_json, stdout_console
+    from gaitswarm.jobs.open import open_jobs
+
+    with open_jobs(server, db) as jobs:
+        job = jobs.prioritize(job_id, priority)
+    if as_json:
+        print_json(job)
+    else:
+        stdout_console().print(
+            f"job {job.id} is {job.state}, with priority {job.priority}", markup=False
         )
 
 

@@ -64,11 +64,20 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         spec: SpecInput | None = None,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[SpecOptions],
     ) -> JobView:
         """Queue a job in the database, for `run` or a runner of another process."""
         jobs = await self._jobs()
-        call = partial(jobs.submit, spec, idempotency_key=idempotency_key, **options)
+        call = partial(
+            jobs.submit,
+            spec,
+            idempotency_key=idempotency_key,
+            priority=priority,
+            notify_url=notify_url,
+            **options,
+        )
         return await to_thread.run_sync(call)
 
     async def fork(
@@ -77,12 +86,20 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         from_iteration: int,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[ForkOptions],
     ) -> JobView:
         """Queue a fork in the database, for `run` or a runner of another process."""
         jobs = await self._jobs()
         call = partial(
-            jobs.fork, job_id, from_iteration, idempotency_key=idempotency_key, **options
+            jobs.fork,
+            job_id,
+            from_iteration,
+            idempotency_key=idempotency_key,
+            priority=priority,
+            notify_url=notify_url,
+            **options,
         )
         return await to_thread.run_sync(call)
 
@@ -195,6 +212,11 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         """Write another budget for a job."""
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.extend, job_id, iterations)
+
+    async def prioritize(self, job_id: str, priority: int) -> JobView:
+        """Write another priority for a job; a process that runs it sees that."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(jobs.prioritize, job_id, priority)
 
     async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Write that a job is kept, or is not."""

@@ -70,12 +70,19 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         spec: SpecInput | None = None,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[SpecOptions],
     ) -> JobView:
         """Queue a job in the database, for `run` or a runner of another process."""
         wanted = chosen_spec(spec, options)
         with simulation_errors("spec"):
-            job, _ = self._service.submit(wanted, idempotency_key=idempotency_key)
+            job, _ = self._service.submit(
+                wanted,
+                idempotency_key=idempotency_key,
+                priority=arguments.priority(priority),
+                notify_url=None if notify_url is None else arguments.notify_url(notify_url),
+            )
         return self._in_full(job)
 
     def fork(
@@ -84,12 +91,20 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         from_iteration: int,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[ForkOptions],
     ) -> JobView:
         """Queue a fork in the database, for `run` or a runner of another process."""
         wanted = arguments.fork(from_iteration, options)
         with simulation_errors("fork"):
-            job, _ = self._service.fork(job_id, wanted, idempotency_key=idempotency_key)
+            job, _ = self._service.fork(
+                job_id,
+                wanted,
+                idempotency_key=idempotency_key,
+                priority=arguments.priority(priority),
+                notify_url=None if notify_url is None else arguments.notify_url(notify_url),
+            )
         return self._in_full(job)
 
     def estimate(
@@ -200,6 +215,10 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
     def extend(self, job_id: str, iterations: int) -> JobView:
         """Write another budget for a job."""
         return self._in_full(self._service.extend(job_id, iterations))
+
+    def prioritize(self, job_id: str, priority: int) -> JobView:
+        """Write another priority for a job; a process that runs it sees that."""
+        return self._in_full(self._service.prioritize(job_id, arguments.priority(priority)))
 
     def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Write that a job is kept, or is not."""

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from gaitswarm.errors import StoreUnavailable
 from gaitswarm.jobs.async_port import AsyncJobs
 from gaitswarm.jobs.port import JobEvent
-from gaitswarm.jobs.server import calls, design_calls
+from gaitswarm.jobs.server import calls, design_calls, job_calls
 from gaitswarm.jobs.server.async_findings import AsyncServerFindings
 from gaitswarm.jobs.server.async_walks import AsyncServerWalks
 from gaitswarm.jobs.server.attempts import (
@@ -99,11 +99,15 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         spec: SpecInput | None = None,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[SpecOptions],
     ) -> JobView:
         """Queue a job on the server; repeated as often as needed, it is queued once."""
         key = idempotency_key or uuid.uuid4().hex
-        return await self._send(calls.submit(chosen_spec(spec, options), key))
+        wanted = chosen_spec(spec, options)
+        call = job_calls.submit(wanted, key, priority=priority, notify_url=notify_url)
+        return await self._send(call)
 
     async def fork(
         self,
@@ -111,12 +115,15 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         from_iteration: int,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[ForkOptions],
     ) -> JobView:
         """Queue a fork on the server; repeated as often as needed, it is queued once."""
         key = idempotency_key or uuid.uuid4().hex
         wanted = arguments.fork(from_iteration, options)
-        return await self._send(calls.fork(job_id, wanted, key))
+        call = job_calls.fork(job_id, wanted, key, priority=priority, notify_url=notify_url)
+        return await self._send(call)
 
     async def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
@@ -152,20 +159,24 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         self, job_id: str, command: Command | str, *, accept_changes: bool = False
     ) -> JobView:
         """Send a command to a job."""
-        call = calls.command(job_id, arguments.command(command), accept_changes)
+        call = job_calls.command(job_id, arguments.command(command), accept_changes)
         return await self._send(call)
 
     async def extend(self, job_id: str, iterations: int) -> JobView:
         """Send another budget for a job."""
-        return await self._send(calls.extend(job_id, iterations))
+        return await self._send(job_calls.extend(job_id, iterations))
+
+    async def prioritize(self, job_id: str, priority: int) -> JobView:
+        """Send another priority for a job."""
+        return await self._send(job_calls.prioritize(job_id, priority))
 
     async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Let the server keep a job, or release it."""
-        return await self._send(calls.keep(job_id, kept))
+        return await self._send(job_calls.keep(job_id, kept))
 
     async def delete(self, job_id: str) -> None:
         """Let the server delete a job; it removes the rows of a long one afterwards."""
-        await self._send(calls.delete(job_id))
+        await self._send(job_calls.delete(job_id))
 
     async def follow(self, job_id: str, *, after: int | None = None) -> AsyncIterator[JobEvent]:
         """Read the server's events; a connection that breaks is taken up again where it broke."""

@@ -15,6 +15,8 @@ T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
 
 IDEMPOTENCY_KEY: Final = "Idempotency-Key"
+NOTIFY_URL: Final = "Notify-URL"
+JOB_PRIORITY: Final = "Job-Priority"
 
 _PAGE: Final = 100
 """Items asked for at once."""

@@ -5,10 +5,9 @@ The client that blocks and the one that does not send the same ones.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 
-from gaitswarm.jobs.server.call import IDEMPOTENCY_KEY, Call, got, job_path, page, posted, segment
+from gaitswarm.jobs.server.call import Call, got, job_path, page, posted, segment
 from gaitswarm.requests.preferences import PreferencesRequest
 from gaitswarm.tables import EvaluationTable, TableFormat
 from gaitswarm.views import (
@@ -36,32 +35,9 @@ from gaitswarm.views.tournament import (
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from services.optimizer.analysis.fits.targets import LeaveOut
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.job import JobOrder, JobState
 from services.optimizer.jobs.spec import Spec
 from sim.identification.recorded_walk import RecordedWalk
-
-
-def submit(spec: Spec, key: str) -> Call[JobView]:
-    """Queue a job.
-
-    Args:
-        spec: What it is to do.
-        key: Idempotency key: the same key and spec again make no second job.
-    """
-    headers = {IDEMPOTENCY_KEY: key}
-    return posted("/jobs", JobView, spec, headers)
-
-
-def fork(job_id: str, request: ForkRequest, key: str) -> Call[JobView]:
-    """Queue a job that begins with iterations of another one.
-
-    Args:
-        job_id: Identifier of that one.
-        request: From where, and what is to be different.
-        key: Idempotency key: the same key and fork again make no second job.
-    """
-    return posted(f"{job_path(job_id)}/fork", JobView, request, {IDEMPOTENCY_KEY: key})
 
 
 def estimate(spec: Spec) -> Call[EstimateView]:
@@ -100,50 +76,6 @@ def job(job_id: str) -> Call[JobView]:
         job_id: Identifier of the job.
     """
     return got(job_path(job_id), JobView)
-
-
-def command(job_id: str, asked: Command, accept_changes: bool) -> Call[JobView]:
-    """Pause, resume or cancel.
-
-    Args:
-        job_id: Identifier of the job.
-        asked: Which of these.
-        accept_changes: Whether a job that is resumed goes on although what its numbers depend on
-            has changed.
-    """
-    body = json.dumps({"accept_changes": True}) if accept_changes else None
-    return Call("POST", f"{job_path(job_id)}/{asked.value}", JobView.model_validate_json, body=body)
-
-
-def extend(job_id: str, iterations: int) -> Call[JobView]:
-    """Give a job another budget.
-
-    Args:
-        job_id: Identifier of the job.
-        iterations: The budget, in all.
-    """
-    body = json.dumps({"iterations": iterations})
-    return Call("POST", f"{job_path(job_id)}/extend", JobView.model_validate_json, body=body)
-
-
-def keep(job_id: str, kept: bool) -> Call[JobView]:
-    """Protect a job from deletion, or release it.
-
-    Args:
-        job_id: Identifier of the job.
-        kept: Whether it is protected.
-    """
-    path = f"{job_path(job_id)}/keep"
-    return Call("PUT" if kept else "DELETE", path, JobView.model_validate_json)
-
-
-def delete(job_id: str) -> Call[bytes]:
-    """Delete a job.
-
-    Args:
-        job_id: Identifier of the job.
-    """
-    return Call("DELETE", job_path(job_id), bytes)
 
 
 def best(job_id: str) -> Call[BestView]:

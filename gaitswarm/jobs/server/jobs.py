@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import StoreUnavailable
 from gaitswarm.jobs.port import JobEvent, Jobs
-from gaitswarm.jobs.server import calls, design_calls
+from gaitswarm.jobs.server import calls, design_calls, job_calls
 from gaitswarm.jobs.server.attempts import (
     BACKOFF,
     RECONNECT,
@@ -109,11 +109,15 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
         spec: SpecInput | None = None,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[SpecOptions],
     ) -> JobView:
         """Queue a job on the server; repeated as often as needed, it is queued once."""
         key = idempotency_key or uuid.uuid4().hex
-        return self._send(calls.submit(chosen_spec(spec, options), key))
+        wanted = chosen_spec(spec, options)
+        call = job_calls.submit(wanted, key, priority=priority, notify_url=notify_url)
+        return self._send(call)
 
     def fork(
         self,
@@ -121,12 +125,15 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
         from_iteration: int,
         *,
         idempotency_key: str | None = None,
+        priority: int = 0,
+        notify_url: str | None = None,
         **options: Unpack[ForkOptions],
     ) -> JobView:
         """Queue a fork on the server; repeated as often as needed, it is queued once."""
         key = idempotency_key or uuid.uuid4().hex
         wanted = arguments.fork(from_iteration, options)
-        return self._send(calls.fork(job_id, wanted, key))
+        call = job_calls.fork(job_id, wanted, key, priority=priority, notify_url=notify_url)
+        return self._send(call)
 
     def estimate(
         self, spec: SpecInput | None = None, **options: Unpack[SpecOptions]
@@ -156,20 +163,24 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
         self, job_id: str, command: Command | str, *, accept_changes: bool = False
     ) -> JobView:
         """Send a command to a job."""
-        call = calls.command(job_id, arguments.command(command), accept_changes)
+        call = job_calls.command(job_id, arguments.command(command), accept_changes)
         return self._send(call)
 
     def extend(self, job_id: str, iterations: int) -> JobView:
         """Send another budget for a job."""
-        return self._send(calls.extend(job_id, iterations))
+        return self._send(job_calls.extend(job_id, iterations))
+
+    def prioritize(self, job_id: str, priority: int) -> JobView:
+        """Send another priority for a job."""
+        return self._send(job_calls.prioritize(job_id, priority))
 
     def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Let the server keep a job, or release it."""
-        return self._send(calls.keep(job_id, kept))
+        return self._send(job_calls.keep(job_id, kept))
 
     def delete(self, job_id: str) -> None:
         """Let the server delete a job; it removes the rows of a long one afterwards."""
-        self._send(calls.delete(job_id))
+        self._send(job_calls.delete(job_id))
 
     def follow(self, job_id: str, *, after: int | None = None) -> Iterator[JobEvent]:
         """Read the server's events; a connection that breaks is taken up again where it broke."""

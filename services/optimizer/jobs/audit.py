@@ -24,6 +24,7 @@ class AuditAction(StrEnum):
     PAUSE = "pause"
     RESUME = "resume"
     EXTEND = "extend"
+    PRIORITIZE = "prioritize"
     CANCEL = "cancel"
     DELETE = "delete"
     KEEP = "keep"

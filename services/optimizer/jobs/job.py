@@ -202,6 +202,8 @@ class Job:
         kept: whether it is protected from deletion.
         submitted_iterations: budget that it was submitted with.
         waiting: what it waits for while it runs, such as workers that are away; None if nothing.
+        priority: the higher, the sooner it is claimed and the more slots its walks get; see
+            `priority.py`.
     """
 
     id: str
@@ -220,6 +222,7 @@ class Job:
     kept: bool = False
     submitted_iterations: int = 0
     waiting: str | None = None
+    priority: int = 0
 
     @property
     def spec(self) -> AnySpec:
@@ -293,3 +296,16 @@ class Claim:
     recordings: Recordings = field(default_factory=dict)
     answered: Answered | None = None
     taken_from: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Renewal:
+    """What a runner hears when it renews its claim on a job.
+
+    Attributes:
+        state: of the job, so that a pause is seen.
+        priority: of the job, which its user may have changed.
+    """
+
+    state: JobState
+    priority: int = 0

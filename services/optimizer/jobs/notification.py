@@ -99,6 +99,31 @@ def pause_after(attempts: int) -> float | None:
     return float(min(_FIRST_PAUSE * 2.0 ** (attempts - 1), _LONGEST_PAUSE))
 
 
+def unusable_url(url: str) -> str | None:
+    """Why nothing can be sent to a URL, whoever sends.
+
+    Args:
+        url: by anybody.
+
+    Returns:
+        The reason, for people; None for a URL of HTTP without credentials.
+    """
+    try:
+        parts = urlsplit(url)
+        name, _ = parts.hostname, parts.port
+    except ValueError:
+        return "not a URL"
+    if (
+        len(url) > _LONGEST_URL
+        or not (url.isascii() and url.isprintable())
+        or any(character in url for character in " \\")
+        or parts.scheme not in ("http", "https")
+        or not name
+    ):
+        return "must be a URL such as https://ci.example/hook"
+    return "must have no user and password" if "@" in parts.netloc else None
+
+
 def refused_url(url: str, hosts: Collection[str]) -> str | None:
     """Why nothing is sent to a URL.
 
@@ -113,21 +138,11 @@ def refused_url(url: str, hosts: Collection[str]) -> str | None:
     """
     if not hosts:
         return "notifications are off here; GAITSWARM_WEBHOOK_HOSTS of the server allows hosts"
-    try:
-        parts = urlsplit(url)
-        name, port = (parts.hostname or "").lower(), parts.port
-    except ValueError:
-        return "not a URL"
-    if (
-        len(url) > _LONGEST_URL
-        or not (url.isascii() and url.isprintable())
-        or any(character in url for character in " \\")
-        or parts.scheme not in ("http", "https")
-        or not name
-    ):
-        return "must be a URL such as https://ci.example/hook"
-    if "@" in parts.netloc:
-        return "must have no user and password"
+    reason = unusable_url(url)
+    if reason is not None:
+        return reason
+    parts = urlsplit(url)
+    name, port = (parts.hostname or "").lower(), parts.port
     named = f"[{name}]" if ":" in name else name
     wanted = {named, f"{named}:{port or {'http': 80, 'https': 443}[parts.scheme]}"}
     if not wanted & {host.lower() for host in hosts}:

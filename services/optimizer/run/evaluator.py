@@ -41,13 +41,14 @@ class EvaluationRequest:
     """One iteration of one job: every design in every case.
 
     Attributes:
-        job_id: Of the job; jobs share the workers equally.
+        job_id: Of the job; jobs share the workers by their weights.
         cases: What every design is put to.
         designs: (n, v) float64.
         provenance: That of the process that asks; the outcomes are to have it.
         iterations_left: Iterations of the job that follow this one, as far as is known.
         iteration: Index of the iteration, from 0.
         on_task: Is told of every task that ends; it must return at once.
+        weight: Of the job, which gets that many times the share of the workers of one of weight 1.
     """
 
     job_id: str
@@ -57,6 +58,7 @@ class EvaluationRequest:
     iterations_left: int = 0
     iteration: int = 0
     on_task: OnTask | None = None
+    weight: float = 1.0
 
 
 class Evaluator(Protocol):

@@ -25,6 +25,7 @@ from services.optimizer.errors import (
 )
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Job, JobState
+from services.optimizer.jobs.priority import weight
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.log_context import log_context
@@ -261,7 +262,7 @@ class _Run:
             outcomes, walked = evaluate_unknown(
                 self.around.evaluator,
                 self.around.store if self.around.cache else None,
-                request,
+                replace(request, weight=weight(self.heartbeat.priority)),
                 keys,
                 self._should_stop,
             )

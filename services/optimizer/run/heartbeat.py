@@ -53,6 +53,7 @@ class Heartbeat:
         self._ended = threading.Event()
         self._lost = threading.Event()
         self._state = claim.job.state
+        self._priority = claim.job.priority
         self._thread = threading.Thread(
             target=self._beat_of_job, name=f"heartbeat-{claim.job.id}", daemon=True
         )
@@ -66,6 +67,11 @@ class Heartbeat:
     def state(self) -> JobState:
         """State of the job at the last beat."""
         return self._state
+
+    @property
+    def priority(self) -> int:
+        """Priority of the job at the last beat."""
+        return self._priority
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -88,9 +94,10 @@ class Heartbeat:
         failed = False
         while not self._ended.wait(self._interval):
             try:
-                self._state = self._store.renew(
+                renewal = self._store.renew(
                     self._claim, lease_seconds=self._lease_seconds, waiting=self._waiting()
                 )
+                self._state, self._priority = renewal.state, renewal.priority
             except LeaseLost as error:
                 # A commit that ends the job gives up the lease between two beats.
                 if not self._ended.is_set():

@@ -8,9 +8,7 @@ from typing import Any, Protocol
 from services.optimizer.access import Tokens
 from services.optimizer.jobs.audit import LOCAL, AuditEntry
 from services.optimizer.jobs.fork import Fork
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
 from services.optimizer.jobs.job import (
-    QUARANTINE_AFTER,
     Claim,
     Command,
     Job,
@@ -23,10 +21,11 @@ from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.deletions import Deletions
 from services.optimizer.store.reading import Changes, CommittedHistory, Page, Queue
+from services.optimizer.store.running import Runs
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
-class Store(CommittedHistory, Deletions, Protocol):
+class Store(CommittedHistory, Deletions, Runs, Protocol):
     """Thread-safe. Every method is one transaction: it happens wholly or not at all.
 
     Methods that take an id raise NotFound for an unknown one. Methods that take a claim raise
@@ -57,6 +56,7 @@ class Store(CommittedHistory, Deletions, Protocol):
         notify_url: str | None = None,
         seconds: float | None = None,
         quota: Quota | None = None,
+        priority: int = 0,
     ) -> tuple[Job, bool]:
         """Insert a queued job of the resolved spec, or find the one that the same key made before.
 
@@ -73,6 +73,7 @@ class Store(CommittedHistory, Deletions, Protocol):
             notify_url: Where its end is told, if anywhere; checked.
             seconds: Simulated time of all its walks [s]; None where nobody has asked.
             quota: What the owner's unfinished jobs may come to with it; None for no limit.
+            priority: Within bounds; the higher, the sooner it is claimed.
 
         Returns:
             The job, and whether it is new.
@@ -216,6 +217,23 @@ class Store(CommittedHistory, Deletions, Protocol):
             Unreadable: The job's spec cannot be read.
         """
 
+    def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
+        """Change the priority of a job that has not ended.
+
+        Whoever runs it hears of it at the next renewal of its claim.
+
+        Args:
+            job_id: Of the job.
+            priority: Within bounds; the higher, the sooner it is claimed.
+            actor: Whom the audit log is to name.
+
+        Returns:
+            The job as it is then.
+
+        Raises:
+            Conflict: The job has ended.
+        """
+
     def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
         """Keep a recorded walk.
 
@@ -239,112 +257,6 @@ class Store(CommittedHistory, Deletions, Protocol):
         Raises:
             NotFound: There is no such recording; names the first.
             Unreadable: One was stored by another version, or damaged.
-        """
-
-    def claim(
-        self,
-        runner: str,
-        *,
-        lease_seconds: float,
-        job_id: str | None = None,
-        quarantine_after: int = QUARANTINE_AFTER,
-    ) -> Claim | None:
-        """Take the oldest job that is queued, or running/pausing with a lease that ran out.
-
-        The claimed job is running, its token one higher than any before. A pausing job without a
-        live lease becomes paused; one that cannot be read fails with the reason, and so does one
-        that is quarantined. None of them is claimed, and none keeps others from being claimed.
-
-        A claim counts as a crash if its lease ran out without release, and another runner takes the
-        job over. A commit sets the count to zero, and so does the user who resumes the job.
-
-        Args:
-            runner: Name of whoever takes it.
-            lease_seconds: For how long, unless the claim is renewed [s].
-            job_id: The only job that is wanted; None for any.
-            quarantine_after: A job with so many crashes in a row fails instead of being claimed.
-
-        Returns:
-            The claim, with all that a run needs; None if no job is to be had.
-        """
-
-    def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> JobState:
-        """Prolong a lease: the heartbeat of whoever runs the job.
-
-        Args:
-            claim: On the job.
-            lease_seconds: From now on [s].
-            waiting: What the job waits for, for people; None for nothing.
-
-        Returns:
-            The job's state, so that a pause is seen.
-
-        Raises:
-            LeaseLost: The claim is no longer the job's.
-        """
-
-    def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
-        """Append what the job's next iterations depend on, unless that is as before.
-
-        Changes that its user has accepted are accepted no longer: they are recorded.
-
-        Args:
-            claim: On the job.
-            provenance: What numbers of whoever holds the claim depend on.
-
-        Raises:
-            LeaseLost: The claim is no longer the job's.
-        """
-
-    def begin(self, claim: Claim, ask: Ask) -> None:
-        """Store the ask that a job begins with, or goes on with after an extension.
-
-        Repeated, it keeps the ask that is there.
-
-        Args:
-            claim: Of whoever runs the job.
-            ask: What is to be evaluated next.
-
-        Raises:
-            BudgetChanged: The job has another budget than the claim's, under which the ask would
-                be another; nothing is stored.
-            Conflict: The ask is not of the job's next iteration.
-            LeaseLost: The claim is no longer the job's.
-        """
-
-    def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
-        """Store a completed iteration and the next ask, in one transaction.
-
-        Unique on (job, iteration): a commit whose answer was lost may be repeated, and changes
-        nothing the second time.
-
-        Args:
-            claim: On the job.
-            done: The iteration.
-            following: What is to be evaluated next; None at the end of the budget.
-
-        Returns:
-            The job's state after: succeeded at the end of the budget; paused, without a lease, if
-            it was to pause; else as before.
-
-        Raises:
-            BudgetChanged: The job has another budget than the claim's, under which `following`
-                would be another ask; nothing is stored.
-            Conflict: The iteration was not asked.
-            LeaseLost: The claim is no longer the job's.
-        """
-
-    def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
-        """Give up the lease.
-
-        Args:
-            claim: On the job.
-            state: `failed`, `paused`, or `queued` to be claimed again; the latter means paused for
-                a job that is pausing, so a runner that stops need not look first.
-            error: Why it failed.
-
-        Raises:
-            LeaseLost: The claim is no longer the job's.
         """
 
     def audit(

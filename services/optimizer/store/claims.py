@@ -31,7 +31,9 @@ from sim.identification.recorded_walk import Recordings
 
 
 def claimable(now: datetime, job_id: str | None) -> Select[*tuple[Any, ...]]:
-    """Select the oldest job that waits for a runner, or whose runner has gone, and lock it.
+    """Select the next job that waits for a runner, or whose runner has gone, and lock it.
+
+    The one of highest priority is next, the oldest among equals.
 
     Runners that look at the same time pass over each other's candidates; only a runner that wants
     one certain job waits for it.
@@ -46,7 +48,7 @@ def claimable(now: datetime, job_id: str | None) -> Select[*tuple[Any, ...]]:
     query = (
         select(jobs)
         .where(or_(jobs.c.state == JobState.QUEUED, _abandoned(now)))
-        .order_by(jobs.c.created_at, jobs.c.id)
+        .order_by(jobs.c.priority.desc(), jobs.c.created_at, jobs.c.id)
         .limit(1)
     )
     if job_id is None:

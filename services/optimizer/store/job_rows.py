@@ -108,6 +108,7 @@ def to_job(row: Row, documents: JobDocuments | None = None) -> Job:
         kept=bool(row["kept"]),
         submitted_iterations=submitted_iterations,
         waiting=row["waiting"],
+        priority=row["priority"],
     )
 
 

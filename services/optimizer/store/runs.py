@@ -12,6 +12,7 @@ from services.optimizer.jobs.job import (
     QUARANTINE_AFTER,
     Claim,
     JobState,
+    Renewal,
 )
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.store.claims import (
@@ -88,7 +89,7 @@ class SqlRuns:
                     set_aside(connection, row, error, now)
         return None
 
-    def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> JobState:
+    def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> Renewal:
         """Prolong a lease."""
         with self._database.transaction(write=True) as connection:
             row = held(connection, claim)
@@ -98,7 +99,7 @@ class SqlRuns:
             if reason != row["waiting"]:
                 changes |= {"waiting": reason}
             update_job(connection, row, changes)
-            return JobState(row["state"])
+            return Renewal(JobState(row["state"]), row["priority"])
 
     def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
         """Record what the numbers depend on from the next iteration on."""

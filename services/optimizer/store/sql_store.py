@@ -20,6 +20,7 @@ from services.optimizer.jobs.job import (
     commanded,
     extended,
 )
+from services.optimizer.jobs.priority import check_can_be_prioritized
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
@@ -132,6 +133,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
         notify_url: str | None = None,
         seconds: float | None = None,
         quota: Quota | None = None,
+        priority: int = 0,
     ) -> tuple[Job, bool]:
         """Insert a queued job, or find the one that the same key made before."""
         _check_key(idempotency_key)
@@ -149,6 +151,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
             owner,
             notify_url,
             seconds,
+            priority,
         )
         try:
             with self._database.transaction(write=True) as connection:
@@ -283,6 +286,15 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
             changes |= {"budget": iterations, "simulated_seconds": planned}
             note_change(connection, now, actor, AuditAction.EXTEND, job_id, iterations=iterations)
             return to_job(update_job(connection, row, changes))
+
+    def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
+        """Change a job's priority."""
+        with self._database.transaction(write=True) as connection:
+            row = job_row(connection, job_id, lock=True)
+            check_can_be_prioritized(JobState(row["state"]))
+            now, action = self._clock(connection), AuditAction.PRIORITIZE
+            note_change(connection, now, actor, action, job_id, priority=priority)
+            return to_job(update_job(connection, row, {"priority": priority}))
 
     # recorded walks
 

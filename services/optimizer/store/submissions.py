@@ -47,6 +47,7 @@ class Submission:
         owner: Name of the token that it comes with, if any.
         notify_url: Where its end is told, if anywhere.
         seconds: Simulated time of all its walks [s]; None where nobody has asked.
+        priority: The higher, the sooner it is claimed.
     """
 
     spec: Spec
@@ -57,6 +58,7 @@ class Submission:
     owner: str | None = None
     notify_url: str | None = None
     seconds: float | None = None
+    priority: int = 0
 
     @property
     def lineage(self) -> Lineage | None:
@@ -123,6 +125,7 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
         "owner": asked.owner,
         "notify_url": asked.notify_url,
         "simulated_seconds": asked.seconds,
+        "priority": asked.priority,
         "idempotency_key": asked.key,
         "request_digest": asked.digest,
         "created_at": now,

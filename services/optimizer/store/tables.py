@@ -192,6 +192,8 @@ jobs: Final = Table(
     Column("kept", Boolean),
     # Of all walks of all designs of its budget [s]; NULL where nobody has asked.
     Column("simulated_seconds", Double),
+    # The higher, the sooner it is claimed.
+    Column("priority", Integer, nullable=False, server_default="0"),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

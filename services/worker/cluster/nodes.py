@@ -89,8 +89,8 @@ class Nodes(Protocol):
         """Tasks that run at the same time."""
 
     @property
-    def requests(self) -> int:
-        """How many want walks of nodes that others use, too."""
+    def demand(self) -> float:
+        """Sum of the weights of those who want walks of nodes that others use, too; 0 for none."""
 
     def wanted(self, request: EvaluationRequest, /) -> AbstractContextManager[Future[None]]:
         """Have nodes prepared as long as the block lasts. For any thread.
@@ -191,9 +191,9 @@ class OwnNode:
         return self._node.cpus
 
     @property
-    def requests(self) -> int:
+    def demand(self) -> float:
         """None: nobody else uses it."""
-        return 0
+        return 0.0
 
     @contextmanager
     def wanted(self, _request: EvaluationRequest) -> Iterator[Future[None]]:

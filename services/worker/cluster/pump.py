@@ -90,7 +90,7 @@ class Pump:
                 self._dispatcher.again(work, suspect=False)
         slots = self._nodes.slots
         if self._shares is not None:
-            slots = self._shares.of(slots, self._nodes.requests)
+            slots = self._shares.of(slots, self._nodes.demand)
         self._dispatcher.slots = max(slots, 1)
 
     @property
@@ -100,7 +100,7 @@ class Pump:
         return most - len(self._flying) - len(self._held)
 
     def _send(self) -> None:
-        patience = _GLANCE if self._nodes.requests else _IDLE
+        patience = _GLANCE if self._nodes.demand else _IDLE
         while self._room > 0:
             work = self._dispatcher.take(0.0 if self._flying or self._held else patience)
             if work is None:

@@ -98,6 +98,7 @@ class ClusterNodes:
         self._changing = threading.Lock()
         self._closed: str | None = None
         self._count: Counter[Wanted] = Counter()
+        self._weights: dict[Future[None], float] = {}
         self._waiting: dict[Future[None], tuple[Wanted, float]] = {}
 
     @property
@@ -106,10 +107,10 @@ class ClusterNodes:
         return sum(node.cpus for node in self._nodes.values() if node.accepted)
 
     @property
-    def requests(self) -> int:
-        """How many want walks at present."""
+    def demand(self) -> float:
+        """Sum of the weights of those who want walks at present."""
         with self._changing:
-            return self._count.total()
+            return sum(self._weights.values())
 
     @contextmanager
     def wanted(self, request: EvaluationRequest) -> Iterator[Future[None]]:
@@ -117,6 +118,7 @@ class ClusterNodes:
         wanted, ready = Wanted.by(request), Future[None]()
         with self._changing:
             self._count[wanted] += 1
+            self._weights[ready] = request.weight
             self._waiting[ready] = (wanted, time.monotonic() + PATIENCE_SECONDS)
             if self._closed is not None:
                 ready.set_exception(EvaluatorUnavailable(self._closed))
@@ -126,6 +128,7 @@ class ClusterNodes:
         finally:
             with self._changing:
                 self._waiting.pop(ready, None)
+                self._weights.pop(ready, None)
                 self._count -= Counter([wanted])
 
     def close(self, reason: str) -> None:

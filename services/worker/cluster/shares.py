@@ -1,4 +1,4 @@
-"""What several runners on one cluster owe each other: a share each, by how many jobs they run."""
+"""What several runners on one cluster owe each other: a share each, by the jobs that they run."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def share(slots: int, own: float, total: float) -> int:
 class Shares:
     """This runner's share of a cluster.
 
-    Each runner reports to one small actor how many jobs want walks of it, and hears of how many
-    there are in all. While the actor cannot be reached, shares stay as they are.
+    Each runner reports to one small actor the weights of the jobs that want walks of it, and hears
+    what those of all runners come to. While the actor cannot be reached, shares stay as they are.
 
     Args:
         session: The connection.
@@ -98,31 +98,31 @@ class Shares:
         self._own = self._total = 0.0
         self._next = 0.0
 
-    def of(self, slots: int, requests: int) -> int:
+    def of(self, slots: int, demand: float) -> int:
         """Report, from time to time, and tell the share. Never waits for an answer.
 
         Args:
             slots: Of the cluster.
-            requests: That want walks of this runner now.
+            demand: Sum of the weights of the jobs that want walks of this runner now.
 
         Returns:
             How many slots it fills.
         """
         try:
             self._hear()
-            if self._asked is None and (time.monotonic() >= self._next or requests != self._own):
-                self._report(requests)
+            if self._asked is None and (time.monotonic() >= self._next or demand != self._own):
+                self._report(demand)
         except self._ray.exceptions.RayError as error:
             _log.info("shares of the cluster stay as they are: %s", error)
             self._actor = self._asked = None
             self._next = time.monotonic() + REPORT_SECONDS
         return share(slots, self._own, self._total)
 
-    def _report(self, requests: int) -> None:
+    def _report(self, demand: float) -> None:
         if self._actor is None:
             remote = self._ray.remote(**self._options)(ledger())
             self._actor = remote.remote(_FORGOTTEN_SECONDS)
-        self._asked = (self._actor.report.remote(self._runner, float(requests)), float(requests))
+        self._asked = (self._actor.report.remote(self._runner, demand), demand)
         self._next = time.monotonic() + REPORT_SECONDS
 
     def _hear(self) -> None:

@@ -1,0 +1,59 @@
+"""How urgent a job is: which one waits for a runner the shortest, and whose walks get more slots.
+
+Priorities decide when walks run, never what comes of them. They are no part of specs, of provenance
+or of the chain, so that a job has the same bits under any.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from services.optimizer.errors import Conflict, InvalidRequest
+from services.optimizer.jobs.job import JobState
+
+DEFAULT: Final = 0
+"""Of a job for which nobody has said more."""
+
+LOWEST: Final = -10
+HIGHEST: Final = 10
+
+
+def check_priority(priority: int, *, field: str = "priority") -> None:
+    """Refuse what is no priority.
+
+    Args:
+        priority: Wanted for a job; the higher, the sooner.
+        field: Of the request, to blame.
+
+    Raises:
+        InvalidRequest: It is out of bounds; says which they are.
+    """
+    if not LOWEST <= priority <= HIGHEST:
+        raise InvalidRequest(
+            f"must be from {LOWEST} (last) to {HIGHEST} (first), it is {priority}", field=field
+        )
+
+
+def check_can_be_prioritized(state: JobState) -> None:
+    """Refuse another priority for a job that neither waits nor runs.
+
+    Args:
+        state: Of the job.
+
+    Raises:
+        Conflict: It has ended.
+    """
+    if state.terminal:
+        raise Conflict(f"cannot prioritize a job that is {state}; it has ended")
+
+
+def weight(priority: int) -> float:
+    """The weight with which running jobs share slots: each step up doubles it.
+
+    Args:
+        priority: Of a job.
+
+    Returns:
+        Its share of slots that several jobs want, in proportion to the others' [1]; 1 for 0.
+    """
+    return 2.0**priority

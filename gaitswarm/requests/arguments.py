@@ -92,7 +92,7 @@ def priority(value: int) -> int:
     Raises:
         InvalidRequest: It is no integer, or out of bounds.
     """
-    if not isinstance(value, int) or isinstance(value, bool):
+    if type(value) is not int:
         raise InvalidRequest(f"must be an integer, it is {value!r}", field="priority")
     check_priority(value)
     return value

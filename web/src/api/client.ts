@@ -3,7 +3,7 @@
 import { ApiProblem, problemOf } from './problem'
 import type { paths } from './schema'
 
-type Method = 'get' | 'post' | 'delete'
+type Method = 'get' | 'post' | 'put' | 'delete'
 
 /** Paths that have an operation of the method. */
 export type PathOf<M extends Method> = {
@@ -54,6 +54,16 @@ export async function post<P extends PathOf<'post'>>(
   const request = posted(options.body, options.signal, options.headers)
   const response = await send(url(path, options.path), request)
   return (await response.json()) as Answer<P, 'post'>
+}
+
+/** PUT a body. */
+export async function put<P extends PathOf<'put'>>(
+  path: P,
+  options: Options & { path?: Params<P, 'put'>; body?: Body<P, 'put'> } = {},
+): Promise<Answer<P, 'put'>> {
+  const request = { ...posted(options.body, options.signal), method: 'PUT' }
+  const response = await send(url(path, options.path), request)
+  return (await response.json()) as Answer<P, 'put'>
 }
 
 /** DELETE a resource. */

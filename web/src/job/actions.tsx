@@ -1,7 +1,7 @@
-/** Pause, resume, extend, cancel, delete and clone, as far as the job's state allows. */
+/** Pause, resume, extend, prioritize, cancel, delete and clone, as far as the job's state allows. */
 
 import { useState } from 'preact/hooks'
-import { post, remove } from '../api/client'
+import { post, put, remove } from '../api/client'
 import { isReadable } from '../api/readable'
 import type { StoredJob } from '../api/types'
 import { ConfirmDialog } from '../components/confirm-dialog'
@@ -10,8 +10,9 @@ import { formatCount } from '../format/number'
 import { navigate } from '../router/navigation'
 import { withQuery } from '../router/routes'
 import { budgetSpent, iterationsSpent, spentInWords } from './budget'
+import { PriorityDialog } from './priority-dialog'
 
-type Asking = 'cancel' | 'delete' | 'extend' | null
+type Asking = 'cancel' | 'delete' | 'extend' | 'priority' | null
 
 export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: StoredJob) => void }) {
   const [asking, setAsking] = useState<Asking>(null)
@@ -52,6 +53,11 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
         {can('extend') && (
           <button type="button" disabled={busy} onClick={() => setAsking('extend')}>
             Extend…
+          </button>
+        )}
+        {can('priority') && (
+          <button type="button" disabled={busy} onClick={() => setAsking('priority')}>
+            Priority…
           </button>
         )}
         {isReadable(job) && (
@@ -112,8 +118,17 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
           certificates of its designs stay as jobs of their own.
         </p>
       </ConfirmDialog>
+      <PriorityDialog
+        key={`priority ${job.id} ${asking === 'priority'}`}
+        job={job}
+        open={asking === 'priority'}
+        onPrioritize={(priority) =>
+          command(() => put('/v1/jobs/{job_id}/priority', { path, body: { priority } }))
+        }
+        onDismiss={() => setAsking(null)}
+      />
       <ExtendDialog
-        key={`${job.id} ${asking === 'extend'}`}
+        key={`extend ${job.id} ${asking === 'extend'}`}
         job={job}
         open={asking === 'extend'}
         onExtend={(iterations) =>

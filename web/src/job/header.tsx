@@ -166,5 +166,6 @@ function subtitle(job: StoredJob): string {
         `${job.precision} precision`,
       ]
     : []
-  return [job.id, ...asked, `submitted ${formatMoment(job.created_at)}`].join(' · ')
+  const priority = job.priority === 0 ? [] : [`priority ${job.priority}`]
+  return [job.id, ...asked, ...priority, `submitted ${formatMoment(job.created_at)}`].join(' · ')
 }

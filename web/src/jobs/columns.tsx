@@ -27,6 +27,14 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
       cell: (job) => <StateBadge state={job.state} />,
     },
     {
+      key: 'priority',
+      label: 'Priority',
+      numeric: true,
+      minor: true,
+      value: (job) => job.priority,
+      cell: (job) => String(job.priority),
+    },
+    {
       key: 'progress',
       label: 'Iterations',
       value: (job) => job.evaluations / job.evaluations_planned,

@@ -6,6 +6,7 @@ import { CopyButton } from '../components/copy-button'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { formatDuration } from '../format/time'
+import { HIGHEST, isPriority, LOWEST, PRIORITY_HELP } from '../job/priority'
 import type { Submission } from './use-submission'
 
 export function SubmitPanel({
@@ -42,6 +43,7 @@ export function SubmitPanel({
         )}
         {problem !== null && <ErrorNotice what={advice(problem)} error={problem} />}
       </div>
+      <PriorityField submission={submission} />
       <button type="submit" class="primary" disabled={sending}>
         {sending ? 'Submitting…' : 'Submit the job'}
       </button>
@@ -62,6 +64,30 @@ export function SubmitPanel({
         </div>
       </details>
     </aside>
+  )
+}
+
+function PriorityField({ submission }: { submission: Submission }) {
+  const { priority, setPriority } = submission
+  const valid = isPriority(priority)
+  return (
+    <div class="field">
+      <label for="submit-priority">
+        Priority <span class="unit">[1]</span>
+      </label>
+      <input
+        id="submit-priority"
+        inputMode="numeric"
+        value={priority}
+        aria-invalid={!valid}
+        aria-describedby="submit-priority-hint"
+        title={PRIORITY_HELP}
+        onInput={(event) => setPriority(event.currentTarget.value)}
+      />
+      <span id="submit-priority-hint" class={valid ? 'hint' : 'wrong'}>
+        {LOWEST} to {HIGHEST}, the higher the sooner
+      </span>
+    </div>
   )
 }
 

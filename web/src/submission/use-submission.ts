@@ -18,6 +18,9 @@ export interface Submission {
   readonly sending: boolean
   /** Submissions that were refused so far. */
   readonly attempts: number
+  /** How urgent the job is to be, as it was typed. */
+  readonly priority: string
+  readonly setPriority: (text: string) => void
   readonly submit: () => void
 }
 
@@ -26,6 +29,7 @@ export function useSubmission(spec: AnySpec): Submission {
   const [problem, setProblem] = useState<unknown>(null)
   const [sending, setSending] = useState(false)
   const [attempts, setAttempts] = useState(0)
+  const [priority, setPriority] = useState('0')
   const [latest] = useState(
     () =>
       new LatestAnswer(
@@ -49,7 +53,7 @@ export function useSubmission(spec: AnySpec): Submission {
   const key = useRef({ text: '', key: '' })
   const submit = () => {
     if (key.current.text !== text) key.current = { text, key: randomKey() }
-    const headers = { 'Idempotency-Key': key.current.key }
+    const headers = { 'Idempotency-Key': key.current.key, 'Job-Priority': priority.trim() }
     setSending(true)
     post('/v1/jobs', { body: spec, headers })
       .then(
@@ -63,7 +67,7 @@ export function useSubmission(spec: AnySpec): Submission {
       )
       .finally(() => setSending(false))
   }
-  return { estimate, problem, sending, attempts, submit }
+  return { estimate, problem, sending, attempts, priority, setPriority, submit }
 }
 
 function randomKey(): string {

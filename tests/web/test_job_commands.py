@@ -1,0 +1,98 @@
+"""What a job's page lets people do to it, and what it says of that first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from services.optimizer.store.sql_store import SqlStore
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.servers import Server, ServerProcess
+from tests.web.conftest import SMALL_JOB
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+def named(page: Page, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def test_a_job_is_deleted_after_its_page_has_said_what_is_lost_and_what_stays(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"name": "to be deleted"})
+    job = server.wait_for(job_id, "succeeded")
+    forked = server.client.post(
+        f"/v1/jobs/{job_id}/fork", json={"from_iteration": 1, "name": "fork"}
+    )
+    fork = server.wait_for(forked.json()["id"], "succeeded")
+    page = visit(server.url).go(f"/jobs/{job_id}")
+
+    named(page, "Delete…")
+    dialog = page.get_by_role("dialog")
+    expect(dialog).to_contain_text(
+        f"{job['iterations']} iterations with {job['evaluations']} evaluated designs are lost for"
+        " good. Forks of the job keep their copies but lose their parent, and certificates of its"
+        " designs stay as jobs of their own."
+    )
+    named(page, "Keep it")
+    expect(dialog).to_be_hidden()
+    assert server.job(job_id)["state"] == "succeeded"
+
+    named(page, "Delete…")
+    named(page, "Delete the job")
+    expect(page).to_have_url(re.compile(r"/$"))
+    expect(page.locator(f"a[href='/jobs/{fork['id']}']")).to_be_visible()
+    expect(page.get_by_role("link", name="to be deleted")).to_have_count(0)
+    assert server.client.get(f"/v1/jobs/{job_id}").status_code == 404
+    left = server.client.get(f"/v1/jobs/{fork['id']}/iterations").json()["items"]
+    assert len(left) == fork["iterations"]
+
+
+def test_a_job_under_way_and_one_that_is_kept_offer_no_deletion(
+    start_server: Callable[..., Server], store: SqlStore, visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    job_id = server.submit(SMALL_SPEC)
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    expect(page.get_by_role("button", name="Cancel…")).to_be_visible()
+    expect(page.get_by_role("button", name="Delete…")).to_have_count(0)
+
+    named(page, "Cancel…")
+    named(page, "Cancel the job")
+    expect(page.get_by_role("button", name="Delete…")).to_be_visible()
+
+    store.keep(job_id, True)
+    page.reload()
+    expect(page.get_by_role("link", name="Clone")).to_be_visible()
+    expect(page.get_by_role("button", name="Delete…")).to_have_count(0)
+
+
+def test_a_job_has_a_priority_from_the_form_and_another_one_from_its_page(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    page = visit(server.url).go("/jobs/new")
+    page.get_by_label(re.compile("^Priority")).fill("3")
+    named(page, "Submit the job")
+    expect(page).to_have_url(re.compile(r"/jobs/(?!new)\w+$"))
+    job_id = page.url.rpartition("/")[2]
+    assert server.job(job_id)["priority"] == 3
+    expect(page.get_by_role("region", name="The job")).to_contain_text("priority 3")
+
+    named(page, "Priority…")
+    wanted = page.get_by_role("dialog").get_by_label(re.compile("^Priority"))
+    change = page.get_by_role("button", name="Change the priority")
+    wanted.fill("11")
+    expect(change).to_be_disabled()
+    wanted.fill("-4")
+    change.click()
+    expect(page.get_by_role("region", name="The job")).to_contain_text("priority -4")
+    assert server.job(job_id)["priority"] == -4
+
+    page.goto(server.url)
+    expect(page.get_by_role("row").filter(has_text=job_id)).to_contain_text("-4")

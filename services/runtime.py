@@ -36,6 +36,7 @@ def open_evaluator(
     address: str | None = None,
     cpus: int | None = None,
     should_stop: Callable[[], bool] = lambda: False,
+    patient: bool = False,
 ) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
     """Open workers for walks.
 
@@ -46,13 +47,14 @@ def open_evaluator(
             jobs on a cluster that is started for them and ends with this process.
         cpus: Walks to compute at once on this machine; all of its cores by default.
         should_stop: Polled several times a second while a cluster is connected.
+        patient: Whether a cluster that is away is waited for by whoever wants walks of it.
 
     Returns:
         The workers; whoever opens them closes them.
 
     Raises:
         InvalidRequest: The address is one of Ray Client (ray://).
-        EvaluatorUnavailable: They cannot be reached; says what to do.
+        EvaluatorUnavailable: They cannot be reached, and nobody is patient; says what to do.
         EvaluationStopped: `should_stop` said so.
     """
     if address is not None and "://" in address:
@@ -66,7 +68,10 @@ def open_evaluator(
     if address is None:
         return HybridEvaluator(cpus)
     cluster = RayEvaluator(address, cpus=cpus)
-    cluster.wait_until_open(should_stop)
+    if patient:
+        cluster.stay_connected(should_stop)
+    else:
+        cluster.wait_until_open(should_stop)
     return cluster
 
 
@@ -83,6 +88,13 @@ class Runtime:
     service: JobService
     evaluator: Evaluator | None
     runner: Runner | None
+
+    @property
+    def slots(self) -> int:
+        """Tasks that run at the same time; 0 while workers are away, and where there are none."""
+        if self.evaluator is None or self.workers_trouble() is not None:
+            return 0
+        return self.evaluator.slots
 
     def workers_trouble(self) -> str | None:
         """Why walks cannot be run now; None if they can, or nothing is known against it."""
@@ -116,7 +128,7 @@ def open_runtime(
     Args:
         database: URL for `open_store`.
         evaluator: Where walks run; None for a process that runs no jobs.
-        ray_address: Of a Ray cluster, as for `open_evaluator`.
+        ray_address: Of a Ray cluster, as for `open_evaluator`; jobs wait for one that is away.
         cpus: Walks to compute at once on this machine; all of its cores by default.
         concurrent_jobs: Jobs to run at once.
         lease_seconds: After so long without a word from this process another one takes its jobs
@@ -139,7 +151,6 @@ def open_runtime(
     Raises:
         InvalidRequest: As for `open_evaluator`.
         StoreUnavailable: The database cannot be opened.
-        EvaluatorUnavailable: The workers cannot be reached.
         EvaluationStopped: `should_stop` said so.
     """
     with ExitStack() as stack:
@@ -167,7 +178,9 @@ def open_runtime(
         if evaluator is None:
             yield Runtime(service, None, None)
             return
-        workers = open_evaluator(evaluator, address=ray_address, cpus=cpus, should_stop=should_stop)
+        workers = open_evaluator(
+            evaluator, address=ray_address, cpus=cpus, should_stop=should_stop, patient=True
+        )
         stack.callback(workers.close)
         if metrics is not None:
             from services.monitoring.collectors import WorkersCollector  # noqa: PLC0415

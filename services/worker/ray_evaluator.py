@@ -6,6 +6,7 @@ import logging
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import Final
 
 from services.optimizer.errors import EvaluatorUnavailable
@@ -26,6 +27,9 @@ _PATIENCE: Final = 10.0
 _PATIENCE_EMBEDDED: Final = 30.0
 """The same for a cluster of our own, which opens sooner or later, however busy the machine is."""
 
+_RECONNECT_SECONDS: Final = 5.0
+"""Between attempts to connect to a cluster that is away, while no job wants walks of it."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -45,6 +49,7 @@ class RayEvaluator:
         self._cpus = cpus
         self._changing = threading.Lock()
         self._closed = False
+        self._closing = threading.Event()
         self._kernels = KernelBuilder()
         self._link = _Link(address, cpus)
 
@@ -71,9 +76,13 @@ class RayEvaluator:
         return self._link.lost
 
     def trouble(self) -> str | None:
-        """Whether Ray was lost, or could not be opened."""
-        if not self.lost:
+        """Whether Ray was lost, or could not be opened; says why."""
+        link = self._link
+        if not link.lost:
             return None
+        error = link.opened.exception()
+        if error is not None:
+            return f"it is tried again and again: {error}"
         return "Ray is out of reach; it is connected again for the next iteration"
 
     def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
@@ -96,6 +105,36 @@ class RayEvaluator:
         except BaseException:
             self.close()
             raise
+
+    def stay_connected(self, should_stop: Callable[[], bool]) -> None:
+        """Return when Ray is open, or known to be away; then it is tried again until it is there.
+
+        Args:
+            should_stop: As for `wait_until_open`.
+
+        Raises:
+            EvaluationStopped: As `wait_until_open`.
+        """
+        try:
+            awaited(self._link.opened, should_stop)
+        except EvaluationStopped:
+            threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
+            raise
+        except EvaluatorUnavailable as error:
+            _log.warning("jobs wait until there are workers: %s", error)
+        threading.Thread(target=self._connect_again, name="ray-reconnect", daemon=True).start()
+
+    def _connect_again(self) -> None:
+        """Until this is closed, whether a job wants walks or not."""
+        was_away = self.lost
+        while not self._closing.wait(_RECONNECT_SECONDS):
+            if self.lost:
+                was_away = True
+                with suppress(EvaluatorUnavailable):
+                    self._living_link()
+            elif was_away and self._link.opened.done():
+                was_away = False
+                _log.info("Ray is open, with %d slots", self.slots)
 
     def is_warm(self) -> bool:
         """Whether Ray is open, and every slot had a process that has imported what walks need.
@@ -129,6 +168,7 @@ class RayEvaluator:
         """Disconnect; an embedded cluster ends."""
         with self._changing:
             self._closed = True
+        self._closing.set()
         self._link.close()
 
     def _living_link(self) -> _Link:

@@ -24,6 +24,12 @@ from services.worker.joining import JoinedNode, runs_here
 _OBJECT_STORE_BYTES: Final = 80 * 1024 * 1024
 """Ray's minimum is 75 MiB; designs and results take kilobytes."""
 
+_ANSWER_SECONDS: Final = 2.0
+"""In which a head says which nodes there are."""
+
+_ALIVE: Final = 0
+"""Of Ray's states of nodes."""
+
 _PREFIX: Final = "gaitswarm-ray-"
 
 _BEFORE_IMPORT: Final = {
@@ -71,6 +77,17 @@ class RaySession:
         """
         return listens(*self.head)
 
+    def nodes(self) -> list[dict[str, Any]]:
+        """Those that are alive, as `ray.nodes` has them, or an error within two seconds.
+
+        `ray.nodes` waits for a head that goes meanwhile for as long as it takes; after a minute Ray
+        ends the process for that, connected or not.
+
+        Raises:
+            EvaluatorUnavailable: The head does not answer.
+        """
+        return _nodes(self.ray)
+
     def only_on(self, node_id: str) -> Any:
         """How a task is scheduled on one node, and fails if that is gone.
 
@@ -92,7 +109,7 @@ class RaySession:
         """
         from ray.util import scheduling_strategies  # noqa: PLC0415 - as in `open_ray`
 
-        heads = [n for n in self.ray.nodes() if "node:__internal_head__" in n["Resources"]]
+        heads = [n for n in self.nodes() if "node:__internal_head__" in n["Resources"]]
         if not heads:
             return "DEFAULT"
         head = str(heads[0]["NodeID"])
@@ -155,7 +172,7 @@ def _connect(ray: ModuleType, address: str) -> RaySession:
         node = JoinedNode(address)
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-        slots = int(ray.cluster_resources().get("CPU", 0))
+        slots = int(sum(n["Resources"].get("CPU", 0) for n in _nodes(ray)))
     except Exception as error:
         with suppress(Exception):
             ray.shutdown()
@@ -166,6 +183,27 @@ def _connect(ray: ModuleType, address: str) -> RaySession:
             " that RAY_AUTH_TOKEN is the cluster's"
         ) from error
     return RaySession(ray, max(slots, 1), _head(ray), node=node)
+
+
+def _nodes(ray: ModuleType) -> list[dict[str, Any]]:
+    client = ray._private.worker.global_worker.gcs_client  # noqa: SLF001 - with a time-out
+    try:
+        found = client.get_all_node_info(timeout=_ANSWER_SECONDS)
+    except ray.exceptions.RpcError as error:
+        raise EvaluatorUnavailable(
+            f"the head of the cluster does not say which nodes there are: {_first_line(error)}"
+        ) from error
+    return [
+        {
+            "NodeID": node_id.hex(),
+            "NodeManagerHostname": info.node_manager_hostname,
+            "NodeManagerAddress": info.node_manager_address,
+            "NodeManagerPort": info.node_manager_port,
+            "Resources": dict(info.resources_total),
+        }
+        for node_id, info in found.items()
+        if info.state == _ALIVE
+    ]
 
 
 def _embed(ray: ModuleType, cpus: int) -> RaySession:

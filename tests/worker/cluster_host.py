@@ -82,13 +82,16 @@ def ray_environment(directory: Path) -> dict[str, str]:
     }
 
 
-def start() -> str:
-    """Start a head without CPUs; its address."""
+def start(port: int | None = None, cpus: int = 0) -> str:
+    """Start a head; its address. port: where it listens, a free one by default."""
     global _cluster  # noqa: PLW0603 - the state of this process
     import ray.cluster_utils
 
     _cluster = ray.cluster_utils.Cluster()
-    _cluster.add_node(num_cpus=0, include_dashboard=False, object_store_memory=_STORE_BYTES)
+    chosen = {} if port is None else {"gcs_server_port": port}
+    _cluster.add_node(
+        num_cpus=cpus, include_dashboard=False, object_store_memory=_STORE_BYTES, **chosen
+    )
     return str(_cluster.address)
 
 
@@ -112,6 +115,11 @@ def lose(node_id: str) -> None:
 
 def nodes() -> list[str]:
     return list(_nodes)
+
+
+def kill() -> None:
+    """Kill all processes of the cluster at once."""
+    _cluster.remove_node(_cluster.head_node, allow_graceful=False)
 
 
 def stop() -> None:

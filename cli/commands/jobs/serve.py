@@ -137,8 +137,7 @@ def runner(options: RunnerOptions) -> None:
         _runtime(settings, metrics, should_stop=stop.is_set) as opened,
         _served(metrics, settings, lambda: opened.service.store.tokens) as url,
     ):
-        slots = opened.evaluator.slots if opened.evaluator else 0
-        log.info("ready: %d slots, %d jobs at once", slots, settings.concurrent_jobs)
+        log.info("ready: %d slots, %d jobs at once", opened.slots, settings.concurrent_jobs)
         if url is not None:
             log.info("metrics: %s", url)
         # Handlers run in this thread, but the system may hand a signal to another one.

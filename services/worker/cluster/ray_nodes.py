@@ -197,7 +197,10 @@ class ClusterNodes:
         self._next_look = time.monotonic() + LOOK_SECONDS
         if not self._session.head_answers():
             return ()
-        found = {str(entry["NodeID"]): entry for entry in self._ray.nodes() if entry["Alive"]}
+        try:
+            found = {str(entry["NodeID"]): entry for entry in self._session.nodes()}
+        except EvaluatorUnavailable:
+            return ()
         listening = {node_id: self._probe(node_id, _place(found[node_id])) for node_id in found}
         lost = []
         for node_id, node in tuple(self._nodes.items()):

@@ -82,6 +82,7 @@ class Shares:
     """
 
     def __init__(self, session: RaySession) -> None:
+        self._session = session
         self._ray = session.ray
         self._options = {
             "name": _NAME,
@@ -120,6 +121,10 @@ class Shares:
 
     def _report(self, demand: float) -> None:
         if self._actor is None:
+            # Ray would wait for a head that is away, and end the process for that.
+            if not self._session.head_answers():
+                self._next = time.monotonic() + REPORT_SECONDS
+                return
             remote = self._ray.remote(**self._options)(ledger())
             self._actor = remote.remote(_FORGOTTEN_SECONDS)
         self._asked = (self._actor.report.remote(self._runner, demand), demand)

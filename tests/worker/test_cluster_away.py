@@ -1,0 +1,93 @@
+"""A server that is started while its cluster is away, which then comes, goes and comes back."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.examples.jobs import SMALL_SPEC
+from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
+from tests.examples.servers import ServerProcess
+from tests.worker import cluster_host
+from tests.worker.cluster_host import Process
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@pytest.fixture
+def environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """For all processes of the test."""
+    directory = Path(tempfile.mkdtemp(prefix="gsc-"))
+    for name, value in cluster_host.ray_environment(directory).items():
+        monkeypatch.setenv(name, value)
+    yield
+    shutil.rmtree(directory, ignore_errors=True)
+
+
+@contextmanager
+def cluster(port: int) -> Iterator[None]:
+    """A head with a CPU that listens at a port; at the end it is killed."""
+    with Process() as host:
+        host.run(cluster_host.start, port=port, cpus=1)
+        try:
+            yield
+        finally:
+            host.run(cluster_host.kill)
+
+
+def workers(server: ServerProcess) -> tuple[str, str]:
+    """What the server says of its workers: status and detail."""
+    answer = server.client.get("/v1/readyz")
+    assert answer.status_code == 200
+    (found,) = [part for part in answer.json()["components"] if part["name"] == "workers"]
+    return found["status"], found["detail"]
+
+
+def test_a_server_that_is_started_while_its_cluster_is_away_waits_for_it_says_so_and_goes_on(
+    environment: None, database: Path
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as reserved:
+        port = reserved.getsockname()[1]
+    server = ServerProcess(database, "--evaluator", "ray", "--ray-address", f"127.0.0.1:{port}")
+    try:
+        assert workers(server) == (
+            "degraded",
+            f"it is tried again and again: no Ray cluster listens at '127.0.0.1:{port}'; is it up?",
+        )
+        first = server.submit(SMALL_SPEC)
+        eventually(lambda: "no Ray cluster listens" in (server.job(first)["waiting"] or ""))
+        with cluster(port):
+            ended = server.wait_for(first, "succeeded", seconds=240.0)
+            assert ended["waiting"] is None
+            assert workers(server) == ("ok", "")
+        second = server.submit(SMALL_SPEC)
+        eventually(lambda: server.job(second)["waiting"] is not None)
+        assert workers(server)[0] == "degraded"
+        with cluster(port):
+            again = server.wait_for(second, "succeeded", seconds=240.0)
+        assert again["head"] is not None and again["best_fitness"] == ended["best_fitness"]
+    finally:
+        server.close()
+
+
+def test_a_runner_that_waits_for_its_cluster_ends_when_it_is_told_to(
+    environment: None, database: Path
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as reserved:
+        address = f"127.0.0.1:{reserved.getsockname()[1]}"
+    runner = start_python(
+        *(*COMMAND_LINE, "runner", "--db", database, "--evaluator", "ray"),
+        *("--ray-address", address),
+    )
+    line_with(runner.stderr, f"jobs wait until there are workers: no Ray cluster .*'{address}'")
+    line_with(runner.stderr, "ready: 0 slots")
+    runner.send_signal(signal.SIGTERM)
+    assert runner.wait(timeout=60.0) == 0
+    runner.communicate()

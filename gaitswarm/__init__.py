@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView
+    from gaitswarm.views.importance import ImportanceView
     from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
@@ -163,6 +164,7 @@ __all__ = [
     "IdempotencyConflict",
     "IdentifiabilityView",
     "IdentificationSpec",
+    "ImportanceView",
     "Interrupted",
     "InvalidRequest",
     "IterationView",
@@ -266,6 +268,7 @@ _MODULES: Final = {
     "gaitswarm.views.families": ("ScenarioFamiliesView",),
     "gaitswarm.views.firmware": ("FirmwareView",),
     "gaitswarm.views.certificate": ("CertificateView",),
+    "gaitswarm.views.importance": ("ImportanceView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.preferences": ("RobustPreferencesView",),
     "gaitswarm.views.replay": ("WalkReplay",),

@@ -21,6 +21,7 @@ from api.dependencies import (
 )
 from api.documentation import binary, problems
 from gaitswarm.requests.families import TOLERANCE, run_scenario_families
+from gaitswarm.requests.importance import run_importance
 from gaitswarm.requests.preferences import PreferencesRequest, run_preferences
 from gaitswarm.requests.trade_offs import (
     DESIGNS,
@@ -38,6 +39,7 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.base import MEDIA_TYPE
 from gaitswarm.views.families import ScenarioFamiliesView
+from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.errors import InvalidRequest
@@ -154,6 +156,23 @@ def get_scenario_families(
     families of every size; from stored objectives, no walk is simulated.
     """
     return _json(run_scenario_families(service, job_id, tolerance))
+
+
+@router.get(
+    "/importance",
+    dependencies=[Analysing],
+    operation_id="get_importance",
+    summary="See which variables matter",
+    response_model=ImportanceView,
+    responses=problems(404, 409, 422),
+)
+def get_importance(job_id: JobId, service: Service) -> Response:
+    """First-order Sobol' indices of every variable for the fitness, for each objective and for
+    failing, among the designs that were tried; and whether the winner lies at a bound.
+
+    From stored objectives, no walk is simulated.
+    """
+    return _json(run_importance(service, job_id))
 
 
 @router.get(

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+    from gaitswarm.views.importance import ImportanceView
     from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
@@ -195,6 +196,10 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """See which scenarios of a job matter, from what is stored."""
+
+    @abstractmethod
+    async def importance(self, job_id: str) -> ImportanceView:
+        """See which variables of a job matter, from what is stored."""
 
     @abstractmethod
     async def preferences(

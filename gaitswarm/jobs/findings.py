@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView
+    from gaitswarm.views.importance import ImportanceView
     from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import HistoryVerificationView
@@ -105,6 +106,22 @@ class Findings(ABC):
             InvalidRequest: The job tunes no drive, or the tolerance makes no sense.
             Conflict: No design of it walks in all scenarios, or it is too large to be held in
                 memory.
+        """
+
+    @abstractmethod
+    def importance(self, job_id: str) -> ImportanceView:
+        """See which variables of a job matter, from what is stored.
+
+        Args:
+            job_id: Identifier of a job that tunes a drive or fits parameters.
+
+        Returns:
+            First-order Sobol' indices of every variable for the fitness, for each objective and for
+            failing, with intervals; and whether the winner lies at a bound.
+
+        Raises:
+            InvalidRequest: The job is of another kind.
+            Conflict: It has no design yet, or is too large to be held in memory.
         """
 
     @abstractmethod

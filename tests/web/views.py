@@ -18,6 +18,7 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
         "job": "/jobs/{job}",
         "scenarios": "/jobs/{job}/scenarios",
         "robustness": "/jobs/{job}/robustness",
+        "analysis": "/jobs/{job}/analysis",
         "variables": "/jobs/{job}/variables",
         "iterations": "/jobs/{job}/iterations",
         "particles": "/jobs/{job}/iterations/1",

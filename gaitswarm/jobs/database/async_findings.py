@@ -24,6 +24,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
+from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
@@ -76,6 +77,11 @@ class AsyncDatabaseFindings(ABC):
         """Judge a job's designs by fewer scenarios, from what is stored."""
         jobs = await self._jobs()
         return await to_thread.run_sync(partial(jobs.scenarios, job_id, tolerance=tolerance))
+
+    async def importance(self, job_id: str) -> ImportanceView:
+        """Estimate indices from what is stored, in a thread."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.importance, job_id))
 
     async def preferences(
         self,

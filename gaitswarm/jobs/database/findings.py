@@ -11,6 +11,7 @@ from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.requests import arguments
 from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.requests.families import run_scenario_families
+from gaitswarm.requests.importance import run_importance
 from gaitswarm.requests.preferences import run_preferences
 from gaitswarm.requests.targets import run_targets
 from gaitswarm.requests.trade_offs import DESIGNS, run_front, run_preference_for
@@ -26,6 +27,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
+from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
@@ -80,6 +82,10 @@ class DatabaseFindings(Findings, Tournaments):
     def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Judge a job's designs by fewer scenarios, from what is stored."""
         return run_scenario_families(self._service, job_id, tolerance)
+
+    def importance(self, job_id: str) -> ImportanceView:
+        """Estimate indices from what is stored."""
+        return run_importance(self._service, job_id)
 
     def preferences(
         self,

@@ -31,6 +31,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
+from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
@@ -91,6 +92,10 @@ class AsyncServerFindings(ABC):
     async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Let the server judge a job's designs by fewer scenarios."""
         return await self._send(calls.scenarios(job_id, tolerance))
+
+    async def importance(self, job_id: str) -> ImportanceView:
+        """Let the server estimate indices."""
+        return await self._send(calls.importance(job_id))
 
     async def preferences(
         self,

@@ -26,6 +26,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import (
     ProblemRunsView,
@@ -183,6 +184,15 @@ def scenarios(job_id: str, tolerance: float) -> Call[ScenarioFamiliesView]:
     """
     path, read = f"{job_path(job_id)}/scenarios", ScenarioFamiliesView.model_validate_json
     return Call("GET", path, read, {"tolerance": repr(tolerance)})
+
+
+def importance(job_id: str) -> Call[ImportanceView]:
+    """Find out which variables of a job matter.
+
+    Args:
+        job_id: Identifier of the job.
+    """
+    return got(f"{job_path(job_id)}/importance", ImportanceView)
 
 
 def preferences(job_id: str, request: PreferencesRequest) -> Call[RobustPreferencesView]:

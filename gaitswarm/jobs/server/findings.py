@@ -33,6 +33,7 @@ from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
+from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
@@ -90,6 +91,10 @@ class ServerFindings(Findings, Tournaments, ABC):
     def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Let the server judge a job's designs by fewer scenarios."""
         return self._send(calls.scenarios(job_id, tolerance))
+
+    def importance(self, job_id: str) -> ImportanceView:
+        """Let the server estimate indices."""
+        return self._send(calls.importance(job_id))
 
     def preferences(
         self,

@@ -5,6 +5,7 @@ import type { Job } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
+import { AnalysisPanel } from './analysis/panel'
 import { CertificatePanel } from './certificate-panel'
 import { FirmwarePanel } from './firmware-panel'
 import { caseWords } from './fitness'
@@ -30,6 +31,7 @@ const TABS = [
   { tab: 'scenarios', label: 'Scenarios' },
   { tab: 'parameters', label: 'Parameters' },
   { tab: 'robustness', label: 'Robustness' },
+  { tab: 'analysis', label: 'Analysis' },
   { tab: 'variables', label: 'Variables' },
   { tab: 'iterations', label: 'Iterations' },
   { tab: 'trade-offs', label: 'Trade-offs' },
@@ -46,6 +48,7 @@ const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
   scenarios: ['tuning', 'identification', 'calibration', 'tournament'],
   parameters: ['identification', 'calibration'],
   robustness: ['tuning'],
+  analysis: ['tuning', 'identification', 'calibration'],
   'trade-offs': ['tuning'],
   preferences: ['tuning'],
   firmware: ['tuning'],
@@ -123,6 +126,8 @@ function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
       return <ScenariosPanel job={job} />
     case 'robustness':
       return <RobustnessPanel job={job} />
+    case 'analysis':
+      return <AnalysisPanel job={job} />
     case 'variables':
       return <VariablesPanel job={job} />
     case 'iterations':

@@ -13,6 +13,7 @@ import { type Draft, draftOf, emptyDraft, preferenceOf, withScenarios } from './
 import { JobForm } from './form'
 import { JsonForm } from './json-form'
 import './submission.css'
+import { widened } from './widen'
 
 interface Start {
   readonly catalogue: Catalogue
@@ -61,7 +62,7 @@ export default function NewJobPage() {
 
 /**
  * `clone` names a job; `seed` and `preference` replace its own; `scenarios` names those of its
- * scenarios that stay; `start` names jobs whose best designs the search begins with; `iteration`, `particle` name a design to stay near.
+ * scenarios that stay; `widen` gives variables other bounds, as `P:0:2`; `start` names jobs whose best designs the search begins with; `iteration`, `particle` name a design to stay near.
  */
 async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Start> {
   const id = query.get('clone')
@@ -78,6 +79,8 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   if (preference) draft = { ...draft, preference }
   const scenarios = query.get('scenarios')?.split(',')
   if (scenarios) draft = withScenarios(draft, scenarios)
+  const widen = query.get('widen')
+  if (widen !== null) draft = widened(draft, widen)
   const design = await designIn(query, from.id, signal)
   if (design) draft = around(draft, design, wholeVariables(catalogue, draft.controller))
   return { catalogue, draft, from }

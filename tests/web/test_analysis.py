@@ -30,7 +30,7 @@ def test_variables_stand_in_the_order_of_what_they_do_to_the_chosen_output(
     bars = page.locator("[data-output] [data-variable]")
     expect(bars).to_have_count(len(found["variables"]))
     for output in ("fitness", "energy"):
-        page.get_by_label("For", exact=True).select_option(output)
+        page.get_by_role("main").get_by_role("combobox").select_option(output)
         expect(page.locator(f"[data-output='{output}']")).to_be_visible()
         values = {
             v["name"]: v["fitness"] if output == "fitness" else v["objectives"][output]
@@ -50,12 +50,13 @@ def test_variables_stand_in_the_order_of_what_they_do_to_the_chosen_output(
 def test_bounds_that_hold_the_winner_are_widened_in_the_form(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
-    # The larger P, the better, far beyond these bounds.
+    # All of its designs are at the upper bound of P.
     narrow = SMALL_JOB | {
         "controller": "pi",
         "variables": [{"name": "P", "low": 0.05, "high": 0.1}, "I"],
-        "start": [{"P": 0.1, "I": 0.2}],
-        "iterations": 3,
+        "start": [{"P": 0.1, "I": 0.2}, {"P": 0.1, "I": 0.5}],
+        "optimizer": {"name": "pso", "particles": 2},
+        "iterations": 1,
     }
     job_id = server.submit(narrow)
     server.wait_for(job_id, "succeeded")

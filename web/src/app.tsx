@@ -10,6 +10,7 @@ import { type Route, routeOf } from './router/routes'
 import { useUnauthorized } from './session/session'
 import { SignIn } from './session/sign-in'
 import { toggleTheme, useTheme } from './theme'
+import { setTitle } from './title'
 
 const NewJobPage = lazyPage('the form', () => import('./submission/page'))
 const JobPage = lazyPage('the job', () => import('./job/page'))
@@ -24,10 +25,11 @@ const LINKS = [
   { page: 'controller', href: '/controller', label: 'Controller' },
 ] as const
 
-const TITLES: Readonly<Record<Route['page'], string>> = {
+/** Null for a page that names itself. */
+const TITLES: Readonly<Record<Route['page'], string | null>> = {
   jobs: 'Jobs',
   'new-job': 'New job',
-  job: 'Job',
+  job: null,
   tournaments: 'Tournaments',
   walk: 'Walk',
   controller: 'Controller',
@@ -78,7 +80,8 @@ export function App() {
 function Main({ route }: { route: Route }) {
   const main = useRef<HTMLElement>(null)
   useEffect(() => {
-    document.title = `${TITLES[route.page]} · gaitswarm`
+    const title = TITLES[route.page]
+    if (title !== null) setTitle(title)
     if (moved) main.current?.focus({ preventScroll: true })
     moved = true
   }, [route.page])

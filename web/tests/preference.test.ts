@@ -54,21 +54,30 @@ describe('the utility', () => {
 describe('what limits a design', () => {
   const analysis = analyse({ flat: walked(3, 2, 4), steep: walked(3, 10, 4) }, PREFERENCE)!
 
-  test('is the scenario of greatest utility, and there the largest contribution', () => {
+  test('is the scenario of greatest utility, and there what it has most more of than the others', () => {
     expect(analysis.worstScenario).toBe('steep')
     expect(analysis.worstFactor).toMatchObject({ scenario: 'steep', objective: 'energy' })
-    expect(analysis.worstFactor.contribution).toBeCloseTo(2 * Math.log(10), 12)
+    expect(analysis.worstFactor.contribution).toBeCloseTo(2 * Math.log(10 / Math.sqrt(20)), 12)
   })
 
   test('exceeds the geometric mean by the root of the ratio of two utilities', () => {
     expect(analysis.excess).toBeCloseTo(Math.sqrt(25), 12)
   })
 
-  test('contributions add up to the logarithm of the utility', () => {
+  test('contributions add up to the logarithm of the utility over that of all', () => {
     const sum = analysis.factors
       .filter((factor) => factor.scenario === 'flat')
       .reduce((total, factor) => total + factor.contribution, 0)
-    expect(sum).toBeCloseTo(Math.log(60), 12)
+    expect(sum).toBeCloseTo(Math.log(2 ** 2 / (2 * 10)), 12)
+    expect(sum).toBeCloseTo(analysis.utilities.flat, 12)
+  })
+
+  test('depends on no unit', () => {
+    const inMillimetres = { flat: walked(3000, 2, 4), steep: walked(3300, 2.1, 4) }
+    const inMetres = { flat: walked(3, 2, 4), steep: walked(3.3, 2.1, 4) }
+    const [one, other] = [inMillimetres, inMetres].map((walks) => analyse(walks, PREFERENCE)!)
+    expect(one.worstFactor.objective).toBe(other.worstFactor.objective)
+    expect(one.worstFactor.contribution).toBeCloseTo(other.worstFactor.contribution, 12)
   })
 
   test('sensitivities are those of the fitness, by small differences', () => {

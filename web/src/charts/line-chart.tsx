@@ -96,7 +96,9 @@ export function LineChart(props: LineChartProps) {
     }
   }, [theme, height, shapeOf(props)])
 
-  useEffect(() => plot.current?.setData(dataOf(latest.current)), [props.x, props.series])
+  useEffect(() => {
+    if (plot.current) renew(plot.current, dataOf(latest.current))
+  }, [props.x, props.series])
   useEffect(() => plot.current?.redraw(false), [props.marker])
 
   return (
@@ -122,6 +124,21 @@ function shapeOf({
   const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.dots, s.stepped, s.silent])
   const axes = [logarithmic, xLogarithmic, fromZero, xLabel, yLabel, xUnit, yUnit]
   return JSON.stringify([lines, bands, axes])
+}
+
+/** New data under the same zoom; all of it where nothing is zoomed. */
+function renew(plot: uPlot, data: uPlot.AlignedData) {
+  const { min, max } = plot.scales.x
+  const x = plot.data[0]
+  const zoomed = x.length > 0 && ((min ?? x[0]) > x[0] || (max ?? 0) < x[x.length - 1])
+  if (!zoomed) {
+    plot.setData(data)
+    return
+  }
+  plot.batch(() => {
+    plot.setData(data, false)
+    plot.setScale('x', { min: min!, max: max! })
+  })
 }
 
 function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
@@ -209,6 +226,13 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
       drawAxes: [(u) => props.current.paint?.(u)],
       setCursor: [(u) => showReadout(u, props.current, readout)],
       draw: [(u) => drawMarker(u, props.current.marker)],
+      // As tests and other tools read it.
+      setScale: [
+        (u, key) => {
+          const { min, max } = u.scales.x
+          if (key === 'x') u.root.dataset.range = `${min} ${max}`
+        },
+      ],
       ready: [
         (u) => {
           u.over.addEventListener('click', () => {

@@ -194,7 +194,7 @@ function readBrush(model: ParallelModel, index: number, brushes: Brushes): strin
 }
 
 /** From the best colour to the worst, through one between them. */
-function themePalette(): Palette {
+export function themePalette(): Palette {
   const stops = ['--rank-best', '--rank-middle', '--rank-worst'] as const
   const [best, middle, worst] = stops.map((name) => channels(themeColour(name)))
   const buckets = Array.from({ length: BUCKETS }, (_, k) => {

@@ -49,6 +49,11 @@ export function Table<R>({
   const by = columns.find((column) => column.key === order?.column)?.value
   const inOrder = order && by ? sorted(rows, by, order.descending) : rows
   const page = paged(inOrder, wanted, pageSize)
+  const reorder = (chosen: SortOrder) => {
+    setOrder(chosen)
+    // What comes first by the new order is what is looked for.
+    setWanted(0)
+  }
   return (
     <div>
       {/* A box that scrolls must take the keyboard. */}
@@ -62,7 +67,7 @@ export function Table<R>({
           <thead>
             <tr>
               {columns.map((column) => (
-                <Header key={column.key} column={column} order={order} onOrder={setOrder} />
+                <Header key={column.key} column={column} order={order} onOrder={reorder} />
               ))}
             </tr>
           </thead>

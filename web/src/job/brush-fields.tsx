@@ -23,7 +23,10 @@ export function BrushFields({
           const [low, high] = brushes.get(index) ?? [0, 1]
           const change = (end: 'low' | 'high', text: string) => {
             const place = text === '' ? (end === 'low' ? 0 : 1) : placeOf(axis, Number(text))
-            const brush = end === 'low' ? ([place, high] as const) : ([low, place] as const)
+            if (Number.isNaN(place)) return
+            // Bounds in the wrong order are those of the same stretch.
+            const ends = end === 'low' ? [place, high] : [low, place]
+            const brush = [Math.min(...ends), Math.max(...ends)] as const
             const whole = brush[0] <= 0 && brush[1] >= 1
             onBrush(withBrush(brushes, index, whole ? null : brush))
           }

@@ -1,4 +1,4 @@
-/** Best, mean and quantiles of fitness over the iterations. */
+/** Best, median and quantiles of fitness over the iterations. */
 
 import { useMemo, useState } from 'preact/hooks'
 import type { Iteration, Job } from '../api/types'
@@ -39,7 +39,7 @@ export function ConvergenceChart({
       legend={
         <>
           <LegendEntry colour="--series-1" label="best so far" />
-          <LegendEntry colour="--series-2" label="mean" />
+          <LegendEntry colour="--series-2" label="median" />
           {drawn.bands.length > 0 && (
             <>
               <LegendEntry colour="--fan-inner" label="25 % to 75 % of the designs" area />
@@ -75,7 +75,7 @@ function content(iterations: readonly Iteration[], { quantiles, items }: Distrib
       colour: '--series-1',
       width: 2.2,
     },
-    { label: 'mean', values: iterations.map((i) => i.mean), colour: '--series-2' },
+    { label: 'median', values: iterations.map((i) => i.median), colour: '--series-2' },
   ]
   const edge = (share: number): Series => {
     const column = quantiles.indexOf(share)

@@ -22,31 +22,37 @@ export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
         <p data-limit={`${analysis.worstScenario} ${analysis.worstFactor.objective}`}>
           {explain(analysis, units)}
         </p>
-        <ContributionTable analysis={analysis} />
+        {Object.keys(analysis.utilities).length > 1 && <ContributionTable analysis={analysis} />}
       </div>
     </section>
   )
 }
 
 function explain(
-  { worstScenario, worstFactor, excess, factors }: Analysis,
+  { worstScenario, worstFactor, excess, factors, utilities }: Analysis,
   units: Map<string, string>,
 ) {
   const steepest = factors.reduce((a, b) => (b.sensitivity > a.sensitivity ? b : a))
   const value = quantity(worstFactor.value, units.get(worstFactor.objective) ?? '1')
   const gain = 1 - (1 - 0.1) ** steepest.sensitivity
+  const several = Object.keys(utilities).length > 1
   return (
     <>
-      The scenario <strong>{worstScenario}</strong> holds it back most: its utility is{' '}
-      {formatNumber(excess, 3)} times the geometric mean of all scenarios. There,{' '}
-      <strong>{inWords(worstFactor.objective)}</strong> ({value}) weighs most. The most to gain is
-      in {inWords(steepest.objective)} of {steepest.scenario}: 10&nbsp;% less of it lowers the
-      fitness by some {percent(gain, 2)}.
+      {several && (
+        <>
+          The scenario <strong>{worstScenario}</strong> holds it back most: its utility is{' '}
+          {formatNumber(excess, 3)} times the geometric mean of all scenarios. What it has more of
+          than the others is above all <strong>{inWords(worstFactor.objective)}</strong> ({value}
+          ).{' '}
+        </>
+      )}
+      The most to gain is in {inWords(steepest.objective)} of {steepest.scenario}: 10&nbsp;% less of
+      it lowers the fitness by some {percent(gain, 2)}.
     </>
   )
 }
 
-/** e ln(b + f) of every factor; the row sums are the logarithms of the utilities. */
+/** What each objective adds to a scenario's utility over that of all; rows add up. */
 function ContributionTable({ analysis }: { analysis: Analysis }) {
   const scenarios = Object.keys(analysis.utilities)
   const objectives = [...new Set(analysis.factors.map((f) => f.objective))]
@@ -56,7 +62,7 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
   return (
     <div>
       <Table
-        caption="Contribution e ln(b + f) of each objective to the logarithm of each scenario's utility"
+        caption="What each objective adds to the logarithm of a scenario's utility over that of all"
         rows={scenarios}
         rowKey={(scenario) => scenario}
         order={{ column: 'sum', descending: true }}
@@ -71,7 +77,7 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
           })),
           {
             key: 'sum',
-            label: 'ln utility',
+            label: 'Sum',
             numeric: true,
             value: (s) => analysis.utilities[s],
             cell: (s) => <strong>{formatNumber(analysis.utilities[s], 3)}</strong>,
@@ -79,7 +85,8 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
         ]}
       />
       <p class="muted small table-note">
-        Each number is e ln(b + f), dimensionless; the sums are the logarithms of the utilities.
+        Each number is e ln((b + f) / the geometric mean of b + f over the scenarios); a sum is the
+        logarithm of the scenario’s utility over the geometric mean of all.
       </p>
     </div>
   )

@@ -1,11 +1,14 @@
 /** One job, live: header, commands, and its parts under tabs. */
 
+import { useEffect } from 'preact/hooks'
 import { isReadable } from '../api/readable'
-import type { Job } from '../api/types'
+import type { Iteration, Job, StoredJob } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
+import { setTitle } from '../title'
 import { AnalysisPanel } from './analysis/panel'
+import { budgetSpent } from './budget'
 import { CertificatePanel } from './certificate-panel'
 import { FirmwarePanel } from './firmware-panel'
 import { caseWords } from './fitness'
@@ -66,6 +69,8 @@ export default function JobPage({ id, tab }: { id: string; tab: string }) {
 function OneJob({ id, tab }: { id: string; tab: string }) {
   const live = useJob(id)
   const { job } = live
+  const title = job ? titleOf(job, live.followed.iterations) : [`Job ${id}`]
+  useEffect(() => setTitle(...title), [title.join()])
   if (job === null) {
     if (live.error === null) return <Loading what="the job" />
     return (
@@ -89,6 +94,13 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       {isReadable(job) && <Parts live={live} job={job} tab={tab} />}
     </div>
   )
+}
+
+/** Name and state, of a job under way with its progress. */
+function titleOf(job: StoredJob, iterations: readonly Iteration[]): readonly string[] {
+  const { done, planned } = budgetSpent(job, iterations)
+  const ended = ['succeeded', 'failed', 'cancelled'].includes(job.state)
+  return [job.name || job.id, ended ? job.state : `${job.state} ${done}/${planned}`]
 }
 
 function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {

@@ -40,7 +40,10 @@ export interface Factor {
   readonly scenario: string
   readonly objective: string
   readonly value: number
-  /** e ln(b + f): what it adds to the logarithm of the utility. */
+  /**
+   * e ln((b + f) / geometric mean of b + f over the scenarios): what it adds to the logarithm of the
+   * scenario's utility over that of all. No unit decides it, as it is a ratio of like things.
+   */
   readonly contribution: number
   /** Change of the fitness, as a share of it, per relative change of the objective. */
   readonly sensitivity: number
@@ -49,7 +52,7 @@ export interface Factor {
 /** Why a design is worth what it is. */
 export interface Analysis {
   readonly factors: readonly Factor[]
-  /** Logarithm of each scenario's utility. */
+  /** Logarithm of each scenario's utility over the geometric mean of all. */
   readonly utilities: Readonly<Record<string, number>>
   /** The scenario of greatest utility, that is, of the worst. */
   readonly worstScenario: string
@@ -59,27 +62,34 @@ export interface Analysis {
   readonly excess: number
 }
 
-/** The factors of every scenario's utility; null if a walk failed. */
+/** The factors of every scenario's utility against those of the others; null if a walk failed. */
 export function analyse(
   scenarios: Readonly<Record<string, ScenarioResult>>,
   preference: Preference,
 ): Analysis | null {
   const names = Object.keys(scenarios)
-  const factors: Factor[] = []
+  const absolute: Factor[] = []
   const utilities: Record<string, number> = {}
   for (const scenario of names) {
     const own = factorsOf(scenario, scenarios[scenario], preference, names.length)
     if (own === null) return null
-    factors.push(...own)
+    absolute.push(...own)
+  }
+  if (absolute.length === 0) return null
+  const factors = absolute.map((factor) => {
+    const like = absolute.filter(({ objective }) => objective === factor.objective)
+    const mean = like.reduce((sum, { contribution }) => sum + contribution, 0) / like.length
+    return { ...factor, contribution: factor.contribution - mean }
+  })
+  for (const scenario of names) {
+    const own = factors.filter((factor) => factor.scenario === scenario)
     utilities[scenario] = own.reduce((sum, f) => sum + f.contribution, 0)
   }
-  if (factors.length === 0) return null
   const worstScenario = names.reduce((a, b) => (utilities[b] > utilities[a] ? b : a))
   const worstFactor = factors
     .filter((f) => f.scenario === worstScenario)
     .reduce((a, b) => (b.contribution > a.contribution ? b : a))
-  const mean = names.reduce((sum, name) => sum + utilities[name], 0) / names.length
-  const excess = Math.exp(utilities[worstScenario] - mean)
+  const excess = Math.exp(utilities[worstScenario])
   return { factors, utilities, worstScenario, worstFactor, excess }
 }
 
@@ -89,6 +99,7 @@ export function utilityOf(result: ScenarioResult, preference: Preference): numbe
   return factors && Math.exp(factors.reduce((sum, f) => sum + f.contribution, 0))
 }
 
+/** The factors of one walk, each contribution e ln(b + f) by itself. */
 function factorsOf(
   scenario: string,
   result: ScenarioResult,

@@ -192,6 +192,14 @@ function RankMove({ design: { rank, rank_before } }: { design: RankedDesign }) {
   )
 }
 
+/** When the best was found; one late find alone does not say that more would follow. */
+function lastGain({ best_so_far }: Ranking): string {
+  const found = best_so_far.findIndex(({ fitness }) => fitness === best_so_far.at(-1)?.fitness)
+  if (found < 0 || best_so_far.at(-1)?.fitness === null) return 'No design walks in every scenario.'
+  const since = best_so_far.length - 1 - found
+  return `The best was found in iteration ${best_so_far[found].index}; ${since === 0 ? 'it is the last one' : `nothing better in the ${since} after it`}.`
+}
+
 function BestSoFar({ ranking }: { ranking: Ranking }) {
   const drawn = useMemo(
     () => ({
@@ -210,7 +218,7 @@ function BestSoFar({ ranking }: { ranking: Ranking }) {
   return (
     <ChartFrame
       title="Best so far under this preference"
-      note="Still falling at the end: more iterations with this preference are likely to help."
+      note={lastGain(ranking)}
       table={() => (
         <Table
           caption="Best so far by iteration"

@@ -3,9 +3,10 @@
 import type { Job } from '../api/types'
 import { type Column, Table } from '../components/table'
 import { formatValue, named } from '../format/value'
+import { inWords } from '../format/words'
 import { jobPath, withQuery } from '../router/routes'
 import { caseWords } from './fitness'
-import { columnNamed, type Particles } from './particles'
+import { columnNamed, type ParticleColumn, type Particles } from './particles'
 
 const DIGITS: Readonly<Record<string, number>> = { integer: 1, continuous: 4 }
 
@@ -13,11 +14,14 @@ export function SelectedDesigns({
   job,
   particles,
   rows,
+  marked = null,
 }: {
   job: Job
   particles: Particles
   /** Rows of `particles`, in the order wanted. */
   rows: readonly number[]
+  /** Row that stands out. */
+  marked?: number | null
 }) {
   const iteration = columnNamed(particles, 'iteration')!.values
   const particle = columnNamed(particles, 'particle')!.values
@@ -28,6 +32,7 @@ export function SelectedDesigns({
       rows={rows}
       rowKey={(row) => `${iteration[row]} ${particle[row]}`}
       order={{ column: 'fitness', descending: false }}
+      rowData={(row) => ({ 'data-marked': String(row === marked) })}
       columns={[
         {
           key: 'design',
@@ -39,7 +44,7 @@ export function SelectedDesigns({
         ...numbers.map(
           (column): Column<number> => ({
             key: column.name,
-            label: column.name.replace(/^utility:/, `${caseWords(job.kind).worth} `),
+            label: labelOf(column, job),
             unit: column.unit,
             numeric: column.kind !== 'categorical',
             value: (row) => (Number.isNaN(column.values[row]) ? null : column.values[row]),
@@ -72,4 +77,9 @@ export function Where({
       design {particle} of iteration {iteration}
     </a>
   )
+}
+
+function labelOf({ name, kind }: ParticleColumn, job: Job): string {
+  if (kind === 'utility') return name.replace(/^utility:/, `${caseWords(job.kind).worth} `)
+  return kind === 'objective' ? inWords(name.replace(/^objective:/, '')) : name
 }

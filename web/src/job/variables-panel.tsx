@@ -11,6 +11,7 @@ import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { BrushFields } from './brush-fields'
 import { caseWords } from './fitness'
+import { PairCard } from './pair-card'
 import { columnNamed, decodeParticles, type Particles } from './particles'
 import { SelectedDesigns } from './selected-designs'
 
@@ -23,9 +24,11 @@ const RENEW_MS = 8000
 export function VariablesPanel({ job }: { job: Job }) {
   const wanted = useSlowly(job.iterations, RENEW_MS)
   const particles = useResource(`${job.id} ${wanted}`, (signal) =>
-    getBytes('/v1/jobs/{job_id}/particles', { path: { job_id: job.id }, signal }).then(
-      decodeParticles,
-    ),
+    getBytes('/v1/jobs/{job_id}/particles', {
+      path: { job_id: job.id },
+      query: { objectives: job.kind === 'tuning' },
+      signal,
+    }).then(decodeParticles),
   )
   // While newer ones are on their way, those before stay to be looked at.
   const shown = useRef<Particles | null>(null)
@@ -55,14 +58,23 @@ export function VariablesPanel({ job }: { job: Job }) {
 function Designs({ job, particles }: { job: Job; particles: Particles }) {
   const words = caseWords(job.kind)
   const [utilities, setUtilities] = useState(false)
+  const [objectives, setObjectives] = useState(false)
+  const [chosen, setChosen] = useState<Place | null>(null)
   const [brushes, setBrushes] = useState(NONE)
-  const sources = useMemo(() => axesOf(particles, utilities), [particles, utilities])
+  const sources = useMemo(
+    () => axesOf(particles, { utility: utilities, objective: objectives }),
+    [particles, utilities, objectives],
+  )
   const model = useMemo(
     () => buildModel(sources, columnNamed(particles, 'fitness')!.values),
     [sources, particles],
   )
   const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
-  const best = useMemo(() => bestRows(model, selected, 20), [model, selected])
+  const marked = useMemo(() => rowOf(particles, chosen), [particles, chosen])
+  const best = useMemo(() => {
+    const rows = bestRows(model, selected, 20)
+    return marked === null || rows.includes(marked) ? rows : [marked, ...rows]
+  }, [model, selected, marked])
   const thinned = particles.rows < particles.total
   const count = `${formatCount(selected.length)} of ${formatCount(particles.rows)} designs`
   return (
@@ -85,6 +97,19 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
               />
               {words.worths} by {words.one} too
             </label>
+            {job.kind === 'tuning' && (
+              <label class="check small">
+                <input
+                  type="checkbox"
+                  checked={objectives}
+                  onChange={(event) => {
+                    setObjectives(event.currentTarget.checked)
+                    setBrushes(NONE)
+                  }}
+                />
+                objectives too
+              </label>
+            )}
             <button
               type="button"
               class="compact"
@@ -113,6 +138,14 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         />
         <BrushFields model={model} brushes={brushes} onBrush={setBrushes} />
       </ChartFrame>
+      <PairCard
+        model={model}
+        selected={selected}
+        brushes={brushes}
+        onBrush={setBrushes}
+        chosen={marked}
+        onChoose={(row) => setChosen(placeOf(particles, row))}
+      />
       <section class="card" aria-labelledby="selected">
         <h2 id="selected">The best of those selected</h2>
         {best.length === 0 ? (
@@ -122,24 +155,54 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
             </button>
           </Empty>
         ) : (
-          <SelectedDesigns job={job} particles={particles} rows={best} />
+          <SelectedDesigns job={job} particles={particles} rows={best} marked={marked} />
         )}
       </section>
     </div>
   )
 }
 
-function axesOf({ columns }: Particles, utilities: boolean): readonly AxisSource[] {
+/** Where a design is in its job: rows change when newer ones come. */
+interface Place {
+  readonly iteration: number
+  readonly particle: number
+}
+
+function placeOf(particles: Particles, row: number): Place {
+  const [iteration, particle] = ['iteration', 'particle'].map(
+    (name) => columnNamed(particles, name)!.values[row],
+  )
+  return { iteration, particle }
+}
+
+function rowOf(particles: Particles, place: Place | null): number | null {
+  if (place === null) return null
+  const iterations = columnNamed(particles, 'iteration')!.values
+  const numbers = columnNamed(particles, 'particle')!.values
+  const row = iterations.findIndex(
+    (iteration, k) => iteration === place.iteration && numbers[k] === place.particle,
+  )
+  return row < 0 ? null : row
+}
+
+/** Variables, what else is asked for by its kind, and the fitness last. */
+function axesOf(
+  { columns }: Particles,
+  more: { readonly utility: boolean; readonly objective: boolean },
+): readonly AxisSource[] {
   const wanted = columns.filter(
-    ({ kind }) => VARIABLES.has(kind) || (kind === 'utility' && utilities),
+    ({ kind }) =>
+      VARIABLES.has(kind) ||
+      (kind === 'utility' && more.utility) ||
+      (kind === 'objective' && more.objective),
   )
   const fitness = columns.filter(({ kind }) => kind === 'fitness')
   return [...wanted, ...fitness].map((column) => ({
-    name: column.name.replace(/^utility:/, ''),
+    name: column.name.replace(/^(utility|objective):/, ''),
     unit: column.unit,
     low: column.low,
     high: column.high,
-    logarithmic: column.kind === 'fitness' || column.kind === 'utility',
+    logarithmic: !VARIABLES.has(column.kind),
     choices: column.choices,
     values: column.values,
   }))

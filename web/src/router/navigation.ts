@@ -55,10 +55,16 @@ export function followLinks(): void {
     const link = (event.target as Element | null)?.closest('a')
     if (!link || link.target !== '' || link.hasAttribute('download')) return
     if (link.origin !== location.origin || !isOwnPath(link.pathname)) return
+    // A place on the page that is shown is the browser's to go to, such as that of the skip link.
+    if (link.hash !== '' && isHere(link)) return
     event.preventDefault()
-    navigate(link.pathname + link.search)
+    navigate(link.pathname + link.search + link.hash)
     scrollTo(0, 0)
   })
+}
+
+function isHere({ pathname, search }: HTMLAnchorElement): boolean {
+  return pathname === location.pathname && search === location.search
 }
 
 /** Other paths of the server, such as /docs and /v1, are left to the browser. */

@@ -1,0 +1,101 @@
+"""What frames every view: skip link and titles; charts and tables that stay as they were set."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.examples.servers import Server, ServerProcess
+from tests.web.conftest import SMALL_JOB
+from tests.web.job_page import wait_for_iteration
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_skip_link_leads_past_the_header(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/jobs")
+    expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
+    page.keyboard.press("Tab")
+    expect(page.get_by_role("link", name="Skip to content")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(page).to_have_url(re.compile("#main$"))
+    page.keyboard.press("Tab")
+    # The first link of the content, not of the header.
+    assert page.evaluate("document.querySelector('main').contains(document.activeElement)")
+
+
+def test_titles_name_the_job_and_its_progress(
+    server: ServerProcess,
+    finished_job: str,
+    start_server: Callable[..., Server],
+    visit: Callable[..., Visit],
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    expect(page).to_have_title("small · succeeded · gaitswarm")
+    page.get_by_role("link", name="Jobs", exact=True).click()
+    expect(page).to_have_title("Jobs · gaitswarm")
+    waiting = start_server()
+    page = visit(waiting.url).go(f"/jobs/{waiting.submit(SMALL_JOB)}")
+    expect(page).to_have_title("small · queued 0/6 · gaitswarm")
+
+
+def chart_range(page: Page) -> list[float]:
+    """Of the horizontal axis of the first chart."""
+    text = page.locator(".uplot").first.get_attribute("data-range")
+    return [float(end) for end in (text or "").split()]
+
+
+def test_a_zoom_stays_while_iterations_arrive(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"iterations": 5000})
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    wait_for_iteration(page, 10)
+    box = page.locator(".u-over").first.bounding_box()
+    assert box is not None
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.2 * box["width"], middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
+    page.mouse.up()
+    low, high = zoomed = chart_range(page)
+    assert 0.0 < low < high
+    last = int(page.locator("[data-stream]").get_attribute("data-iteration") or 0)
+    wait_for_iteration(page, last + 5)
+    assert chart_range(page) == zoomed
+    page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
+    expect(page.locator(".uplot").first).to_have_attribute("data-range", re.compile("^0 "))
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+
+
+def test_a_new_order_begins_on_the_first_page(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    job_id = server.submit(SMALL_JOB | {"iterations": 60, "optimizer": {"particles": 2}})
+    server.wait_for(job_id, "succeeded")
+    page = visit(server.url).go(f"/jobs/{job_id}/iterations")
+    page.get_by_role("button", name="Next").click()
+    expect(page.get_by_text("page 2 of 2")).to_be_visible()
+    page.get_by_role("columnheader", name="Worst").get_by_role("button").click()
+    expect(page.get_by_text("page 1 of 2")).to_be_visible()
+
+
+def test_bounds_of_a_selection_in_the_wrong_order_are_those_of_the_same_stretch(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/variables")
+    page.get_by_text("Select by numbers").click()
+    least, most = page.get_by_label("FI1R from"), page.get_by_label("FI1R to")
+    least.fill("5000")
+    least.press("Tab")
+    most.fill("2000")
+    most.press("Tab")
+    expect(least).to_have_value("2000")
+    expect(most).to_have_value("5000")
+    expect(page.locator("[data-selected]")).not_to_have_attribute("data-selected", "0")

@@ -1,0 +1,79 @@
+"""Designs over any two of their axes, with the selection of all charts and of the table."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.examples.servers import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+MAP = re.compile("designs by .* and ")
+
+
+def test_a_box_selects_in_all_charts_and_in_the_table(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/variables?x=FI1R&y=FI2R")
+    chart = page.get_by_role("img", name=MAP)
+    expect(chart).to_have_attribute("aria-label", "48 designs by FI1R and FI2R")
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.1 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.98 * box["width"], box["y"] + 0.9 * box["height"], steps=4)
+    page.mouse.up()
+    selected = int(page.locator("[data-selected]").get_attribute("data-selected") or 0)
+    assert 0 < selected < 48
+    expect(chart).to_have_attribute("aria-label", f"{selected} designs by FI1R and FI2R")
+    parallel = page.get_by_role("img", name=re.compile("^Parallel coordinates"))
+    expect(parallel).to_have_attribute("aria-label", re.compile(f" {selected} of 48 designs"))
+    page.get_by_text("Select by numbers").click()
+    expect(page.get_by_label("FI1R from")).not_to_have_value("1500")
+    rows = page.get_by_role("table", name="Designs", exact=True).locator("tbody tr")
+    expect(rows).to_have_count(min(20, selected))
+    page.get_by_role("button", name="Select all").first.click()
+    expect(page.locator("[data-selected]")).to_have_attribute("data-selected", "48")
+
+
+def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/variables")
+    page.get_by_label("objectives too").check()
+    page.get_by_label("Across").select_option("energy")
+    page.get_by_label("Up").select_option("torque")
+    expect(page).to_have_url(re.compile("x=energy&y=torque"))
+    expect(page.get_by_role("img", name=MAP)).to_have_attribute(
+        "aria-label", "48 designs by energy and torque"
+    )
+    page.get_by_label("mean rank by cell").check()
+    expect(page).to_have_url(re.compile("as=ranks"))
+    page.get_by_role("button", name=re.compile("^Show as table.*Two axes")).click()
+    cells = page.get_by_role("table", name="Designs by cell").locator("tbody tr")
+    expect(cells.first).to_contain_text(" to ")
+
+
+def test_a_design_that_is_clicked_is_marked_in_the_table(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/variables?x=FI1R&y=FI2R")
+    chart = page.get_by_role("img", name=MAP)
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    assert box is not None
+    marked = page.locator("[data-marked='true']")
+    expect(marked).to_have_count(0)
+    # Somewhere along these lines there is a design.
+    for share in (0.3, 0.5, 0.7):
+        for step in range(1, 20):
+            page.mouse.click(box["x"] + box["width"] * step / 20, box["y"] + box["height"] * share)
+            if marked.count() == 1:
+                return
+    raise AssertionError("no click marked a design")

@@ -11,6 +11,7 @@ import schemathesis
 from hypothesis import HealthCheck, Phase, settings
 from requests import Session
 from schemathesis.core.parameters import ParameterLocation
+from schemathesis.core.result import Ok
 from schemathesis.generation.meta import CoveragePhaseData
 from schemathesis.pytest.lazy import get_all_tests
 from schemathesis.schemas import APIOperation
@@ -137,6 +138,7 @@ def test_every_answer_is_as_documented(operation: str, url: str) -> None:
         settings=_SETTINGS,
         given_kwargs={},
     )
+    assert isinstance(made, Ok)
     _, send_all = made.ok()
     # A connection for each of a thousand requests would take longer than their answers.
     with Session() as connected:

@@ -70,7 +70,8 @@ def test_a_design_gives_groups_of_legs_values_of_their_own(
         view = gaitswarm("simulate", "--controller", "pi", *options, "--json").json
         return view["scenarios"]["short"]
 
-    plain, alike = walked("a.json"), walked("b.json", **{"stride[front]": 0.06, "gait": "own"})
+    own: dict[str, float | str] = {"stride[front]": 0.06, "gait": "own"}
+    plain, alike = walked("a.json"), walked("b.json", **own)
     assert alike["objectives"] == plain["objectives"]
     assert walked("c.json", **{"stride[front]": 0.05})["objectives"] != plain["objectives"]
     wave = walked("d.json", gait="wave", duty_factor=0.85)

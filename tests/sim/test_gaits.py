@@ -16,7 +16,7 @@ from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.robot import Robot, load_robot, parse_robot
 from sim.robot.leg_groups import leg_groups
 from sim.robot.posture import feet_in_body
-from sim.scenario import GAIT_NAMES, Scenario, find_scenario
+from sim.scenario import GAIT_NAMES, GaitName, Scenario, find_scenario
 from tests.examples.walks import logged_walk, quadruped_files, short_walk
 
 CYCLE = np.arange(1000) / 1000 + 0.0005
@@ -43,9 +43,9 @@ def standing(robot: Robot, scenario: Scenario) -> dict[str, np.ndarray]:
     return {leg.name: feet[:, k] for k, leg in enumerate(robot.legs)}
 
 
-def footfalls(robot: Robot, name: str) -> dict[float, set[str]]:
+def footfalls(robot: Robot, name: GaitName) -> dict[float, set[str]]:
     """Lag -> legs that come down then."""
-    lags = np.round(lags_of(GAITS[name], robot.legs), 9).tolist()
+    lags = np.round(np.array(lags_of(GAITS[name], robot.legs)), 9).tolist()
     legs = [leg.name for leg in robot.legs]
     return {
         lag: {leg for leg, of in zip(legs, lags, strict=True) if of == lag}
@@ -188,7 +188,8 @@ def test_a_cycloid_leaves_the_ground_and_comes_down_without_speed() -> None:
     np.testing.assert_allclose(np.diff(forward[stands]), -0.1 / 0.6 * 1e-4, rtol=1e-6)
     assert not lift[stands].any()
     assert lift.max() == pytest.approx(0.03) and (lift >= 0.0).all()
-    np.testing.assert_allclose(forward[[0, np.argmin(stands), -1]], [0.05, -0.05, 0.05], atol=1e-6)
+    begins, ends, again = forward[0], forward[np.argmin(stands)], forward[-1]
+    assert (begins, ends, again) == pytest.approx((0.05, -0.05, 0.05), abs=1e-6)
     speeds = np.hypot(np.diff(forward), np.diff(lift)) / 1e-4
     assert max(speeds[6001], speeds[-1]) < 1e-4 < speeds[6100]
 

@@ -69,7 +69,7 @@ def test_every_name_but_own_is_a_gait() -> None:
     ],
 )
 def test_feet_of_a_quadruped_come_down_in_hildebrands_order(
-    quadruped: Robot, gait: str, expected: list[set[str]]
+    quadruped: Robot, gait: GaitName, expected: list[set[str]]
 ) -> None:
     found = footfalls(quadruped, gait)
     assert list(found.values()) == expected

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +39,7 @@ def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
     if window == "moving_average" or taps < 3:
         return np.full(taps, 1.0 / taps)
     # Slow to import, and only for this window.
+    require_room_for_scipy()
     from scipy.signal import firwin  # noqa: PLC0415
 
     return np.asarray(firwin(taps, 2.0 / taps, window="hamming"))

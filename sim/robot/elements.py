@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
+from sim.memory import require_room_for_scipy
 from sim.robot.bounds import LARGEST, shortened
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class Origin:
 
     def _rotation(self) -> Rotation:
         # Slow to import, and most robots have no turned frame.
+        require_room_for_scipy()
         from scipy.spatial.transform import Rotation  # noqa: PLC0415
 
         return Rotation.from_euler("xyz", self.rpy)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
+from sim.memory import require_room_for_scipy
 from sim.robot.bounds import LARGEST, shortened
 from sim.robot.elements import Origin, numbers_of, origin_of
 
@@ -148,6 +149,7 @@ def _hold(element: ET.Element, kind: str, angle: float) -> None:
             " at 0"
         )
     if angle and kind != "fixed":
+        require_room_for_scipy()
         from scipy.spatial.transform import Rotation  # noqa: PLC0415
 
         turned = Rotation.from_matrix(joint.origin.matrix())

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.memory import require_room_for_scipy
 from sim.robot.chain import chain_of
 from sim.robot.description import Leg
 from sim.robot.legs import LegKinematics
@@ -133,6 +134,7 @@ def _trunk(robot: Robot) -> Shape:
 def _capsule(end: Floats, radius: float, role: Role) -> Shape:
     """From the link's origin to `end`."""
     # Slow to import, and only pictures need it.
+    require_room_for_scipy()
     from scipy.spatial.transform import Rotation  # noqa: PLC0415
 
     length = float(np.linalg.norm(end))

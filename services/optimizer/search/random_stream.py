@@ -8,6 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.memory import require_room_for_scipy
+
 _DOUBLE_BITS: Final = 53
 
 
@@ -101,6 +103,7 @@ class RandomNumbers:
         Returns:
             An array of that shape, none beyond 8.3.
         """
+        require_room_for_scipy()
         from scipy.special import ndtri  # noqa: PLC0415 - slow, and few searches need it
 
         middles = (np.floor(self.uniform(*shape) * 2.0**52) + 0.5) * 2.0**-52

@@ -15,6 +15,7 @@ from services.optimizer.errors import Conflict
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.preference import HEIGHT_LOSS
+from sim.memory import require_room_for_scipy
 from sim.outcome import Status
 
 Floats = NDArray[np.float64]
@@ -219,6 +220,7 @@ def proportion(happened: NDArray[np.bool_]) -> Proportion:
         The count and its interval.
     """
     # It takes a quarter of a second to import, and few questions need it.
+    require_room_for_scipy()
     from scipy.special import betaincinv  # noqa: PLC0415
 
     n, k = len(happened), int(np.count_nonzero(happened))

@@ -20,6 +20,7 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import Preference
 from services.optimizer.search.random_stream import uniform
+from sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -167,6 +168,7 @@ def _widest_lead(lead: Floats) -> tuple[Floats, float]:
 
 def _program(lead: Floats) -> tuple[Floats, float]:
     """As `_widest_lead`, of few designs."""
+    require_room_for_scipy()
     from scipy.optimize import linprog  # noqa: PLC0415 - slow to import
 
     count, size = lead.shape

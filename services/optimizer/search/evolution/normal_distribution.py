@@ -14,6 +14,7 @@ from services.optimizer.search.evolution.symmetric import eigen, product
 from services.optimizer.search.optimizer import matrix
 from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.space import Space
+from sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 
@@ -324,6 +325,7 @@ class NormalDistribution:
 
     def _keep_trying_integers(self) -> None:
         """Widen integers' scales, so that some samples still have other values."""
+        require_room_for_scipy()
         from scipy.special import ndtri  # noqa: PLC0415 - slow, and few searches need it
 
         away = float(-ndtri(_OTHERS / self._size))

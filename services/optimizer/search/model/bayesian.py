@@ -14,6 +14,7 @@ from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_stream import RandomNumbers
 from services.optimizer.search.replayed import Proposals, Start
 from services.optimizer.search.space import Space
+from sim.memory import require_room_for_scipy
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -147,6 +148,7 @@ def _bounded(fitness: Floats) -> Floats:
 
 def _sobol(space: Space, count: int, random: RandomNumbers) -> Floats:
     """Positions of a scrambled Sobol sequence."""
+    require_room_for_scipy()
     from scipy.stats.qmc import Sobol  # noqa: PLC0415 - slow to import
 
     power = max(1, math.ceil(math.log2(count)))

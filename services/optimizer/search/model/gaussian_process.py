@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.optimizer.search.space import Space
+from sim.memory import require_room_for_scipy
 
 if TYPE_CHECKING:
     from sklearn.gaussian_process import GaussianProcessRegressor
@@ -62,6 +63,7 @@ class GaussianProcess:
             designs: (n, d).
             values: (n,) of mean 0 and variance 1 or less.
         """
+        require_room_for_scipy()
         from scipy.optimize import minimize  # noqa: PLC0415 - slow to import
         from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
         from threadpoolctl import threadpool_limits  # noqa: PLC0415
@@ -113,6 +115,7 @@ class GaussianProcess:
         Returns:
             (count, d), different from each other as far as there are so many.
         """
+        require_room_for_scipy()
         from scipy.special import ndtr  # noqa: PLC0415 - slow to import
         from threadpoolctl import threadpool_limits  # noqa: PLC0415
 

@@ -28,6 +28,10 @@ COMMAND: Final = "from cli.main import main; main()"
 GRAVITY: Final = 9.81
 MOST_DESIGNS: Final = 1000
 
+HEAD: Final = """\
+| robot | mass | designs that walk both | `slow` | cost | `fast` | cost | time |
+| --- | --- | --- | --- | --- | --- | --- | --- |"""
+
 
 def tuned(urdf: Path, folder: Path, options: argparse.Namespace) -> dict[str, Any]:
     """Make a robot, tune it, and tell how its best design walks."""
@@ -82,22 +86,16 @@ def _walk(result: dict[str, Any] | None, mass: float) -> dict[str, Any]:
     }
 
 
-def table(rows: dict[str, dict[str, Any]]) -> str:
-    """As docs/robots.md has it."""
-    lines = [
-        "| robot | mass | designs that walk both | `slow` | cost | `fast` | cost | time |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for name, row in rows.items():
-        cells = [name, f"{row['mass']:.1f} kg", f"{row['upright']} of {row['designs']}"]
-        for walk in row["walks"].values():
-            walked = walk["status"] == "ok"
-            cells += [
-                f"{walk['speed']:.2f} m/s" if walked else "falls",
-                f"{walk['cost_of_transport']:.2f}" if walked else "",
-            ]
-        lines.append(f"| {' | '.join(cells)} | {row['seconds']:.0f} s |")
-    return "\n".join(lines)
+def line(name: str, row: dict[str, Any]) -> str:
+    """Of the table, as docs/robots.md has it."""
+    cells = [name, f"{row['mass']:.1f} kg", f"{row['upright']} of {row['designs']}"]
+    for walk in row["walks"].values():
+        walked = walk["status"] == "ok"
+        cells += [
+            f"{walk['speed']:.2f} m/s" if walked else "falls",
+            f"{walk['cost_of_transport']:.1f}" if walked else "",
+        ]
+    return f"| {' | '.join(cells)} | {row['seconds']:.0f} s |"
 
 
 def main() -> None:
@@ -118,10 +116,15 @@ def main() -> None:
     if not FOLDER.is_dir():
         parser.error("the URDFs of example-robot-data are missing: run scripts/robots.sh")
     rows = {}
+    if not options.json:
+        print(HEAD)
     for name in options.robots:
         with tempfile.TemporaryDirectory() as folder:
             rows[name] = tuned(FOLDER / QUADRUPEDS[name], Path(folder), options)
-    print(json.dumps(rows, indent=2) if options.json else table(rows))
+        if not options.json:
+            print(line(name, rows[name]), flush=True)
+    if options.json:
+        print(json.dumps(rows, indent=2))
 
 
 if __name__ == "__main__":

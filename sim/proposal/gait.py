@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Final
 
+from sim.gait.gaits import GAITS, lags_of
 from sim.proposal.drive import GRAVITY
 from sim.proposal.stance import Stance
 from sim.robot.legs import ChainLeg
@@ -34,13 +35,7 @@ def alternating_phases(legs: Sequence[ChainLeg]) -> list[float]:
     Returns:
         By leg the start of its support, as a share of the cycle.
     """
-    phases = [0.0] * len(legs)
-    for side in (1.0, -1.0):
-        row = [k for k, leg in enumerate(legs) if leg.side == side or (not leg.side and side > 0)]
-        row.sort(key=lambda k: -legs[k].hip[0])
-        for place, k in enumerate(row):
-            phases[k] = 0.5 * ((place + (side < 0)) % 2)
-    return phases
+    return [(1.0 - lag) % 1.0 for lag in lags_of(GAITS["alternating"], legs)]
 
 
 def propose_scenarios(stance: Stance, sole: float, legs: int) -> list[dict[str, Any]]:

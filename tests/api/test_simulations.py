@@ -50,6 +50,19 @@ def test_objectives_are_the_simulators_to_the_last_bit(client: httpx2.Client) ->
         assert list(result["objectives"].values()) == outcome.objectives[0].tolist()
 
 
+def test_a_design_may_give_groups_of_legs_a_gait_of_their_own(client: httpx2.Client) -> None:
+    design = PUBLISHED_A | {"gait": "ripple", "duty_factor": 0.7, "stride[front]": 0.05}
+    scenario = short_walk(
+        gait="ripple", duty_factor=0.7, by_group={"stride[front]": 0.05}, name="short"
+    )
+    mine = simulated(client, design=design, scenarios=[SHORT_WALK])["scenarios"]["short"]
+    theirs = simulated(client, scenarios=[scenario.model_dump()])["scenarios"]["short"]
+    assert mine == theirs and mine["gait"]["fewest_feet"] == 4
+    problem = refused(client, scenarios=[SHORT_WALK | {"gait": "trot"}])
+    assert problem["errors"][0]["field"] == "scenarios.0"
+    assert "trot is for 4 legs" in problem["errors"][0]["message"]
+
+
 def test_the_fitness_is_the_geometric_mean_of_the_utilities(client: httpx2.Client) -> None:
     view = simulated(client, scenarios=["1", "6"], preference="B")
 

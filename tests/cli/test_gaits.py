@@ -64,8 +64,8 @@ def test_a_design_gives_groups_of_legs_values_of_their_own(
 ) -> None:
     scenario = write_json(SCENARIO, "scenario.json")
 
-    def walked(name: str, **design: float | str) -> Any:
-        file = write_json({"P": 0.45, "I": 0.1, **design}, name)
+    def walked(name: str, **gait: Any) -> Any:
+        file = write_json({"P": 0.45, "I": 0.1, **gait}, name)
         options = ("--design", str(file), "--scenario", str(scenario))
         view = gaitswarm("simulate", "--controller", "pi", *options, "--json").json
         return view["scenarios"]["short"]

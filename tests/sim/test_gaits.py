@@ -9,7 +9,7 @@ import pytest
 
 from sim.errors import RobotFileError, SimulationInputError
 from sim.gait.cycloid import cycloid
-from sim.gait.gaits import GAITS, lags_of
+from sim.gait.gaits import GAITS, find_gait, lags_of
 from sim.gait.leg_gaits import leg_gaits, supporting
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.gait_variables import GAIT_CATALOGUE, with_gait
@@ -45,7 +45,7 @@ def standing(robot: Robot, scenario: Scenario) -> dict[str, np.ndarray]:
 
 def footfalls(robot: Robot, name: GaitName) -> dict[float, set[str]]:
     """Lag -> legs that come down then."""
-    lags = np.round(np.array(lags_of(GAITS[name], robot.legs)), 9).tolist()
+    lags = [round(lag, 9) for lag in lags_of(find_gait(name), robot.legs)]
     legs = [leg.name for leg in robot.legs]
     return {
         lag: {leg for leg, of in zip(legs, lags, strict=True) if of == lag}
@@ -188,8 +188,8 @@ def test_a_cycloid_leaves_the_ground_and_comes_down_without_speed() -> None:
     np.testing.assert_allclose(np.diff(forward[stands]), -0.1 / 0.6 * 1e-4, rtol=1e-6)
     assert not lift[stands].any()
     assert lift.max() == pytest.approx(0.03) and (lift >= 0.0).all()
-    begins, ends, again = forward[0], forward[np.argmin(stands)], forward[-1]
-    assert (begins, ends, again) == pytest.approx((0.05, -0.05, 0.05), abs=1e-6)
+    lift_off = int(np.argmin(stands))
+    assert forward[[0, lift_off, -1]] == pytest.approx([0.05, -0.05, 0.05], abs=1e-6)
     speeds = np.hypot(np.diff(forward), np.diff(lift)) / 1e-4
     assert max(speeds[6001], speeds[-1]) < 1e-4 < speeds[6100]
 

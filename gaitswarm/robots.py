@@ -40,7 +40,7 @@ JOB_FILE: Final = "job.json"
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
 _SECONDS: Final = 1.0
-_STIFF: Final = 5.0
+_STIFF: Final = 20.0
 """Stiffness with which torque-controlled joints are held, per torque limit [1/rad]."""
 
 _DAMPED: Final = 0.02
@@ -151,7 +151,7 @@ def check_robot(
         robot = load_robot(files)
         scenario = standing_scenario(robot)
         require_reachable(robot, scenario)
-        controller, design = _stiff_drive(robot)
+        controller, design = standing_drive(robot)
         values = np.array([list(design.values())])
         stood = simulate(scenario, controller, list(design), values, robot=robot, log=True)
     standing, warnings = _standing(robot, stood)
@@ -215,8 +215,15 @@ def standing_scenario(robot: Robot) -> Scenario:
     )
 
 
-def _stiff_drive(robot: Robot) -> tuple[str, dict[str, float]]:
-    """A controller and its design that hold all joints."""
+def standing_drive(robot: Robot) -> tuple[str, dict[str, float]]:
+    """A controller that holds all joints.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Its name, and a design: stiff, and damped where motors do not brake by themselves.
+    """
     if not robot.is_torque_controlled:
         return "p", {"P": 1.0}
     stiffness = _STIFF * float(np.median(robot.actuators().torque_limit))

@@ -18,6 +18,10 @@ _ON_THE_GROUND: Final = 0.1
 """Share of a foot's lift up to which it counts as on the ground: a filter rounds its path."""
 
 
+_LIFTED: Final = 1e-4
+"""Height up to which no foot counts as lifted [m]: those of a robot that stands are there but for
+rounding."""
+
 _DECIMALS: Final = 9
 """Of torques in N m that are kept: a walk must be the same anywhere."""
 
@@ -44,7 +48,7 @@ def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Fl
         own = slice(JOINTS_PER_LEG * number, JOINTS_PER_LEG * (number + 1))
         height[:, number], slopes[:, own] = _height(leg, angles[:, own])
     lowest, highest = height.min(axis=0), height.max(axis=0)
-    down = height <= lowest + _ON_THE_GROUND * (highest - lowest)
+    down = height <= lowest + np.maximum(_ON_THE_GROUND * (highest - lowest), _LIFTED)
     force = robot.mass * gravity / np.maximum(down.sum(axis=1), 1)
     forces = np.repeat(down * force[:, np.newaxis], JOINTS_PER_LEG, axis=1)
     # numpy's functions of angles differ in the last bit between processors.

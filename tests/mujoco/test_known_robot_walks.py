@@ -24,9 +24,9 @@ DESIGN = {"P": 0.6, "I": 0.5}
 
 @pytest.fixture(scope="module")
 def files() -> tuple[RobotFiles, dict[str, Any]]:
-    """Of a1, and the faster of its walks."""
+    """Of a1 with DC motors, which the tests' own PI drives, and the faster of its walks."""
     text = urdf_of(QUADRUPEDS["a1"]).read_text(encoding="utf-8")
-    proposal = propose_robot(text, "a1")
+    proposal = propose_robot(text, "a1", "dc")
     return RobotFiles(toml=proposal.toml, urdf=proposal.urdf), proposal.job["scenarios"][1]
 
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cli.main import run
-from gaitswarm.robots import init_robot, standing_scenario
+from gaitswarm.robots import init_robot, standing_drive, standing_scenario
 from sim.errors import RobotFileError
 from sim.gait.trajectory import require_reachable
 from sim.kernel.parameters import pack_parameters
@@ -156,11 +156,12 @@ def test_its_accelerations_and_mass_matrix_are_pinocchios(
 
 def test_it_stands_with_its_weight_on_all_feet(robot: Robot) -> None:
     """In the interpreter, which walks the same second as a compiled kernel."""
+    controller, design = standing_drive(robot)
     stood = simulate(
         standing_scenario(robot),
-        "p",
-        ["P"],
-        np.array([[1.0]]),
+        controller,
+        list(design),
+        np.array([list(design.values())]),
         robot=robot,
         log=True,
         backend="reference",

@@ -51,13 +51,14 @@ def test_a_torque_controlled_robot_is_read_and_written() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("torque_limit = 12.0", "", "actuators.femur.torque_limit: Field required"),
+        ("torque_limit = 12.0", "", "actuators.femur.torque_limit: is missing"),
         ("torque_limit = 12.0", "torque_limit = -1", r"line \\d+: actuators.femur.torque_limit"),
-        ("torque_limit = 12.0", "torque_limitt = 1", "actuators.femur.torque_limit"),
+        ("gear_ratio = 12.0", "gear_ratio = 12.0\nknee_sped = 1.0",
+         "tibia.knee_sped: unknown key; did you mean .knee_speed"),
         ('kind = "torque"', 'kind = "hydraulic"', "actuators.coxa: kind: must be dc"),
         ("knee_speed = 12.0", "", "speed_limit and knee_speed go together"),
         ("knee_speed = 12.0", "knee_speed = 40.0", "knee_speed: 40 rad/s must be less than"),
-        ("rate = 1000", "rate = 750", "torque_command.rate: Input should be a multiple of 500"),
+        ("rate = 1000", "rate = 750", "torque_command.rate: must be a multiple of 500"),
         ("[torque_command]", "[pwm]\ncounts = 9\nfull_scale = 9\n[torque_command]",
          "pwm: is for DC motors"),
         ("voltage = 24.0", "voltage = 24.0\nnominal_voltage = 24.0",

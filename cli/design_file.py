@@ -174,12 +174,9 @@ def _controller(name: str) -> Controller:
 
 
 def _controller_name(name: str) -> ControllerName:
-    for known in CONTROLLERS:
-        if known == name:
-            return known
-    raise InvalidRequest(
-        f"unknown controller {name!r}; known are {', '.join(CONTROLLERS)}", field="controller"
-    )
+    if name not in CONTROLLERS:
+        raise InvalidRequest(CONTROLLERS.unknown(name), field="controller")
+    return name
 
 
 def _checked(values: dict[str, Any], known: Sequence[Variable], field: str) -> dict[str, Any]:

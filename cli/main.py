@@ -36,6 +36,7 @@ from cli.commands.jobs import (
     history,
     lifecycle,
     optimize,
+    plugins,
     rank,
     serve,
     token,
@@ -117,6 +118,7 @@ def _root(
 
 for _module in (
     optimize,
+    plugins,
     serve,
     lifecycle,
     delete,

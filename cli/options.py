@@ -135,6 +135,14 @@ class SpecOptions:
     controller: Annotated[str | None, typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")] = (
         None
     )
+    case: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|JSON|FILE",
+            help="Evaluate designs by a plug-in's case in place of walks in gaitswarm's simulator,"
+            " by its name or its settings; `gaitswarm cases` lists all.",
+        ),
+    ] = None
     with_gait: Annotated[
         bool | None,
         typer.Option(

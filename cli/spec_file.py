@@ -85,6 +85,9 @@ def build_spec(options: SpecOptions) -> AnySpec:
         chosen["scenarios"] = scenario_data(options.scenarios)
     if options.robot is not None:
         chosen["robot"] = chosen_robot(options.robot)
+    case = options.case
+    if case is not None and (case[0:1] in "{@" or case.endswith(".json")):
+        chosen["case"] = json_object(case, "case")
     _lay_settings(chosen, data.get("optimizer", {}))
     _lay_worlds(chosen, data.get("worlds"))
     with_gait = chosen.pop("with_gait", False)

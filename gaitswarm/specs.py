@@ -18,6 +18,7 @@ from services.optimizer.jobs.preference import Preference, PreferenceName
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
 from services.optimizer.search.automatic import ChoiceName, ChosenSettings
+from sim.case_registry import CaseSettings
 from sim.controllers import ControllerName
 from sim.kernel.walk import Precision
 from sim.robot import RobotFiles, RobotVariant
@@ -70,6 +71,8 @@ class SpecOptions(TypedDict, total=False):
             five best; `{"jobs": [ID, ...], "count": N}` for another number.
         precision: Of the numbers of the search's physics; what is reported as best is judged in
             double.
+        case: What evaluates designs in place of walks in gaitswarm's simulator: a plug-in's case by
+            name, or its settings, `{"name": "mujoco-walk", "rate": 2000}`.
         worlds: `TuningWorlds`, or a document of it, for a search that judges every design in worlds
             that differ from the model.
     """
@@ -87,6 +90,7 @@ class SpecOptions(TypedDict, total=False):
     seed: int
     start: StartInput
     precision: Precision
+    case: str | CaseSettings | Document | None
     worlds: TuningWorlds | Document | None
 
 

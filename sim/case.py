@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.kernel.batch import KernelTime, Walking, walk_together
-from sim.kernel.walk import Precision
+from sim.kernel.walk import Kernel, Precision
 from sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
 from sim.robot import RobotSource
 from sim.scenario import Scenario
 from sim.simulate import Simulation, simulating
 
 
+@runtime_checkable
 class Case(Protocol):
     """One test of designs, with all that it depends on; immutable, and fit for another process.
 
@@ -180,12 +181,30 @@ class Walk:
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
+    def run_with(self, kernel: Kernel, designs: NDArray[np.float64]) -> Outcome:
+        """Let every design walk, by a kernel of one's choice.
+
+        Args:
+            kernel: Of the robot: another engine's, for one.
+            designs: As for `run`.
+
+        Returns:
+            Objectives and statuses.
+
+        Raises:
+            SimulationInputError: A design cannot be simulated; names the variable.
+        """
+        (simulation,) = walk_together([self._simulating(designs, kernel)])
+        return simulation.outcome
+
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
         """Let every design walk, beside walks of other cases."""
         walked = yield from self._simulating(designs)
         return walked.outcome
 
-    def _simulating(self, designs: NDArray[np.float64]) -> Walking[Simulation]:
+    def _simulating(
+        self, designs: NDArray[np.float64], kernel: Kernel | None = None
+    ) -> Walking[Simulation]:
         return simulating(
             self.scenario,
             self.controller,
@@ -193,6 +212,7 @@ class Walk:
             designs,
             robot=self.robot,
             precision=self.precision,
+            kernel=kernel,
         )
 
 

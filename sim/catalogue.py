@@ -19,7 +19,7 @@ def design_catalogue(controller: str) -> VariableCatalogue:
     Returns:
         The controller's variables and conventions and the gait's variables, by name.
     """
-    family = CONTROLLERS[controller]  # type: ignore[index]
+    family = CONTROLLERS[controller]
     known = (*family.variables, *family.conventions, *GAIT_VARIABLES)
     return VariableCatalogue(known)
 
@@ -41,7 +41,7 @@ def check_design(controller: str, design: Mapping[str, float | str]) -> None:
             raise SimulationInputError(
                 f"design: unknown variable {name!r}; known are {', '.join(known)}"
             )
-    needed = [variable.name for variable in CONTROLLERS[controller].variables]  # type: ignore[index]
+    needed = [variable.name for variable in CONTROLLERS[controller].variables]
     missing = [name for name in needed if name not in design]
     if missing:
         raise SimulationInputError(f"design: {', '.join(missing)} missing; {controller} needs it")

@@ -7,9 +7,8 @@ it, so that a robot file, code or a compiler that changed meanwhile is noticed.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
-from importlib import metadata
 from pathlib import Path
 from typing import Final, Literal
 
@@ -17,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from sim.assembly import has_native_kernel
 from sim.kernel.walk import Precision
+from sim.plugins import MISSING, source_digest, version_of
 from sim.robot import RobotSource, load_robot
 
 _ROOT: Final = Path(__file__).parent
@@ -38,9 +38,6 @@ _NOT_IN_A_CASE: Final = (
 
 LIBRARIES: Final = ("casadi", "numpy", "pin")
 """Distributions that compute: of the kernel's source, of trajectories and of controllers."""
-
-_NOT_INSTALLED: Final = "none"
-"""In place of a version."""
 
 _DIGITS: Final = 32
 
@@ -112,9 +109,9 @@ def version_changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[s
         One phrase for each library that has another version, or that only one of the two has.
     """
     return [
-        f"{name} {now.get(name, _NOT_INSTALLED)} instead of {before.get(name, _NOT_INSTALLED)}"
+        f"{name} {now.get(name, MISSING)} instead of {before.get(name, MISSING)}"
         for name in sorted(before.keys() | now.keys())
-        if before.get(name, _NOT_INSTALLED) != now.get(name, _NOT_INSTALLED)
+        if before.get(name, MISSING) != now.get(name, MISSING)
     ]
 
 
@@ -146,17 +143,10 @@ def provenance_of(
         robot=", ".join(machine.description.name for machine in machines),
         robot_digest=hashlib.sha256(content.encode()).hexdigest()[:_DIGITS],
         code_digest=simulator_digest(),
-        libraries={name: _version(name) for name in libraries},
+        libraries={name: version_of(name) for name in libraries},
         backend="native" if native else "reference",
         precision=precision,
     )
-
-
-def _version(distribution: str) -> str:
-    try:
-        return metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return _NOT_INSTALLED
 
 
 def simulator_files() -> tuple[Path, ...]:
@@ -169,24 +159,6 @@ def simulator_files() -> tuple[Path, ...]:
             if file.suffix in _SUFFIXES and not {file, *file.parents} & set(left_out)
         )
     )
-
-
-def source_digest(root: Path, files: Iterable[Path]) -> str:
-    """Digest of source files.
-
-    Args:
-        root: folder that the files lie under; only their places below it count.
-        files: the files, in the order in which they enter.
-
-    Returns:
-        Hexadecimal digits that change with any name or byte of them.
-    """
-    digest = hashlib.sha256()
-    for file in files:
-        content = file.read_bytes()
-        digest.update(f"{file.relative_to(root).as_posix()}\0{len(content)}\0".encode())
-        digest.update(content)
-    return digest.hexdigest()[:_DIGITS]
 
 
 @lru_cache(maxsize=1)

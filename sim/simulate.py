@@ -30,7 +30,7 @@ from sim.gait_variables import GAIT_CATALOGUE, with_gait
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.gains import NO_JOINT_PD
 from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.walk import Precision, WalkSetup
+from sim.kernel.walk import Kernel, Precision, WalkSetup
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
@@ -126,6 +126,7 @@ def simulating(
     backend: Backend = "auto",
     physics_rate: int = PHYSICS_RATE,
     precision: Precision = "double",
+    kernel: Kernel | None = None,
 ) -> Walking[Simulation]:
     """What `simulate` does, for `walk_together` to run beside others.
 
@@ -138,6 +139,7 @@ def simulating(
         backend: Which kernel.
         physics_rate: Physics steps a second [Hz].
         precision: Of the physics' numbers.
+        kernel: In place of that of `backend` and `precision`.
 
     Returns:
         The computation, which wants its walks once, and results in what `simulate` returns.
@@ -151,6 +153,7 @@ def simulating(
         backend=backend,
         physics_rate=physics_rate,
         precision=precision,
+        kernel=kernel,
     )
 
 
@@ -167,13 +170,14 @@ def _simulating(
     backend: Backend = "auto",
     physics_rate: int = PHYSICS_RATE,
     precision: Precision = "double",
+    kernel: Kernel | None = None,
 ) -> Walking[Simulation]:
     """As `simulate`, which documents the arguments."""
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
     if noise is not None and noise.kind == "angle":
         machine = with_shafts(machine)
-    kernel = kernel_of(machine, backend, precision=precision)
+    kernel = kernel or kernel_of(machine, backend, precision=precision)
     coding, timestep = control_steps(machine, physics_rate)
     statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
     objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
@@ -324,9 +328,7 @@ def _check_arguments(
     physics_rate: int,
 ) -> None:
     if controller not in CONTROLLERS:
-        raise SimulationInputError(
-            f"controller: unknown {controller!r}; known are {', '.join(CONTROLLERS)}"
-        )
+        raise SimulationInputError(f"controller: {CONTROLLERS.unknown(controller)}")
     own = names_of(CONTROLLERS[controller])
     for name in variables:
         if name not in own and name not in GAIT_CATALOGUE:

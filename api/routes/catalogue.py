@@ -13,14 +13,18 @@ from api.routes.simulations import NOT_STORED
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.views import (
     PREFIX,
+    CaseView,
     CatalogueView,
     ControllerView,
     OptimizerView,
+    PluginView,
     PreferenceView,
     RobotView,
     ScenarioView,
+    case_views,
     controller_views,
     optimizer_views,
+    plugin_views,
     preference_views,
     robot_views,
     scenario_views,
@@ -87,6 +91,28 @@ def list_controllers() -> CatalogueView[ControllerView]:
     return CatalogueView(items=controller_views())
 
 
+@router.get(
+    "/cases",
+    operation_id="list_cases",
+    summary="List cases of plug-ins",
+    responses=problems(),
+)
+def list_cases() -> CatalogueView[CaseView]:
+    """What designs may be put to in place of walks in gaitswarm's simulator, by plug-ins here."""
+    return CatalogueView(items=case_views())
+
+
+@router.get(
+    "/plugins",
+    operation_id="list_plugins",
+    summary="List plug-ins",
+    responses=problems(),
+)
+def list_plugins() -> CatalogueView[PluginView]:
+    """Controllers, cases and search methods that other packages bring to this server."""
+    return CatalogueView(items=plugin_views())
+
+
 @router.post(
     "/controllers/{controller}/surface",
     operation_id="controller_surface",
@@ -112,7 +138,7 @@ async def controller_surface(
     of the inference.
     """
     if controller not in CONTROLLERS:
-        raise NotFound(f"no controller {controller!r}; known are {', '.join(CONTROLLERS)}")
+        raise NotFound(CONTROLLERS.unknown(controller))
     body = await slots.run(partial(_surface, controller, request))
     return Response(body, media_type="application/json", headers=NOT_STORED)
 

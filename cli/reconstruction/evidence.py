@@ -41,7 +41,7 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.provenance import job_provenance
-from sim.provenance import source_digest
+from sim.plugins import source_digest
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,8 @@ from services.optimizer.analysis.tournaments.standings import looked_at
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.search.registry import METHODS, OPTIMIZERS, missing_of
+from services.optimizer.search.method import missing_of
+from services.optimizer.search.registry import METHODS, OPTIMIZERS
 from services.optimizer.tournament.functions import FUNCTIONS
 from services.optimizer.tournament.methods import (
     is_multi_objective,

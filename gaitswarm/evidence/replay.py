@@ -12,6 +12,7 @@ from gaitswarm.views.verification import DifferenceView
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.evaluator import EvaluationRequest
 from sim.identification.recorded_walk import Recordings
 from sim.mujoco.engines import ENGINE
@@ -33,6 +34,8 @@ def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
     """
     if spec.unwalked is None:
         return None, "what a run of a tournament comes to depends on more than what is simulated"
+    if isinstance(spec, JobSpec) and spec.case is not None:
+        return None, f"designs were put to {spec.case.name}, a plug-in's, which may have other bits"
     if provenance_of(*spec.described, precision=spec.precision).backend == "reference":
         return False, (
             "there is no C compiler here: interpreted walks have other bits, and take some hundred"

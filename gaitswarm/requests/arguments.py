@@ -129,7 +129,7 @@ def controller(name: str) -> ControllerName:
         NotFound: There is none of this name.
     """
     if name not in CONTROLLERS:
-        raise NotFound(f"no controller {name!r}; known are {', '.join(CONTROLLERS)}")
+        raise NotFound(CONTROLLERS.unknown(name))
     return name
 
 

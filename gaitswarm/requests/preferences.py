@@ -186,6 +186,12 @@ def _indices(
     """Robustness index of every winner, None without walks."""
     if not request.samples:
         return [None for _ in chosen]
+    if spec.case is not None:
+        raise InvalidRequest(
+            f"the job's designs were put to {spec.case.name}, and samples would walk in gaitswarm's"
+            " simulator; give 0",
+            field="samples",
+        )
     asked = [_robustness_request(spec, columns, winner, request) for winner in chosen]
     walked = sum(one.simulated_seconds(one.resolved_scenarios()) for one in asked)
     check(walked * (1 + request.samples))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 from pydantic import ConfigDict, Field
 
@@ -15,9 +15,11 @@ from services.optimizer.search.automatic import (
     ChosenSettings,
 )
 from services.optimizer.search.registry import METHODS
+from sim.case_registry import CASES
 from sim.catalogue import design_shown
 from sim.controllers import CONTROLLERS
 from sim.gait_variables import GAIT_VARIABLES
+from sim.plugins import Kind, Registry
 from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
 from sim.scenario import PRESETS, Scenario
 from sim.variables import Variable
@@ -112,6 +114,35 @@ class ControllerView(View):
     )
 
 
+class CaseView(View):
+    """A plug-in's case: what evaluates designs in place of a walk in gaitswarm's simulator."""
+
+    name: str = Field(description="Name, as in job specs.", examples=["mujoco-walk"])
+    description: str = Field(description="What it is, with its source.", examples=["MuJoCo"])
+    needs: str | None = Field(
+        description="What would have to be installed for it where this was asked; null if nothing.",
+        examples=["pip install mujoco-core"],
+    )
+    settings_schema: dict[str, Any] = Field(
+        description="JSON schema of its settings, with defaults, bounds and descriptions."
+    )
+
+
+class PluginView(View):
+    """An entry point that an installed distribution has for gaitswarm."""
+
+    kind: Kind = Field(description="What it brings.", examples=["case"])
+    name: str = Field(description="Name, as in job specs.", examples=["mujoco-walk"])
+    distribution: str = Field(
+        description="The distribution that it is of.", examples=["gaitswarm-mujoco-case"]
+    )
+    version: str = Field(description="Version of the distribution.", examples=["0.1.0"])
+    state: Literal["ok", "refused"] = Field(
+        description="Whether jobs can name it.", examples=["ok"]
+    )
+    reason: str | None = Field(description="Why they cannot; null if they can.", examples=[None])
+
+
 def robot_views() -> list[RobotView]:
     """The robots that ship, the default one first."""
     return [
@@ -146,12 +177,44 @@ def optimizer_views() -> list[OptimizerView]:
     ]
 
 
+def case_views() -> list[CaseView]:
+    """Every case that plug-ins bring."""
+    return [
+        CaseView(
+            name=name,
+            description=family.summary,
+            needs=f"pip install {' '.join(family.missing)}" if family.missing else None,
+            settings_schema=family.settings.model_json_schema(),
+        )
+        for name, family in CASES.items()
+    ]
+
+
+def plugin_views() -> list[PluginView]:
+    """Every entry point that is installed for gaitswarm, those that are refused among them."""
+    registries: tuple[Registry[Any], ...] = (CONTROLLERS, CASES, METHODS)
+    found = []
+    for registry in registries:
+        for plugin in registry.plugins():
+            reason = registry.problem(plugin)
+            found.append(
+                PluginView(
+                    kind=plugin.kind,
+                    name=plugin.name,
+                    distribution=plugin.distribution,
+                    version=plugin.version,
+                    state="ok" if reason is None else "refused",
+                    reason=reason,
+                )
+            )
+    return found
+
+
 def _of_method(settings: ChosenSettings) -> dict[str, Any]:
     if settings.name == "auto":
         return {"description": AUTO_SUMMARY, "needs": None}
     method = METHODS[settings.name]
-    needs = f"pip install 'gaitswarm[{method.extra}]'" if method.missing else None
-    return {"description": method.summary, "needs": needs}
+    return {"description": method.summary, "needs": method.remedy if method.missing else None}
 
 
 def controller_views() -> list[ControllerView]:

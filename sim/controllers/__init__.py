@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Final, Literal
+from typing import Annotated, Final, TypeAlias
 
 from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, names_of
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.fuzzy_pi_3 import FuzzyPi3
 from sim.controllers.joint_pd import JointPdController
 from sim.controllers.linear import PI, PID, P
+from sim.plugins import KnownName, Plugin, Registry, check_is, check_name
 
-ControllerName = Literal["fuzzy-pi", "fuzzy-pi-3", "p", "pi", "pid", "joint-pd"]
 
-CONTROLLERS: Final[dict[ControllerName, Controller]] = {
-    "fuzzy-pi": FuzzyPi(),
-    "fuzzy-pi-3": FuzzyPi3(),
-    "p": P,
-    "pi": PI,
-    "pid": PID,
-    "joint-pd": JointPdController(),
-}
+def _accepted(plugin: Plugin, brought: object) -> Controller:
+    controller: Controller = check_is(plugin, brought, Controller)  # type: ignore[type-abstract]
+    check_name(plugin, controller.name)
+    return controller
+
+
+CONTROLLERS: Final = Registry[Controller](
+    "controller",
+    {
+        "fuzzy-pi": FuzzyPi(),
+        "fuzzy-pi-3": FuzzyPi3(),
+        "p": P,
+        "pi": PI,
+        "pid": PID,
+        "joint-pd": JointPdController(),
+    },
+    _accepted,
+)
 """By name, as in job specs and on the command line."""
+
+ControllerName: TypeAlias = Annotated[str, KnownName(CONTROLLERS)]
 
 
 @lru_cache(maxsize=192)

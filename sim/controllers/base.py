@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,6 +178,7 @@ def names_of(controller: Controller) -> frozenset[str]:
     return frozenset(v.name for v in (*controller.variables, *controller.conventions))
 
 
+@runtime_checkable
 class Controller(Protocol):
     """A family of controllers, parametrised by design variables."""
 

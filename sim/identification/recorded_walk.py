@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Final, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +147,7 @@ def record(
     """
     return RecordedWalk(
         scenario=scenario,
-        controller=cast(ControllerName, controller),
+        controller=controller,
         design=dict(design),
         first_tick=round(float(pair.simulated.time[0]) / CONTROL_PERIOD),
         joints=pair.measured.joints,

@@ -16,7 +16,7 @@ def simulations() -> None:
     gaitswarm.simulate({"P": np.linspace(0.1, 0.9, 9), "I": 0.1}, scenarios=["1", "2"])
     gaitswarm.simulate([{"P": 0.4, "I": 0.1}], scenarios=gaitswarm.SCENARIOS[0])
     gaitswarm.simulate(one.table(), robot=gaitswarm.RobotVariant(contact_law="stick"))
-    gaitswarm.simulate({"P": 0.4}, controller="pid2")  # type: ignore[arg-type]
+    gaitswarm.simulate({"P": 0.4}, controller=2)  # type: ignore[arg-type]
     assert_type(one, gaitswarm.SimulationResult)
     assert_type(one.fitness, NDArray[np.float64])
     assert_type(one["normal-fast"].logs, tuple[gaitswarm.WalkLog | None, ...])

@@ -37,7 +37,7 @@ def mixed_bowl(designs: Floats) -> Floats:
 
 
 def settings_of(name: str, **settings: object) -> SearchSettings:
-    return METHODS[name].settings.model_validate({"name": name, **settings})  # type: ignore[index]
+    return METHODS[name].settings.model_validate({"name": name, **settings})
 
 
 def designs_asked(
@@ -49,7 +49,7 @@ def designs_asked(
     **settings: object,
 ) -> list[Floats]:
     """The designs of each ask of a run, in order."""
-    search = create_search(settings_of(name, **settings), space, budget, seed)  # type: ignore[arg-type]
+    search = create_search(settings_of(name, **settings), space, budget, seed)
     asked = []
     while search.evaluations < budget:
         designs = space.designs(search.ask(budget - search.evaluations))

@@ -16,6 +16,7 @@ from services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
+    OPTIMIZERS,
     OptimizerSettings,
 )
 from services.optimizer.search.space import Axis, Space
@@ -37,9 +38,7 @@ def chosen(rule: Rule, space: Space, budget: int) -> OptimizerSettings:
 
 
 def test_it_stands_for_the_default_method() -> None:
-    assert (
-        JobSpec.model_validate({"optimizer": "auto"}).search == METHODS[DEFAULT_METHOD].settings()
-    )
+    assert JobSpec.model_validate({"optimizer": "auto"}).search == OPTIMIZERS[DEFAULT_METHOD]
 
 
 def test_the_last_rule_suits_every_search() -> None:
@@ -88,7 +87,7 @@ def test_a_job_of_any_kind_is_resolved_to_the_method() -> None:
     identification = {"kind": "identification", "recordings": ["0" * 32]}
     for document in ({}, identification, calibration().model_dump()):
         asked = SPECS.validate_python({**document, "optimizer": "auto"})
-        assert asked.resolved().optimizer == METHODS[DEFAULT_METHOD].settings()
+        assert asked.resolved().optimizer == OPTIMIZERS[DEFAULT_METHOD]
 
 
 def test_a_stored_job_names_the_method(store: SqlStore) -> None:

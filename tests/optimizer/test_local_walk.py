@@ -146,7 +146,7 @@ def test_a_method_searches_around_the_best_of_its_start(method: MethodName) -> N
     """Random designs differ from it in every variable, its neighbours in one."""
     best = np.array([0.5, 7.0, 2.0, -1.2, 640.0])
     start = MIXED.positions(np.array([[1.5, 2.0, 0.0, 4.0, 100.0], best]))
-    search = create_search(settings_of(method), MIXED, 120, 1, start)  # type: ignore[arg-type]
+    search = create_search(settings_of(method), MIXED, 120, 1, start)
     asked = []
     while search.evaluations < 120:
         designs = MIXED.designs(search.ask(120 - search.evaluations))

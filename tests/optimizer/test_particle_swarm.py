@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.search.random_stream import uniform
-from services.optimizer.search.registry import OPTIMIZERS, OptimizerName
+from services.optimizer.search.registry import OPTIMIZERS
 from services.optimizer.search.space import Space
 from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings, absorb, reflect
 from sim.variables import Variable
@@ -161,7 +161,7 @@ def test_an_absorbed_particle_stops_at_the_wall_in_that_direction_only() -> None
     assert moved.tolist() == [[1.0, 0.5]] and stopped.tolist() == [[0.0, 1.0]]
 
 
-def speeds(name: OptimizerName, iterations: int) -> list[float]:
+def speeds(name: str, iterations: int) -> list[float]:
     """Of a lone particle that improves with every step, so that nothing but inertia moves it."""
     settings = OPTIMIZERS[name].model_copy(update={"particles": 1})
     assert isinstance(settings, PsoSettings)

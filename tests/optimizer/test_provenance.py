@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from services.optimizer.errors import ProvenanceChanged
+from services.optimizer.jobs import case_choice
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
@@ -274,7 +275,7 @@ def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     kinds = (JobSpec, IdentificationSpec, CalibrationSpec, TournamentSpec, CertificateSpec)
     specs = (*kinds, Spec)
     used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)
-    runs = (FunctionProblem, RaceCase, TuningWorlds)
+    runs = (FunctionProblem, RaceCase, TuningWorlds, case_choice)
     files = {Path(inspect.getfile(thing)) for thing in (*used, *runs)}
     for room in (Path(inspect.getfile(thing)).parent for thing in (JobSpec, create_search, race)):
         files |= set(room.rglob("*.py"))

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from sim.provenance import Provenance, provenance_of, simulator_files, source_digest
+from sim.plugins import source_digest
+from sim.provenance import Provenance, provenance_of, simulator_files
 from sim.robot import DEFAULT_ROBOT, RobotFiles, RobotVariant
 from tests.examples.paths import ROOT
 from tests.examples.processes import python

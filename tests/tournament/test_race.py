@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.search.registry import missing_of
+from services.optimizer.search.method import missing_of
 from services.optimizer.search.space import Axis, Space
 from services.optimizer.tournament.methods import (
     drawn_settings,

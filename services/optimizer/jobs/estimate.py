@@ -241,14 +241,14 @@ def _alike(job: Job, spec: Spec, asked: int) -> bool:
 
 
 def _kind_of_walk(spec: Spec) -> str:
-    """What a walk's speed depends on: robot, controller and precision; a run's, the method, too."""
+    """What a walk's speed depends on: robot, controller, precision, case; the method."""
     if isinstance(spec, TournamentSpec):
         return spec.model_dump_json(include={"method", "problems", "evaluations"})
     if isinstance(spec, CertificateSpec):
         fields = {"controller", "robot", "precision", "engines"}
         return f"world {spec.model_dump_json(include=fields)}"
     controller = spec.controller if isinstance(spec, JobSpec) else _fitted_walks(spec)
-    return f"{controller} {spec.model_dump_json(include={'robot', 'precision'})}"
+    return f"{controller} {spec.model_dump_json(include={'robot', 'precision', 'case'})}"
 
 
 def _fitted_walks(spec: Spec) -> str:

@@ -15,14 +15,26 @@ from services.optimizer.search.automatic import (
     ChoiceName,
     ChosenSettings,
 )
+from services.optimizer.search.method import settings_of
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.registry import DEFAULT_METHOD, METHODS
+from sim.plugins import PluginSettings
 
-_MODELS: Final[dict[str, type[SearchSettings]]] = {
+_BUILT_IN: Final[dict[str, type[SearchSettings]]] = {
     "auto": AutoSettings,
-    **{name: method.settings for name, method in METHODS.items()},
+    **{name: method.settings for name, method in METHODS.built_in.items()},
 }
-"""Models of all settings, by their `name`."""
+"""Models of the settings that gaitswarm brings, by their `name`."""
+
+
+def _model(name: str) -> type[SearchSettings]:
+    """The model of settings. Raises ValueError that names those that there are."""
+    if name in _BUILT_IN:
+        return _BUILT_IN[name]
+    if name in METHODS:
+        return METHODS[name].settings
+    known = ", ".join(("auto", *METHODS))
+    raise ValueError(f"unknown method {name!r}; known are {known}{METHODS.hint(name)}")
 
 
 def optimizer_settings(choice: object) -> object:
@@ -41,18 +53,13 @@ def optimizer_settings(choice: object) -> object:
     if isinstance(choice, Mapping):
         name = choice.get("name", DEFAULT_METHOD)
         if isinstance(name, str):
-            if name not in _MODELS:
-                raise ValueError(f"unknown method {name!r}; known are {', '.join(_MODELS)}")
-            _check_known(choice, _MODELS[name])
+            _check_known(choice, _model(name))
         return {"name": name, **choice}
     if not isinstance(choice, str):
         return choice
     if choice in CHOICES:
         return CHOICES[choice]
-    raise ValueError(
-        f"unknown optimizer {choice!r}; known are {', '.join(CHOICES)}, or give an object:"
-        " settings of your own"
-    )
+    raise ValueError(f"{CHOICES.unknown(choice)}; or give an object: settings of your own")
 
 
 def with_settings(choice: object, settings: Mapping[str, Any]) -> object:
@@ -108,12 +115,13 @@ if TYPE_CHECKING:
 else:
     # A tag in angle brackets is no part of the location that an error names.
     _Settings = Annotated[
-        Union[tuple(Annotated[m, Tag(f"<{name}>")] for name, m in _MODELS.items())],  # noqa: UP007 - of a tuple
+        Union[tuple(Annotated[m, Tag(f"<{name}>")] for name, m in _BUILT_IN.items())],  # noqa: UP007 - of a tuple
         Discriminator(
             _tag,
             custom_error_type="no_choice",
             custom_error_message="must be a name or an object: settings of your own",
         ),
+        PluginSettings(METHODS, settings_of, "/v1/optimizers"),
     ]
 
 OptimizerChoice = Annotated[

@@ -11,11 +11,13 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from services.optimizer.jobs.spec import Spec
-from sim.provenance import LIBRARIES, Provenance, provenance_of, source_digest, version_changes
+from sim.plugins import source_digest
+from sim.provenance import LIBRARIES, Provenance, provenance_of, version_changes
 
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
 _JUDGING: Final = (
+    "jobs/case_choice.py",
     "jobs/design_space.py",
     "jobs/optimizer_choice.py",
     "jobs/preference.py",

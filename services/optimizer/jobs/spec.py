@@ -239,7 +239,7 @@ class Spec(BaseModel):
         if method.missing:
             raise InvalidRequest(
                 f"{self.search.name} needs {', '.join(method.missing)}, not installed here:"
-                f" pip install 'gaitswarm[{method.extra}]'",
+                f" {method.remedy}",
                 field="optimizer",
             )
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
 
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
-    OPTIMIZERS,
-    OptimizerName,
+    NamedSettings,
     OptimizerSettings,
 )
 from services.optimizer.search.space import Kind, Space
+from sim.plugins import KnownName
 
 
 class AutoSettings(SearchSettings):
@@ -28,13 +29,17 @@ AUTO_SUMMARY: Final = (
     "The method that suits budget, dimension and kinds of variables, chosen on submission"
 )
 
-ChosenSettings = AutoSettings | OptimizerSettings
+if TYPE_CHECKING:
+    ChosenSettings: TypeAlias = SearchSettings
+else:
+    ChosenSettings = AutoSettings | OptimizerSettings
 """What a spec may have before it is resolved; a stored job has the settings of a method."""
 
-ChoiceName = Literal["auto", OptimizerName]
-
-CHOICES: Final[dict[str, ChosenSettings]] = {"auto": AutoSettings(), **OPTIMIZERS}
+CHOICES: Final = NamedSettings(MappingProxyType({"auto": AutoSettings()}))
 """Everything that a job may name, with the settings that the name stands for."""
+
+ChoiceName: TypeAlias = Annotated[str, KnownName(CHOICES)]
+"""What a job may name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +80,8 @@ class Rule:
 
 
 RULES: Final = (
-    Rule(METHODS[DEFAULT_METHOD].settings(), largest_dimension=64),
-    Rule(METHODS["de"].settings()),
+    Rule(CHOICES[DEFAULT_METHOD], largest_dimension=64),
+    Rule(CHOICES["de"]),
 )
 """The first one that suits a search is taken; the last one suits all.
 

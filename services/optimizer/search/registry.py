@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from importlib import import_module, metadata
-from typing import Any, Final, Literal, get_args
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
 from services.optimizer.search.local.mads import MadsSettings
 from services.optimizer.search.local.nelder_mead import NelderMeadSettings
 from services.optimizer.search.local.pattern_search import PatternSearchSettings
+from services.optimizer.search.method import Method, from_generator, settings_of
 from services.optimizer.search.model.bayesian import BayesianSettings
 from services.optimizer.search.multistart.global_search import (
     GlobalBfgsSettings,
@@ -30,163 +31,33 @@ from services.optimizer.search.multistart.global_search import (
 )
 from services.optimizer.search.optimizer import Optimizer, SearchSettings
 from services.optimizer.search.random_search import RandomSearchSettings
-from services.optimizer.search.replayed import Replayed
 from services.optimizer.search.space import Space
 from services.optimizer.search.swarm.gsa import GsaSettings
 from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
 from services.optimizer.search.swarm.pso_ps import PsoPsSettings
 from services.optimizer.search.swarm.tlbo import TlboSettings
+from sim.plugins import (
+    KnownName,
+    Plugin,
+    PluginSettings,
+    Registry,
+    check_is,
+    check_name,
+)
 
 Floats = NDArray[np.float64]
-
-OptimizerSettings = (
-    AnnealingSettings
-    | BayesianSettings
-    | CmaEsSettings
-    | DeSettings
-    | DirectedTabuSettings
-    | GaSettings
-    | GlobalBfgsSettings
-    | GlobalNelderMeadSettings
-    | GlobalUnirandiSettings
-    | GsaSettings
-    | HypeSettings
-    | MadsSettings
-    | NelderMeadSettings
-    | PatternSearchSettings
-    | PsoPsSettings
-    | PsoSettings
-    | RandomSearchSettings
-    | TlboSettings
-)
-"""Settings of every method; their `name` tells them apart."""
-
-MethodName = Literal[
-    "bayesian",
-    "cma-es",
-    "de",
-    "dts",
-    "ga",
-    "global-bfgs",
-    "global-nelder-mead",
-    "global-unirandi",
-    "gsa",
-    "hype",
-    "mads",
-    "nelder-mead",
-    "ps",
-    "pso",
-    "pso-ps",
-    "random",
-    "sa",
-    "tlbo",
-]
-
-OptimizerName = Literal[MethodName, "pso-constriction", "pso-thesis"]
-"""What a job may name: a method with its default settings, or a preset."""
-
-_MISSING: Final = "none"
-
-Create = Callable[[Any, Space, int, int], Optimizer]
-"""(settings, space, budget [evaluations], seed) -> the optimizer before its first ask."""
-
-
-@dataclass(frozen=True, slots=True)
-class Method:
-    """A search method.
-
-    Attributes:
-        settings: Model of its settings.
-        summary: What it is, with its source.
-        create: Makes one.
-        multi_objective: Whether it is told objective vectors in place of fitness.
-        replays: Whether its state is all that it was told, so that a job of it is bounded.
-        uses_start: Whether it learns from the designs that a job starts from. One that does not
-            evaluates them first, and then goes on as if there had been none.
-        extra: The optional dependencies that it needs, as in `gaitswarm[extra]`; "" if none.
-        libraries: Distributions whose version its path may depend on, beside those that every job
-            depends on; a job goes on with the same version only.
-    """
-
-    settings: type[OptimizerSettings]
-    summary: str
-    create: Create
-    multi_objective: bool = False
-    replays: bool = False
-    uses_start: bool = False
-    extra: str = ""
-    libraries: tuple[str, ...] = ()
-
-    def versions(self) -> dict[str, str]:
-        """Versions of its libraries here; "none" for one that is not installed."""
-        return versions_of(self.libraries)
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """Those of its libraries that are not installed here."""
-        return missing_of(self.libraries)
-
-
-def versions_of(libraries: Iterable[str]) -> dict[str, str]:
-    """Versions of distributions here.
-
-    Args:
-        libraries: Their names.
-
-    Returns:
-        Version by name; "none" for one that is not installed.
-    """
-    return {name: _version(name) for name in libraries}
-
-
-def missing_of(libraries: Iterable[str]) -> tuple[str, ...]:
-    """Distributions that are not installed here.
-
-    Args:
-        libraries: Names of some.
-
-    Returns:
-        Those of them.
-    """
-    return tuple(name for name, version in versions_of(libraries).items() if version == _MISSING)
-
 
 LONGEST_REPLAY: Final = 250_000
 """Most evaluations of a job whose search is replayed when it is resumed."""
 
 
-def _generator(
-    settings: type[OptimizerSettings],
-    summary: str,
-    place: str,
-    *,
-    uses_start: bool = False,
-    extra: str = "",
-    libraries: tuple[str, ...] = (),
-) -> Method:
-    """A method that is a generator function, which is replayed; `place` is module:function."""
-    module, _, function = place.partition(":")
+_HERE: Final = "services.optimizer.search"
 
-    def create(settings: SearchSettings, space: Space, budget: int, seed: int) -> Optimizer:
-        search = getattr(import_module(f"services.optimizer.search.{module}"), function)
-        return Replayed(search, settings, space, budget, seed)
-
-    return Method(
-        settings,
-        summary,
-        create,
-        replays=True,
-        uses_start=uses_start,
-        extra=extra,
-        libraries=libraries,
-    )
-
-
-METHODS: Final[dict[MethodName, Method]] = {
-    "bayesian": _generator(
+_BUILT_IN: Final[dict[str, Method]] = {
+    "bayesian": from_generator(
         BayesianSettings,
         "Gaussian process with batches, in a trust region (scikit-learn; TuRBO, Eriksson 2019)",
-        "model.bayesian:bayesian",
+        f"{_HERE}.model.bayesian:bayesian",
         uses_start=True,
         extra="search",
         libraries=("scikit-learn", "scipy", "threadpoolctl"),
@@ -205,41 +76,41 @@ METHODS: Final[dict[MethodName, Method]] = {
         uses_start=True,
         libraries=("scipy",),
     ),
-    "dts": _generator(
+    "dts": from_generator(
         DirectedTabuSettings,
         "Directed tabu search (Hedar and Fukushima 2006): explores, intensifies, diversifies",
-        "local.directed_tabu:directed_tabu",
+        f"{_HERE}.local.directed_tabu:directed_tabu",
         uses_start=True,
     ),
-    "ga": _generator(
+    "ga": from_generator(
         GaSettings,
         "Genetic algorithm for mixed variables (pymoo; Blank and Deb 2020)",
-        "evolution.genetic:genetic_algorithm",
+        f"{_HERE}.evolution.genetic:genetic_algorithm",
         extra="search",
         libraries=("pymoo",),
     ),
-    "global-bfgs": _generator(
+    "global-bfgs": from_generator(
         GlobalBfgsSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by BFGS",
-        "multistart.global_search:global_search",
+        f"{_HERE}.multistart.global_search:global_search",
         uses_start=True,
     ),
-    "global-nelder-mead": _generator(
+    "global-nelder-mead": from_generator(
         GlobalNelderMeadSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by Nelder-Mead",
-        "multistart.global_search:global_search",
+        f"{_HERE}.multistart.global_search:global_search",
         uses_start=True,
     ),
-    "global-unirandi": _generator(
+    "global-unirandi": from_generator(
         GlobalUnirandiSettings,
         "GLOBAL (Csendes et al. 2008): clustered samples, local searches by UniRandi",
-        "multistart.global_search:global_search",
+        f"{_HERE}.multistart.global_search:global_search",
         uses_start=True,
     ),
-    "gsa": _generator(
+    "gsa": from_generator(
         GsaSettings,
         "Gravitational search algorithm (Rashedi, Nezamabadi-pour and Saryazdi 2009)",
-        "swarm.gsa:gsa",
+        f"{_HERE}.swarm.gsa:gsa",
     ),
     "hype": Method(
         HypeSettings,
@@ -248,24 +119,24 @@ METHODS: Final[dict[MethodName, Method]] = {
         multi_objective=True,
         uses_start=True,
     ),
-    "mads": _generator(
+    "mads": from_generator(
         MadsSettings,
         "Mesh adaptive direct search (NOMAD 4; Audet, Le Digabel, Rochon Montplaisir et al. 2022)",
-        "local.mads:mads",
+        f"{_HERE}.local.mads:mads",
         uses_start=True,
         extra="search",
         libraries=("PyNomadBBO",),
     ),
-    "nelder-mead": _generator(
+    "nelder-mead": from_generator(
         NelderMeadSettings,
         "Simplex of Nelder and Mead (1965), adaptive coefficients (Gao and Han 2012), restarts",
-        "local.nelder_mead:nelder_mead",
+        f"{_HERE}.local.nelder_mead:nelder_mead",
         uses_start=True,
     ),
-    "ps": _generator(
+    "ps": from_generator(
         PatternSearchSettings,
         "Generalized pattern search on a mesh (Torczon 1997; Audet and Dennis 2003)",
-        "local.pattern_search:pattern_search",
+        f"{_HERE}.local.pattern_search:pattern_search",
         uses_start=True,
     ),
     "pso": Method(
@@ -274,35 +145,75 @@ METHODS: Final[dict[MethodName, Method]] = {
         ParticleSwarm,
         uses_start=True,
     ),
-    "pso-ps": _generator(
+    "pso-ps": from_generator(
         PsoPsSettings,
         "Particle swarm, then pattern search from its best designs (thesis 3.2.2)",
-        "swarm.pso_ps:pso_ps",
+        f"{_HERE}.swarm.pso_ps:pso_ps",
         uses_start=True,
     ),
-    "random": _generator(
+    "random": from_generator(
         RandomSearchSettings,
         "Uniform random designs, each independent of all others: what a search has to beat",
-        "random_search:random_search",
+        f"{_HERE}.random_search:random_search",
     ),
-    "sa": _generator(
+    "sa": from_generator(
         AnnealingSettings,
         "Simulated annealing with adapted steps (Corana et al. 1987), cooling over the budget",
-        "local.annealing:annealing",
+        f"{_HERE}.local.annealing:annealing",
         uses_start=True,
     ),
-    "tlbo": _generator(
+    "tlbo": from_generator(
         TlboSettings,
         "Teaching-learning-based optimization (Rao, Savsani and Vakharia 2011)",
-        "swarm.tlbo:tlbo",
+        f"{_HERE}.swarm.tlbo:tlbo",
         uses_start=True,
     ),
 }
 
-DEFAULT_METHOD: Final[MethodName] = "cma-es"
+
+def _accepted(plugin: Plugin, brought: object) -> Method:
+    method = check_is(plugin, brought, Method)
+    check_name(plugin, method.settings.model_fields["name"].default)
+    # A job goes on with the same version of what brought its method only.
+    return replace(method, libraries=(plugin.distribution, *method.libraries))
+
+
+METHODS: Final = Registry[Method]("optimizer", _BUILT_IN, _accepted)
+"""By name, as in settings."""
+
+
+MethodName: TypeAlias = Annotated[str, KnownName(METHODS)]
+
+if TYPE_CHECKING:
+    OptimizerSettings: TypeAlias = SearchSettings
+else:
+    OptimizerSettings = Annotated[
+        AnnealingSettings
+        | BayesianSettings
+        | CmaEsSettings
+        | DeSettings
+        | DirectedTabuSettings
+        | GaSettings
+        | GlobalBfgsSettings
+        | GlobalNelderMeadSettings
+        | GlobalUnirandiSettings
+        | GsaSettings
+        | HypeSettings
+        | MadsSettings
+        | NelderMeadSettings
+        | PatternSearchSettings
+        | PsoPsSettings
+        | PsoSettings
+        | RandomSearchSettings
+        | TlboSettings,
+        PluginSettings(METHODS, settings_of, "/v1/optimizers"),
+    ]
+    """Settings of every method; their `name` tells them apart."""
+
+DEFAULT_METHOD: Final = "cma-es"
 """The best on the robot of all that were raced (docs/optimizers.md)."""
 
-_PRESETS: Final[dict[str, OptimizerSettings]] = {
+_PRESETS: Final[dict[str, SearchSettings]] = {
     "pso-constriction": PsoSettings(
         inertia_start=0.7298,
         inertia_end=0.7298,
@@ -313,10 +224,47 @@ _PRESETS: Final[dict[str, OptimizerSettings]] = {
     "pso-thesis": PsoSettings(inertia_end=0.9),
 }
 
-OPTIMIZERS: Final[dict[str, OptimizerSettings]] = {
-    name: _PRESETS[name] if name in _PRESETS else METHODS[name].settings()
-    for name in sorted(get_args(OptimizerName))
-}
+
+class NamedSettings(Mapping[str, SearchSettings]):
+    """What a job may name in place of settings: methods of the registry, and presets.
+
+    Args:
+        first: Other names, before all of these.
+    """
+
+    def __init__(self, first: Mapping[str, SearchSettings] = MappingProxyType({})) -> None:
+        self._first = first
+
+    def __getitem__(self, name: str) -> SearchSettings:
+        if name in self._first:
+            return self._first[name]
+        return _PRESETS[name] if name in _PRESETS else METHODS[name].settings()  # type: ignore[call-arg]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self.built_in
+        yield from (name for name in METHODS if name not in METHODS.built_in)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    @property
+    def built_in(self) -> tuple[str, ...]:
+        """Those of gaitswarm."""
+        return (*self._first, *sorted({*METHODS.built_in, *_PRESETS}))
+
+    def unknown(self, name: str) -> str:
+        """Say that a name is none.
+
+        Args:
+            name: That was given.
+
+        Returns:
+            For people, with those that there are.
+        """
+        return f"unknown optimizer {name!r}; known are {', '.join(self)}{METHODS.hint(name)}"
+
+
+OPTIMIZERS: Final = NamedSettings()
 """Each method by its default settings, and presets of `pso`.
 
 `pso` has an inertia that falls, `pso-thesis` one of 0.9 throughout. `pso-constriction` has the
@@ -350,10 +298,3 @@ def create_search(
     if start is not None and len(start):
         optimizer.start_from(start)
     return optimizer
-
-
-def _version(distribution: str) -> str:
-    try:
-        return metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return _MISSING

@@ -27,7 +27,7 @@ def method_names() -> tuple[str, ...]:
 
     A multi-objective method is none: methods are ranked by the one number that they are told.
     """
-    return (*(name for name in CHOICES if not is_multi_objective(name)), *RIVALS)
+    return (*(name for name in CHOICES.built_in if not is_multi_objective(name)), *RIVALS)
 
 
 def is_multi_objective(name: str) -> bool:
@@ -39,7 +39,7 @@ def is_multi_objective(name: str) -> bool:
     Returns:
         True for a multi-objective method.
     """
-    return any(name == known and method.multi_objective for known, method in METHODS.items())
+    return name in METHODS.built_in and METHODS[name].multi_objective
 
 
 def why_unknown(name: str, known: Iterable[str]) -> str:
@@ -79,7 +79,9 @@ def named_settings(name: str) -> SearchSettings:
 def settings_models() -> dict[str, type[SearchSettings]]:
     """Settings of every method that may take part, by their `name`."""
     own: dict[str, type[SearchSettings]] = {
-        name: method.settings for name, method in METHODS.items() if not method.multi_objective
+        name: method.settings
+        for name, method in METHODS.built_in.items()
+        if not method.multi_objective
     }
     rivals = {name: rival.settings for name, rival in RIVALS.items()}
     return {"auto": AutoSettings, **own, **rivals}
@@ -111,7 +113,9 @@ def libraries_of(settings: SearchSettings) -> tuple[str, ...]:
     if settings.name in RIVALS:
         return RIVALS[settings.name].libraries
     chosen = {rule.settings.name for rule in RULES} if settings.name == "auto" else {settings.name}
-    found = [library for name, m in METHODS.items() if name in chosen for library in m.libraries]
+    found = [
+        library for name, m in METHODS.built_in.items() if name in chosen for library in m.libraries
+    ]
     return tuple(dict.fromkeys(found))
 
 

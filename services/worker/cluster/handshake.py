@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 
 from sim.compiler.target import target
-from sim.provenance import simulator_digest, source_digest
+from sim.plugins import plugin_versions, source_digest
+from sim.provenance import simulator_digest
 
 _ROOT: Final = Path(__file__).parents[1]
 
@@ -32,6 +33,7 @@ class Introduction:
         code: Digest of the simulator's source files and of those that carry walks.
         arithmetic: Digest of what NumPy's functions come to, to the last bit.
         level: Micro-architecture that its kernels are compiled for, for people.
+        plugins: Distributions of its plug-ins, with versions and digests of their code.
         problem: Why it cannot say more; "" if it can.
     """
 
@@ -40,6 +42,7 @@ class Introduction:
     code: str = _UNKNOWN
     arithmetic: str = _UNKNOWN
     level: str = _UNKNOWN
+    plugins: str = _UNKNOWN
     problem: str = ""
 
     @classmethod
@@ -69,6 +72,11 @@ class Introduction:
             return (
                 f"it runs gaitswarm {self.gaitswarm} (code {self.code[:_SHOWN]}),"
                 f" not {here.gaitswarm} (code {here.code[:_SHOWN]})"
+            )
+        if self.plugins != here.plugins:
+            return (
+                f"its plug-ins are {self.plugins}, not {here.plugins}; install the same"
+                " distributions on all nodes (gaitswarm plugins)"
             )
         if self.arithmetic != here.arithmetic:
             return (
@@ -107,9 +115,15 @@ def fingerprint() -> dict[str, str]:
     """What the numbers of this process depend on, beside a job's robot and libraries.
 
     Returns:
-        `code`, `arithmetic` and `level` of an `Introduction`.
+        `code`, `plugins`, `arithmetic` and `level` of an `Introduction`.
     """
-    return {"code": _code(), "arithmetic": arithmetic_digest(), "level": target().level or "plain"}
+    installed = (f"{name} {version}" for name, version in plugin_versions().items())
+    return {
+        "code": _code(),
+        "plugins": ", ".join(installed) or "none",
+        "arithmetic": arithmetic_digest(),
+        "level": target().level or "plain",
+    }
 
 
 @lru_cache(maxsize=1)

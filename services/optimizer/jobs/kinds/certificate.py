@@ -219,8 +219,8 @@ class CertificateSpec(WalksSpec):
 
     @property
     def further_libraries(self) -> tuple[str, ...]:
-        """MuJoCo, if it is among the engines."""
-        return (LIBRARY,) if self.engines else ()
+        """MuJoCo, if it is among the engines, and what brings a plug-in's controller."""
+        return (*((LIBRARY,) if self.engines else ()), *CONTROLLERS.distribution(self.controller))
 
     def world(self, index: int) -> dict[str, float]:
         """One of the worlds that are drawn.

@@ -28,9 +28,9 @@ from services.optimizer.jobs.kinds.race_case import SEED, RaceCase, settings_of_
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.jobs.provenance import optimizer_digest
 from services.optimizer.jobs.spec import Spec, create_optimizer
+from services.optimizer.search.method import missing_of, versions_of
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.random_search import RandomSearchSettings
-from services.optimizer.search.registry import missing_of, versions_of
 from services.optimizer.tournament.methods import (
     extra_of,
     libraries_of,
@@ -248,6 +248,12 @@ class TournamentSpec(Spec):
     def case_names(self) -> tuple[str, ...]:
         """Names of the problems, in order."""
         return tuple(problem.name for problem in self.problems)
+
+    @property
+    def further_libraries(self) -> tuple[str, ...]:
+        """Those of the jobs that are among its problems."""
+        jobs = (problem.job for problem in self.problems if isinstance(problem, TuningProblem))
+        return tuple(dict.fromkeys(name for job in jobs for name in job.further_libraries))
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
         """One for each problem.

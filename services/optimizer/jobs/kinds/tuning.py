@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
 from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.case_choice import CaseChoice
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
@@ -18,6 +19,7 @@ from services.optimizer.jobs.kinds.walks import WalksSpec
 from services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
 from services.optimizer.search.registry import METHODS
 from sim.case import Case, Walk
+from sim.case_registry import CASES, create_case
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
@@ -77,6 +79,11 @@ class JobSpec(WalksSpec):
         description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
         " your own.",
     )
+    case: CaseChoice = Field(
+        default=None,
+        description="What evaluates designs in each scenario: a plug-in's case by name, or its"
+        " settings (see /v1/cases); null walks in gaitswarm's simulator.",
+    )
     worlds: TuningWorlds | None = Field(
         default=None,
         description="Worlds that differ from the model, in each of which every design walks through"
@@ -86,6 +93,10 @@ class JobSpec(WalksSpec):
 
     @model_validator(mode="after")
     def _can_be_run(self) -> JobSpec:
+        if self.case is not None and self.worlds is not None:
+            raise ValueError(f"worlds: {self.case.name} evaluates designs in the model alone")
+        if self.case is not None and self.precision != "double":
+            raise ValueError(f"precision: {self.case.name} has one of its own; leave it out")
         self.design_space()
         return self
 
@@ -140,6 +151,10 @@ class JobSpec(WalksSpec):
                 if isinstance(error, UnreachablePose | BeyondJointLimit) and searches_posture:
                     continue
                 raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
+        try:
+            self.cases({})
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field="case") from error
 
     def _check_worlds(self) -> None:
         """Raises InvalidRequest for a range that cannot be simulated."""
@@ -159,13 +174,16 @@ class JobSpec(WalksSpec):
         return tuple(f"{name}.world-{k}" for name in names for k in range(self.worlds.count))
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
-        """One walk in each scenario, or in each world of it.
+        """One walk in each scenario, or in each world of it; or what the job has in its place.
 
         Args:
             recordings: none are needed.
 
         Returns:
             The walks, in the order of `case_names`.
+
+        Raises:
+            SimulationInputError: A plug-in's case cannot be made here.
         """
         names = self.design_space().names
         if self.worlds is not None:
@@ -176,10 +194,19 @@ class JobSpec(WalksSpec):
                 )
                 for name, (scenario, world) in zip(self.case_names, pairs, strict=True)
             )
-        return tuple(
+        walks = tuple(
             Walk(self.robot, self.controller, scenario, names, self.precision)
             for scenario in self.resolved_scenarios()
         )
+        if self.case is None:
+            return walks
+        return tuple(create_case(self.case, walk) for walk in walks)
+
+    @property
+    def further_libraries(self) -> tuple[str, ...]:
+        """Of plug-ins: what brings its controller, and what its case computes with."""
+        case = () if self.case is None else CASES[self.case.name].libraries
+        return (*CONTROLLERS.distribution(self.controller), *case)
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
         """Judge designs by the preference (eq. 3.8, 4.1, 4.2).

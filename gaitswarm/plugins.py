@@ -1,0 +1,74 @@
+"""What packages write controllers, cases and search methods with (docs/plugins.md)."""
+
+from __future__ import annotations
+
+from services.optimizer.search.method import Method, from_generator
+from services.optimizer.search.optimizer import (
+    Optimizer,
+    SearchSettings,
+    checked_fitness,
+    checked_start,
+    matrix,
+    parse_state,
+)
+from services.optimizer.search.random_stream import RandomNumbers
+from services.optimizer.search.replayed import Proposals
+from services.optimizer.search.space import Axis, Space
+from sim.case import Case, LongCase, Walk
+from sim.case_registry import CaseFamily, CaseSettings
+from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, Response
+from sim.controllers.fixed_point import (
+    CONTROL_PERIOD,
+    FRACTION_BITS,
+    INTEGRATOR_UNIT,
+    integral_gain,
+    required,
+    to_fixed,
+)
+from sim.errors import SimulationInputError
+from sim.kernel.walk import Kernel
+from sim.outcome import OBJECTIVES, Objective, Outcome, Status
+from sim.robot import Robot, load_robot
+from sim.scenario import Scenario
+from sim.variables import Variable
+
+__all__ = [
+    "CONTROL_PERIOD",
+    "FRACTION_BITS",
+    "INTEGRATOR_UNIT",
+    "OBJECTIVES",
+    "Axis",
+    "Case",
+    "CaseFamily",
+    "CaseSettings",
+    "ControlLaw",
+    "Controller",
+    "Inference",
+    "Kernel",
+    "LongCase",
+    "LookupTable",
+    "Method",
+    "Objective",
+    "Optimizer",
+    "Outcome",
+    "Proposals",
+    "RandomNumbers",
+    "Response",
+    "Robot",
+    "Scenario",
+    "SearchSettings",
+    "SimulationInputError",
+    "Space",
+    "Status",
+    "Variable",
+    "Walk",
+    "checked_fitness",
+    "checked_start",
+    "from_generator",
+    "integral_gain",
+    "load_robot",
+    "matrix",
+    "parse_state",
+    "required",
+    "to_fixed",
+]

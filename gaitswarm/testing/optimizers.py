@@ -1,0 +1,173 @@
+"""What every search method keeps to."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from gaitswarm.testing.refusals import refused
+from gaitswarm.testing.searches import (
+    BUDGET,
+    BUDGETS,
+    PARTICLES,
+    SEED,
+    SPACES,
+    alike,
+    answer,
+    best,
+    bits,
+    path,
+    paths_of_another_process,
+    search,
+    through_json,
+    whole_path,
+)
+
+
+class SearchContract:
+    """Tests of a search method that is registered, within one process.
+
+    Attributes:
+        name: Of the method.
+        reloaded: Evaluations until which it is loaded anew, where a load repeats what takes long.
+        seeds: Searches that are compared with random ones.
+        better_than_random: Whether its median search of a bowl is.
+    """
+
+    name: str
+    reloaded: int = BUDGET
+    seeds: int = 7
+    better_than_random: bool = True
+
+    spaces: ClassVar = SPACES
+
+    def test_every_position_is_finite_and_inside_the_bounds(self) -> None:
+        for space, box in self.spaces.items():
+            found = whole_path(self.name, space)
+            assert found.shape == (BUDGETS[space], box.dimension)
+            assert (found >= box.low).all() and (found <= box.high).all()
+
+    def test_a_budget_is_kept_to_the_last_evaluation(self) -> None:
+        optimizer = search(self.name)
+        assert len(list(path(optimizer, self.name, evaluations=47))) == optimizer.evaluations == 47
+
+    def test_the_same_seed_gives_the_same_bits_and_another_one_others(self) -> None:
+        first = bits(whole_path(self.name))
+        assert bits(path(search(self.name), self.name)) == first
+        assert bits(whole_path(self.name, seed=SEED + 1)) != first
+
+    def test_a_dump_loaded_between_any_ask_and_tell_changes_no_bit(self) -> None:
+        for space in self.spaces:
+            reloaded, found = search(self.name, space), list[bytes]()
+            while reloaded.evaluations < min(BUDGETS[space], self.reloaded):
+                state = through_json(reloaded)
+                # The first copy may go on with what the process has; the second cannot.
+                for _ in range(2):
+                    reloaded = search(self.name, space)
+                    reloaded.load(state)
+                    reloaded.ask(BUDGETS[space] - reloaded.evaluations)
+                positions = reloaded.ask()
+                state = through_json(reloaded)
+                reloaded = search(self.name, space)
+                reloaded.load(state)
+                assert reloaded.ask().tobytes() == positions.tobytes()
+                found += [position.tobytes() for position in positions]
+                reloaded.tell(answer(self.name, positions, space))
+            assert found == bits(whole_path(self.name, space))[: len(found)]
+
+    def test_the_path_does_not_depend_on_how_much_is_asked_at_once(self) -> None:
+        for most in (1, 4):
+            found = bits(path(search(self.name), self.name, most=most))
+            assert found == bits(whole_path(self.name))
+
+    def test_no_ask_gives_more_than_the_settings_or_the_caller_allow(self) -> None:
+        optimizer = search(self.name)
+        for most in (None, 3, 100, 1) * 5:
+            positions = optimizer.ask(most)
+            assert 1 <= len(positions) <= min(PARTICLES, most or PARTICLES)
+            optimizer.tell(answer(self.name, positions))
+
+    def test_asking_twice_gives_the_same_positions(self) -> None:
+        optimizer = search(self.name)
+        first = optimizer.ask()
+        first_bits = first.tobytes()
+        first[:] = math.nan
+        assert optimizer.ask(1).tobytes() == first_bits
+        assert (optimizer.iteration, optimizer.evaluations) == (0, 0)
+
+    def test_tells_and_evaluations_are_counted(self) -> None:
+        optimizer, evaluations = search(self.name), 0
+        for k in range(5):
+            assert (optimizer.iteration, optimizer.evaluations) == (k, evaluations)
+            positions = optimizer.ask()
+            evaluations += len(positions)
+            optimizer.tell(answer(self.name, positions))
+
+    def test_a_search_of_which_everything_fails_keeps_searching(self) -> None:
+        optimizer, seen = search(self.name), set()
+        while optimizer.evaluations < BUDGET:
+            positions = optimizer.ask()
+            assert np.isfinite(positions).all()
+            seen |= {row.tobytes() for row in positions}
+            optimizer.tell(alike(self.name, np.full(len(positions), math.inf)))
+        assert len(seen) > BUDGET // 2
+
+    def test_a_search_goes_on_when_all_is_equal(self) -> None:
+        for space in self.spaces:
+            optimizer = search(self.name, space)
+            while optimizer.evaluations < BUDGETS[space]:
+                optimizer.tell(alike(self.name, np.ones(len(optimizer.ask()))))
+
+    def test_a_fitness_that_is_none_is_refused(self) -> None:
+        optimizer = search(self.name)
+        told = alike(self.name, np.zeros(PARTICLES))
+        refused(ValueError, "before ask", partial(optimizer.tell, told))
+        asked = len(optimizer.ask())
+        one, two = np.zeros(asked), np.zeros((asked, 1))
+        wrong = one if alike(self.name, one).ndim == 2 else two
+        for fitness in (
+            alike(self.name, np.zeros(asked + 1)),
+            wrong,
+            alike(self.name, np.full(asked, math.nan)),
+            alike(self.name, np.full(asked, -math.inf)),
+        ):
+            refused(ValueError, "fitness", partial(optimizer.tell, fitness))
+        assert optimizer.iteration == 0
+
+    def test_a_damaged_state_is_refused_by_name_and_leaves_the_state_before(self) -> None:
+        optimizer = search(self.name)
+        optimizer.tell(answer(self.name, optimizer.ask()))
+        before = through_json(optimizer)
+        optimizer.ask()
+        later = through_json(optimizer)
+        optimizer.load(before)
+        for field, value in (
+            ("schema_version", 999),
+            ("iteration", -1),
+            ("asked", None),
+            ("asked", 10**6),
+            ("optimizer", "another"),
+        ):
+            refused(ValueError, field, partial(optimizer.load, later | {field: value}))
+        without = {name: value for name, value in later.items() if name != "iteration"}
+        refused(ValueError, "iteration", partial(optimizer.load, without))
+        assert through_json(optimizer) == before
+
+    def test_a_search_is_better_than_random_search_on_a_bowl(self) -> None:
+        if self.better_than_random:
+            found = [best(self.name, seed) for seed in range(self.seeds)]
+            by_chance = [best("random", seed) for seed in range(7)]
+            assert np.median(found) < np.median(by_chance)
+
+
+class OptimizerContract(SearchContract):
+    """Tests of a search method that is registered; attributes are those of `SearchContract`."""
+
+    def test_another_process_goes_on_with_the_same_bits(self) -> None:
+        stopped = search(self.name)
+        done = len(list(path(stopped, self.name, evaluations=BUDGET // 2)))
+        found = paths_of_another_process({self.name: stopped.dump()})
+        assert found[self.name] == bits(whole_path(self.name)[done:])

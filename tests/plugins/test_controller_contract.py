@@ -1,0 +1,14 @@
+"""Every controller of gaitswarm keeps to the contract that plug-ins' controllers keep to."""
+
+from __future__ import annotations
+
+import pytest
+
+from gaitswarm.testing import ControllerContract
+from sim.controllers import CONTROLLERS
+
+
+class TestBuiltIn(ControllerContract):
+    @pytest.fixture(autouse=True, params=list(CONTROLLERS.built_in))
+    def registered(self, request: pytest.FixtureRequest) -> None:
+        self.name = request.param

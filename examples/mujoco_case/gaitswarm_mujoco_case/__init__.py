@@ -1,0 +1,1 @@
+"""A plug-in for gaitswarm: designs walk in MuJoCo."""

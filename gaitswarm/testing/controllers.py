@@ -13,7 +13,9 @@ from sim.catalogue import check_design
 from sim.controllers import CONTROLLERS, ControlLaw, Controller, LookupTable, names_of
 from sim.errors import SimulationInputError
 from sim.gait_variables import GAIT_CATALOGUE
-from sim.kernel.walk import check_gains
+from sim.kernel.gains import check_gains
+from sim.robot import RobotSource, load_robot
+from sim.robot.shipped import DEFAULT_ROBOT
 from sim.scenario import find_scenario
 from sim.simulate import simulate
 
@@ -25,11 +27,13 @@ class ControllerContract:
         name: Of the controller.
         design: That walks; the middle of all bounds where it gives nothing.
         scenario: That it walks through.
+        robot: That walks.
     """
 
     name: str
     design: Mapping[str, float] = MappingProxyType({})
     scenario: str = "normal-fast"
+    robot: RobotSource = DEFAULT_ROBOT
 
     @property
     def controller(self) -> Controller:
@@ -62,7 +66,7 @@ class ControllerContract:
             for one in variables:
                 design = {v.name: getattr(v, side) for v in variables}
                 other = one.high if side == "low" else one.low
-                _check(self.controller.compile(design | {one.name: other}))
+                self._check(self.controller.compile(design | {one.name: other}))
 
     def test_the_same_design_is_the_same_law(self) -> None:
         first, second = (self.controller.compile(self.walking_design) for _ in range(2))
@@ -88,17 +92,16 @@ class ControllerContract:
         design = self.walking_design
         designs = np.array([list(design.values())] * 2)
         arguments = (find_scenario(self.scenario), self.name, tuple(design))
-        both = simulate(*arguments, designs).outcome
-        alone = simulate(*arguments, designs[:1]).outcome
+        both = simulate(*arguments, designs, robot=self.robot).outcome
+        alone = simulate(*arguments, designs[:1], robot=self.robot).outcome
         assert both.objectives[:1].tobytes() == alone.objectives.tobytes()
         assert both.objectives[1:].tobytes() == alone.objectives.tobytes()
 
-
-def _check(law: ControlLaw) -> None:
-    assert isinstance(law, ControlLaw)
-    gains = (law.proportional_gain, law.integral_gain, law.derivative_gain)
-    assert all(isinstance(gain, int) for gain in gains)
-    check_gains(law)
+    def _check(self, law: ControlLaw) -> None:
+        assert isinstance(law, ControlLaw)
+        gains = (law.proportional_gain, law.integral_gain, law.derivative_gain)
+        assert all(isinstance(gain, int) for gain in gains)
+        check_gains(law, torque=load_robot(self.robot).is_torque_controlled)
 
 
 def _content(law: ControlLaw) -> list[object]:

@@ -6,9 +6,12 @@ import pytest
 
 from gaitswarm.testing import ControllerContract
 from sim.controllers import CONTROLLERS
+from tests.examples.walks import torque_quadruped_files
 
 
 class TestBuiltIn(ControllerContract):
     @pytest.fixture(autouse=True, params=list(CONTROLLERS.built_in))
     def registered(self, request: pytest.FixtureRequest) -> None:
         self.name = request.param
+        if self.name == "joint-pd":
+            self.robot = torque_quadruped_files()

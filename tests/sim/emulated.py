@@ -94,6 +94,7 @@ class EmulatedLibrary:
             "sums": 8 * self.gaitswarm_integrands(),
             "desired": 4 * joints,
             "disturbance": 8 * joints,
+            "feed_forward": 8 * joints,
             "log": 8 * self.gaitswarm_log_width(),
             "robot": 8 * self.gaitswarm_constants(),
         }
@@ -150,7 +151,7 @@ class _Function:
     def _size(self, walker: Any, owner: Any, name: str) -> int:
         if name == "values":
             return int(owner.n_error * owner.n_current * owner.n_velocity)
-        ticks = walker.ticks if name in ("desired", "disturbance", "log") else 1
+        ticks = walker.ticks if name in ("desired", "disturbance", "feed_forward", "log") else 1
         return int(self._library.sizes[name] * ticks)
 
 

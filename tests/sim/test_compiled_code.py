@@ -17,6 +17,7 @@ from sim.kernel.native import load_kernel, native_kernel
 from sim.kernel.source import kernel_identity, kernel_source
 from sim.kernel.walk import Precision
 from sim.robot import RobotFiles, RobotVariant, load_robot
+from tests.examples.walks import torque_quadruped_files
 from tests.sim.processes import ROOT, run_python
 from tests.sim.sanitized_walks import (
     ROBOTS,
@@ -47,8 +48,17 @@ def quadruped() -> RobotFiles:
         RobotVariant(contact_law="stick"),
         RobotVariant(contact_law="stick", backlash=(2.5, 1.0, 1.0)),
         quadruped(),
+        torque_quadruped_files(),
     ],
-    ids=["linear zone", "karnopp", "dead zone", "stick", "stick and backlash", "quadruped"],
+    ids=[
+        "linear zone",
+        "karnopp",
+        "dead zone",
+        "stick",
+        "stick and backlash",
+        "quadruped",
+        "torque",
+    ],
 )
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_every_robots_kernel_compiles_without_a_warning(

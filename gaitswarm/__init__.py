@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     )
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
+    from gaitswarm.views.comparison import JobComparisonView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView
@@ -168,8 +169,10 @@ __all__ = [
     "Interrupted",
     "InvalidRequest",
     "IterationView",
+    "JobComparisonView",
     "JobEnded",
     "JobEvent",
+    "JobFilter",
     "JobSpec",
     "JobSummaryView",
     "JobView",
@@ -265,6 +268,7 @@ _MODULES: Final = {
         "JobView", "RankingView", "StateView",
     ),
     "gaitswarm.views.calibration": ("TargetsView",),
+    "gaitswarm.views.comparison": ("JobComparisonView",),
     "gaitswarm.views.families": ("ScenarioFamiliesView",),
     "gaitswarm.views.firmware": ("FirmwareView",),
     "gaitswarm.views.certificate": ("CertificateView",),
@@ -281,6 +285,7 @@ _MODULES: Final = {
     "gaitswarm.views.verification": ("VerificationView",),
     "services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
+    "services.optimizer.jobs.labels": ("JobFilter",),
     "services.optimizer.jobs.kinds.identification": ("IdentificationSpec",),
     "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
     "services.optimizer.jobs.kinds.tournament": ("TournamentSpec",),

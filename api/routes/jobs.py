@@ -32,6 +32,7 @@ from gaitswarm.views import (
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from services.optimizer.jobs.labels import JobFilter
 from services.optimizer.jobs.notification import check_url
 from services.optimizer.service import JobService
 
@@ -129,7 +130,7 @@ def submit_job(
     if not new:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
-    return _in_full(service, job)
+    return job_in_full(service, job)
 
 
 @router.post(
@@ -180,7 +181,7 @@ def fork_job(
     if not new:
         response.status_code = status.HTTP_200_OK
     response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
-    return _in_full(service, job)
+    return job_in_full(service, job)
 
 
 @router.post(
@@ -209,24 +210,51 @@ def list_jobs(
         str,
         Query(
             max_length=200,
-            description="Only jobs whose name or id contains this, whatever its case.",
+            description="Only jobs whose name, id, note or tags contain this, whatever its case.",
         ),
     ] = "",
     order: Annotated[
         JobOrder,
         Query(
             description="`created`: newest first; `fitness`: best first, jobs without one last;"
-            " `name`: by name, jobs without one last."
+            " `name`: by name, jobs without one last; `state`: those that wait or run first;"
+            " `evaluations`: most first."
         ),
     ] = JobOrder.CREATED,
+    robot: Annotated[
+        str | None,
+        Query(max_length=200, description="Only jobs of this robot; `own` for users' own."),
+    ] = None,
+    controller: Annotated[
+        str | None, Query(max_length=200, description="Only jobs that tune this controller.")
+    ] = None,
+    preference: Annotated[
+        str | None,
+        Query(max_length=200, description="Only jobs of this preference; `own` for any other."),
+    ] = None,
+    tag: Annotated[
+        str | None, Query(max_length=200, description="Only jobs that have this tag.")
+    ] = None,
+    archived: Annotated[
+        bool | None, Query(description="Only jobs that are archived, or that are not.")
+    ] = None,
     after: Annotated[
         str | None, Query(max_length=200, description="`next` of the page before.")
     ] = None,
     limit: Annotated[int, Query(ge=1, le=200, description="Most jobs on a page.")] = 50,
 ) -> PageView[JobSummaryView]:
     """Jobs with their progress, in pages. Jobs submitted meanwhile do not shift later pages."""
+    where = JobFilter(
+        archived=archived, robot=robot, controller=controller, preference=preference, tag=tag
+    )
     page = service.jobs(
-        state=state, parent=parent, search=search, order=order, after=after, limit=limit
+        state=state,
+        parent=parent,
+        search=search,
+        where=where,
+        order=order,
+        after=after,
+        limit=limit,
     )
     return PageView(items=[JobSummaryView.from_job(job) for job in page.items], next=page.next)
 
@@ -236,7 +264,7 @@ def list_jobs(
 )
 def get_job(job_id: JobId, service: Service) -> JobView:
     """State, progress, rates, estimated time left, best design so far, and why it failed if so."""
-    return _in_full(service, service.job(job_id))
+    return job_in_full(service, service.job(job_id))
 
 
 @router.post(
@@ -252,7 +280,7 @@ def pause_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
 
     409 if it is paused already, or has ended.
     """
-    return _in_full(service, service.command(job_id, Command.PAUSE, actor=actor))
+    return job_in_full(service, service.command(job_id, Command.PAUSE, actor=actor))
 
 
 @router.post(
@@ -279,7 +307,7 @@ def resume_job(
     """
     accept = resumption is not None and resumption.accept_changes
     job = service.command(job_id, Command.RESUME, accept_changes=accept, actor=actor, quota=quota)
-    return _in_full(service, job)
+    return job_in_full(service, job)
 
 
 @router.post(
@@ -306,7 +334,7 @@ def extend_job(
     every time. 409 if the job was cancelled.
     """
     job = service.extend(job_id, extension.iterations, actor=actor, quota=quota)
-    return _in_full(service, job)
+    return job_in_full(service, job)
 
 
 @router.post(
@@ -321,7 +349,7 @@ def cancel_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
 
     409 if it has ended.
     """
-    return _in_full(service, service.command(job_id, Command.CANCEL, actor=actor))
+    return job_in_full(service, service.command(job_id, Command.CANCEL, actor=actor))
 
 
 @router.put(
@@ -342,7 +370,7 @@ def prioritize_job(
     409 if the job has ended.
     """
     check_may_prioritize(token, wanted.priority)
-    return _in_full(service, service.prioritize(job_id, wanted.priority, actor=actor))
+    return job_in_full(service, service.prioritize(job_id, wanted.priority, actor=actor))
 
 
 @router.put(
@@ -354,7 +382,7 @@ def prioritize_job(
 )
 def keep_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     """A job that is kept cannot be deleted, and stays however long ago it ended."""
-    return _in_full(service, service.keep(job_id, kept=True, actor=actor))
+    return job_in_full(service, service.keep(job_id, kept=True, actor=actor))
 
 
 @router.delete(
@@ -366,7 +394,7 @@ def keep_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
 )
 def release_job(job_id: JobId, service: Service, actor: Actor) -> JobView:
     """A server with a time of retention deletes it when it ended longer ago than that."""
-    return _in_full(service, service.keep(job_id, kept=False, actor=actor))
+    return job_in_full(service, service.keep(job_id, kept=False, actor=actor))
 
 
 @router.delete(
@@ -389,6 +417,15 @@ def delete_job(job_id: JobId, service: Service, actor: Actor) -> None:
     service.delete(job_id, actor=actor)
 
 
-def _in_full(service: JobService, job: Job) -> JobView:
+def job_in_full(service: JobService, job: Job) -> JobView:
+    """Make the answer of every route that is about one job.
+
+    Args:
+        service: Where the job is.
+        job: As it was read.
+
+    Returns:
+        The job with its best design.
+    """
     found = job.progress.best_fitness is not None
     return JobView.from_job_and_best(job, service.best(job.id) if found else None)

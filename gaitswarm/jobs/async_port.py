@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self, Unpack
 
 from gaitswarm.jobs.port import JobEvent
 from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from sim.controllers import ControllerName
 from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     )
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
+    from gaitswarm.views.comparison import JobComparisonView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView, RecordingView
@@ -107,6 +109,7 @@ class AsyncJobs(ABC):
         state: JobState | str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]:
@@ -159,6 +162,18 @@ class AsyncJobs(ABC):
         """Give a job that has not ended another priority."""
 
     @abstractmethod
+    async def label(
+        self,
+        job_id: str,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Iterable[str] | None = None,
+        archived: bool | None = None,
+    ) -> JobView:
+        """Write on a job what people want to know of it."""
+
+    @abstractmethod
     async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Protect a job from deletion, or release it."""
 
@@ -200,6 +215,10 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def importance(self, job_id: str) -> ImportanceView:
         """See which variables of a job matter, from what is stored."""
+
+    @abstractmethod
+    async def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
+        """Set jobs beside each other, from what is stored."""
 
     @abstractmethod
     async def preferences(

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from gaitswarm.views import BestView, HistoryIterationView, IterationView, RankingView
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
+    from gaitswarm.views.comparison import JobComparisonView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.importance import ImportanceView
@@ -122,6 +123,22 @@ class Findings(ABC):
         Raises:
             InvalidRequest: The job is of another kind.
             Conflict: It has no design yet, or is too large to be held in memory.
+        """
+
+    @abstractmethod
+    def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
+        """Set jobs beside each other, from what is stored.
+
+        Args:
+            job_ids: One at least, 12 at most, each once.
+
+        Returns:
+            How they converged by iterations, evaluations and time, how the fitness of their designs
+            is distributed, and how their specs differ.
+
+        Raises:
+            InvalidRequest: There are none, too many, or one is named twice.
+            Conflict: One of them is too large to be held in memory.
         """
 
     @abstractmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeAlias, Unpack
 
@@ -12,6 +12,7 @@ from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.jobs.walks import Walks
 from gaitswarm.views import IterationView, StateView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 
 if TYPE_CHECKING:
     from gaitswarm.specs import ForkOptions, SpecInput, SpecOptions
@@ -140,6 +141,7 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         state: JobState | str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
@@ -148,8 +150,10 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         Args:
             state: Only jobs in this state, such as "running".
             parent: Only jobs that were forked from the job of this id.
-            search: Only jobs whose name or id contains this, whatever its case.
-            order: "created" (newest first), "fitness" (best first) or "name".
+            search: Only jobs whose name, id, note or tags contain this, whatever its case.
+            where: Only jobs that this admits, such as `JobFilter(controller="pi")`.
+            order: "created" (newest first), "fitness" (best first), "name", "state" or
+                "evaluations" (most first).
             limit: Most jobs to list; None for all.
 
         Returns:
@@ -257,6 +261,33 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         Raises:
             Conflict: It has ended.
             InvalidRequest: The priority is out of bounds.
+        """
+
+    @abstractmethod
+    def label(
+        self,
+        job_id: str,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Iterable[str] | None = None,
+        archived: bool | None = None,
+    ) -> JobView:
+        """Write on a job what people want to know of it; its spec and its results stay.
+
+        Args:
+            job_id: Identifier of the job.
+            name: Shown in place of the spec's; "" to show that again. None leaves it, as it does
+                with the others.
+            note: Text of any kind.
+            tags: Words to find it by, in place of those before.
+            archived: Whether it is out of the way in lists.
+
+        Returns:
+            The job as it is then.
+
+        Raises:
+            InvalidRequest: A label is too long; names it.
         """
 
     @abstractmethod

@@ -6,7 +6,7 @@ a controller that does not exist is NotFound, as its path on a server is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from typing import Any, TypeVar, cast, get_args
 
@@ -26,6 +26,7 @@ from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.analysis.robustness.certificate import MOST_WORST
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.labels import LabelsChange
 from services.optimizer.jobs.notification import unusable_url
 from services.optimizer.jobs.priority import check_priority
 from sim.controllers import CONTROLLERS, ControllerName
@@ -217,6 +218,27 @@ def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
         InvalidRequest: An argument makes no sense; names it.
     """
     return checked(RankingRequest, {"preference": preference, "top": top})
+
+
+def labels(
+    name: str | None, note: str | None, tags: Iterable[str] | None, archived: bool | None
+) -> LabelsChange:
+    """What to write on a job.
+
+    Args:
+        name: Shown in place of its spec's; None leaves it, as it does with the others.
+        note: Text of any kind.
+        tags: Words to find it by.
+        archived: Whether it is out of the way in lists.
+
+    Returns:
+        The change, checked.
+
+    Raises:
+        InvalidRequest: A label is too long; names it.
+    """
+    words = None if tags is None else tuple(tags)
+    return checked(LabelsChange, {"name": name, "note": note, "tags": words, "archived": archived})
 
 
 def preferences(

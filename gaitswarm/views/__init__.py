@@ -31,6 +31,7 @@ from gaitswarm.views.catalogue import (
     robot_views,
     scenario_views,
 )
+from gaitswarm.views.commands import ExtensionRequest, PriorityRequest, ResumeRequest
 from gaitswarm.views.evaluation import (
     BestView,
     EvaluationView,
@@ -40,11 +41,8 @@ from gaitswarm.views.evaluation import (
 )
 from gaitswarm.views.iteration import HistoryIterationView, IterationView
 from gaitswarm.views.job import (
-    ExtensionRequest,
     JobSummaryView,
     JobView,
-    PriorityRequest,
-    ResumeRequest,
     StateView,
 )
 from gaitswarm.views.links import PREFIX

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.budget import Spent, budget_spent
@@ -16,13 +16,12 @@ from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.iteration import Evaluation
 from services.optimizer.jobs.job import (
-    LARGEST_BUDGET,
     Job,
     JobState,
     UnreadableSpec,
 )
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.priority import HIGHEST, LOWEST
+from services.optimizer.jobs.labels import preference_name, robot_name
 from services.optimizer.jobs.provenance import ProvenanceRecord
 from services.optimizer.jobs.time_left import time_left
 from sim.kernel.walk import Precision
@@ -34,7 +33,10 @@ class JobSummaryView(View):
     """A job and how far it is."""
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
-    name: str = Field(description="Name given by its user.", examples=["chapter 4, preference A"])
+    name: str = Field(
+        description="Name given by its user, with the spec or since.",
+        examples=["chapter 4, preference A"],
+    )
     kind: JobKind | None = Field(
         description="Whether it tunes a drive, fits parameters of the robot to recorded walks, fits"
         " robot and conventions to a table of results, runs a search method many times, or puts a"
@@ -135,6 +137,23 @@ class JobSummaryView(View):
         description="Of a job that was forked from another one: from which, and what it took over;"
         " null for any other. Forks of a job are listed by `/v1/jobs?parent=`.",
     )
+    robot: str | None = Field(
+        default=None,
+        description="Name of its robot, `own` for one of its user's; null if the spec cannot be"
+        " read, or names none.",
+        examples=["szabadka2-reconstructed"],
+    )
+    preference: str | None = Field(
+        default=None,
+        description="Name of the preference that it tunes by, `own` for any other; null for a job"
+        " that tunes nothing.",
+        examples=["A"],
+    )
+    note: str = Field(default="", description="What people have written on it.")
+    tags: list[str] = Field(
+        default_factory=list, description="Words to find it by.", examples=[["thesis"]]
+    )
+    archived: bool = Field(default=False, description="Whether it is out of the way in lists.")
     owner: str | None = Field(
         default=None,
         description="Name of the token that it was submitted with; null for none.",
@@ -256,43 +275,6 @@ class JobView(JobSummaryView):
         )
 
 
-class ExtensionRequest(BaseModel):
-    """Another budget for a job."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    iterations: int = Field(
-        ge=1,
-        le=LARGEST_BUDGET,
-        description="Budget in all, in iterations of `particles` designs each: more than the job"
-        " has spent [1].",
-        examples=[50],
-    )
-
-
-class ResumeRequest(BaseModel):
-    """How a job goes on."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    accept_changes: bool = Field(
-        default=False,
-        description="Whether it goes on although what its numbers depend on has changed, which is"
-        " then recorded in its `provenance`. Otherwise such a job fails and says what has changed.",
-        examples=[True],
-    )
-
-
-class PriorityRequest(BaseModel):
-    """Another priority for a job."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    priority: int = Field(
-        ge=LOWEST, le=HIGHEST, description="The higher, the sooner; 0 is usual [1].", examples=[5]
-    )
-
-
 class StateView(View):
     """A change of a job's state, as the event stream tells it."""
 
@@ -348,6 +330,10 @@ def _summary(job: Job) -> dict[str, object]:
         "owner": job.owner,
         "kept": job.kept,
         "priority": job.priority,
+        "name": job.name,
+        "note": job.labels.note,
+        "tags": job.labels.tags,
+        "archived": job.archived,
         "created_at": job.created_at,
         "updated_at": job.updated_at,
         "started_at": job.started_at,
@@ -374,8 +360,9 @@ def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
     else:
         kind, scenarios, particles = spec.kind, _walked(spec), spec.optimizer.particles
     return {
-        "name": spec.name,
         "kind": kind,
+        "robot": robot_name(getattr(spec, "robot", None)),
+        "preference": preference_name(getattr(spec, "preference", None)),
         "controller": spec.controller if isinstance(spec, JobSpec) else None,
         "scenarios": scenarios,
         "precision": None if isinstance(spec, UnreadableSpec) else spec.precision,

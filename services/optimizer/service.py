@@ -20,10 +20,12 @@ from services.optimizer.jobs.estimate import Estimate, MeasuredRates, checked_le
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.iteration import Evaluation, Iteration
 from services.optimizer.jobs.job import Claim, Job, JobOrder, JobState, refusal
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.jobs.priority import check_priority
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
+from services.optimizer.labelling import Labelling
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from services.optimizer.run.runner import runner_name
 from services.optimizer.store.reading import Page
@@ -34,7 +36,7 @@ _EARLIER: Final = 50
 
 
 @dataclass(frozen=True, slots=True)
-class JobService(Questions, Commands, Deletion):
+class JobService(Questions, Commands, Deletion, Labelling):
     """Jobs as their users see them. Thread-safe, as the store is.
 
     Attributes:
@@ -256,6 +258,7 @@ class JobService(Questions, Commands, Deletion):
         kind: str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
         limit: int = 50,
@@ -266,7 +269,8 @@ class JobService(Questions, Commands, Deletion):
             state: only jobs in it; None for any.
             kind: only jobs whose specs say that they are of this kind; None for any.
             parent: only jobs that were forked from the job of this id; None for any.
-            search: only jobs whose name or id contains this, whatever its case.
+            search: only jobs whose name, id, note or tags contain this, whatever its case.
+            where: only jobs that this admits.
             order: how they are sorted.
             after: `next` of the page before, of the same order.
             limit: most jobs on a page.
@@ -282,6 +286,7 @@ class JobService(Questions, Commands, Deletion):
             kind=kind,
             parent=parent,
             search=search,
+            where=where,
             order=order,
             after=after,
             limit=limit,

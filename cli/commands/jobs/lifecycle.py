@@ -76,10 +76,28 @@ def list_jobs(
         str | None, typer.Option(metavar="ID", help="Only jobs that were forked from this one.")
     ] = None,
     search: Annotated[
-        str, typer.Option(metavar="TEXT", help="Only jobs whose name or id contains this.")
+        str,
+        typer.Option(metavar="TEXT", help="Only jobs whose name, id, note or tags contain this."),
     ] = "",
+    robot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Only jobs of this robot, or of `own` ones.")
+    ] = None,
+    controller: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Only jobs that tune this controller.")
+    ] = None,
+    preference: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Only jobs of this preference, or of `own`.")
+    ] = None,
+    tag: Annotated[str | None, typer.Option(help="Only jobs that have this tag.")] = None,
+    archived: Annotated[
+        bool | None,
+        typer.Option("--archived/--not-archived", help="Only jobs that are archived, or are not."),
+    ] = None,
     order: Annotated[
-        str, typer.Option(help="created (newest first), fitness (best first) or name.")
+        str,
+        typer.Option(
+            help="created (newest first), fitness (best first), name, state or evaluations."
+        ),
     ] = "created",
     limit: Annotated[int, typer.Option(min=1, help="Most jobs to list.")] = 50,
     server: Server = None,
@@ -91,12 +109,18 @@ def list_jobs(
     from cli.tables import jobs_table
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.jobs.job import JobOrder, JobState
+    from services.optimizer.jobs.labels import JobFilter
 
     in_state = None if state is None else _one_of(JobState, state, "state")
     sorted_by = _one_of(JobOrder, order, "order")
     with open_jobs(server, db) as jobs:
         found = jobs.jobs(
-            state=in_state, parent=forks_of, search=search, order=sorted_by, limit=limit
+            state=in_state,
+            parent=forks_of,
+            search=search,
+            where=JobFilter(archived, robot, controller, preference, tag),
+            order=sorted_by,
+            limit=limit,
         )
         if as_json:
             print_json_list(found)

@@ -22,6 +22,7 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
+from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
@@ -82,6 +83,11 @@ class AsyncDatabaseFindings(ABC):
         """Estimate indices from what is stored, in a thread."""
         jobs = await self._jobs()
         return await to_thread.run_sync(partial(jobs.importance, job_id))
+
+    async def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
+        """Compare jobs from what is stored, in a thread."""
+        jobs = await self._jobs()
+        return await to_thread.run_sync(partial(jobs.comparison, job_ids))
 
     async def preferences(
         self,

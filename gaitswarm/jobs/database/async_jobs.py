@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from functools import partial
 from typing import Self, TypeVar, Unpack
 
@@ -32,6 +32,7 @@ from gaitswarm.views import (
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.evaluator import Evaluator
 from services.runtime import EvaluatorKind
 from sim.identification.recorded_walk import RecordedWalk
@@ -184,13 +185,20 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         state: JobState | str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]:
         """List the database's jobs, read by pages."""
         jobs = await self._jobs()
         found = partial(
-            jobs.jobs, state=state, parent=parent, search=search, order=order, limit=limit
+            jobs.jobs,
+            state=state,
+            parent=parent,
+            search=search,
+            where=where,
+            order=order,
+            limit=limit,
         )
         async for job in iterated(found):
             yield job
@@ -217,6 +225,20 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         """Write another priority for a job; a process that runs it sees that."""
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.prioritize, job_id, priority)
+
+    async def label(
+        self,
+        job_id: str,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Iterable[str] | None = None,
+        archived: bool | None = None,
+    ) -> JobView:
+        """Write on a job of the database, in a thread."""
+        jobs = await self._jobs()
+        call = partial(jobs.label, job_id, name=name, note=note, tags=tags, archived=archived)
+        return await to_thread.run_sync(call)
 
     async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Write that a job is kept, or is not."""

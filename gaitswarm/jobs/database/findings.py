@@ -10,6 +10,7 @@ from gaitswarm.jobs.findings import Findings
 from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.requests import arguments
 from gaitswarm.requests.certificate import run_certificate
+from gaitswarm.requests.comparison import run_comparison
 from gaitswarm.requests.families import run_scenario_families
 from gaitswarm.requests.importance import run_importance
 from gaitswarm.requests.preferences import run_preferences
@@ -25,6 +26,7 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
+from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
@@ -86,6 +88,10 @@ class DatabaseFindings(Findings, Tournaments):
     def importance(self, job_id: str) -> ImportanceView:
         """Estimate indices from what is stored."""
         return run_importance(self._service, job_id)
+
+    def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
+        """Compare jobs from what is stored."""
+        return run_comparison(self._service, arguments.runs(job_ids))
 
     def preferences(
         self,

@@ -6,7 +6,7 @@ import os
 import shlex
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from typing import Final, Unpack
 
@@ -29,6 +29,7 @@ from gaitswarm.views import (
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingView
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
 from services.runtime import EvaluatorKind
@@ -194,11 +195,12 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         state: JobState | str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List the database's jobs, read by pages."""
-        found = self._all(arguments.state(state), parent, search, arguments.order(order))
+        found = self._all(arguments.state(state), parent, search, where, arguments.order(order))
         return map(JobSummaryView.from_job, islice(found, limit))
 
     def job(self, job_id: str) -> JobView:
@@ -219,6 +221,19 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
     def prioritize(self, job_id: str, priority: int) -> JobView:
         """Write another priority for a job; a process that runs it sees that."""
         return self._in_full(self._service.prioritize(job_id, arguments.priority(priority)))
+
+    def label(
+        self,
+        job_id: str,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Iterable[str] | None = None,
+        archived: bool | None = None,
+    ) -> JobView:
+        """Write on a job of the database."""
+        change = arguments.labels(name, note, tags, archived)
+        return self._in_full(self._service.label(job_id, change))
 
     def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Write that a job is kept, or is not."""
@@ -281,12 +296,23 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         self._service.store.close()
 
     def _all(
-        self, state: JobState | None, parent: str | None, search: str, order: JobOrder
+        self,
+        state: JobState | None,
+        parent: str | None,
+        search: str,
+        where: JobFilter,
+        order: JobOrder,
     ) -> Iterator[Job]:
         after: str | None = None
         while True:
             page = self._service.jobs(
-                state=state, parent=parent, search=search, order=order, after=after, limit=PAGE
+                state=state,
+                parent=parent,
+                search=search,
+                where=where,
+                order=order,
+                after=after,
+                limit=PAGE,
             )
             yield from page.items
             if page.next is None:

@@ -29,6 +29,7 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
+from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
@@ -96,6 +97,10 @@ class AsyncServerFindings(ABC):
     async def importance(self, job_id: str) -> ImportanceView:
         """Let the server estimate indices."""
         return await self._send(calls.importance(job_id))
+
+    async def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
+        """Let the server compare jobs."""
+        return await self._send(calls.comparison(arguments.runs(job_ids)))
 
     async def preferences(
         self,

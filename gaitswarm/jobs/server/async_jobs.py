@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 from typing import TypeVar, Unpack
 
@@ -49,6 +49,7 @@ from gaitswarm.views import (
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.outage import Backoff
 from sim.identification.recorded_walk import RecordedWalk
 
@@ -137,13 +138,16 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         state: JobState | str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]:
         """List the server's jobs, page by page."""
         wanted, sorted_by = arguments.state(state), arguments.order(order)
         left = limit
-        pages = self._items(lambda after: calls.jobs(wanted, parent, search, sorted_by, after))
+        pages = self._items(
+            lambda after: calls.jobs(wanted, parent, search, where, sorted_by, after)
+        )
         async for job in pages:
             if left is not None:
                 if left <= 0:
@@ -169,6 +173,20 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
     async def prioritize(self, job_id: str, priority: int) -> JobView:
         """Send another priority for a job."""
         return await self._send(job_calls.prioritize(job_id, priority))
+
+    async def label(
+        self,
+        job_id: str,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Iterable[str] | None = None,
+        archived: bool | None = None,
+    ) -> JobView:
+        """Let the server write on a job."""
+        return await self._send(
+            job_calls.label(job_id, arguments.labels(name, note, tags, archived))
+        )
 
     async def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Let the server keep a job, or release it."""

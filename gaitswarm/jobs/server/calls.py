@@ -6,6 +6,7 @@ The client that blocks and the one that does not send the same ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
 from gaitswarm.jobs.server.call import Call, got, job_path, page, posted, segment
 from gaitswarm.requests.preferences import PreferencesRequest
@@ -24,6 +25,7 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
+from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView, RecordingView
 from gaitswarm.views.importance import ImportanceView
@@ -37,6 +39,7 @@ from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from services.optimizer.analysis.fits.targets import LeaveOut
 from services.optimizer.jobs.job import JobOrder, JobState
+from services.optimizer.jobs.labels import JobFilter
 from services.optimizer.jobs.spec import Spec
 from sim.identification.recorded_walk import RecordedWalk
 
@@ -51,14 +54,20 @@ def estimate(spec: Spec) -> Call[EstimateView]:
 
 
 def jobs(
-    state: JobState | None, parent: str | None, search: str, order: JobOrder, after: str | None
+    state: JobState | None,
+    parent: str | None,
+    search: str,
+    where: JobFilter,
+    order: JobOrder,
+    after: str | None,
 ) -> Call[PageView[JobSummaryView]]:
     """A page of the list of jobs.
 
     Args:
         state: Of the jobs; None for any.
         parent: Identifier of the job that they were forked from; None for any.
-        search: Text that name or id contains, whatever its case.
+        search: Text that name, id, note or tags contain, whatever its case.
+        where: Admits the jobs.
         order: In which they are listed.
         after: `next` of the page before; None for the first page.
     """
@@ -67,6 +76,9 @@ def jobs(
         chosen["state"] = state.value
     if parent is not None:
         chosen["parent"] = parent
+    for name, value in asdict(where).items():
+        if value is not None:
+            chosen[name] = str(value).lower() if isinstance(value, bool) else value
     return page("/jobs", PageView[JobSummaryView], after, chosen)
 
 
@@ -193,6 +205,17 @@ def importance(job_id: str) -> Call[ImportanceView]:
         job_id: Identifier of the job.
     """
     return got(f"{job_path(job_id)}/importance", ImportanceView)
+
+
+def comparison(job_ids: Sequence[str]) -> Call[JobComparisonView]:
+    """Set jobs beside each other.
+
+    Args:
+        job_ids: Identifiers of the jobs, at least one.
+    """
+    first, *others = job_ids
+    path = f"{job_path(first)}/comparison"
+    return Call("GET", path, JobComparisonView.model_validate_json, {"also": others})
 
 
 def preferences(job_id: str, request: PreferencesRequest) -> Call[RobustPreferencesView]:

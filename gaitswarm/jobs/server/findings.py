@@ -31,6 +31,7 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
+from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
@@ -95,6 +96,10 @@ class ServerFindings(Findings, Tournaments, ABC):
     def importance(self, job_id: str) -> ImportanceView:
         """Let the server estimate indices."""
         return self._send(calls.importance(job_id))
+
+    def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
+        """Let the server compare jobs."""
+        return self._send(calls.comparison(arguments.runs(job_ids)))
 
     def preferences(
         self,

@@ -16,6 +16,7 @@ from gaitswarm.requests import arguments
 from gaitswarm.views import JobView
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command
+from services.optimizer.jobs.labels import LabelsChange
 from services.optimizer.jobs.priority import DEFAULT
 from services.optimizer.jobs.spec import Spec
 
@@ -98,6 +99,17 @@ def prioritize(job_id: str, priority: int) -> Call[JobView]:
     """
     body = json.dumps({"priority": arguments.priority(priority)})
     return Call("PUT", f"{job_path(job_id)}/priority", JobView.model_validate_json, body=body)
+
+
+def label(job_id: str, change: LabelsChange) -> Call[JobView]:
+    """Write on a job.
+
+    Args:
+        job_id: Identifier of the job.
+        change: What is to be different.
+    """
+    body = change.model_dump_json(exclude_none=True)
+    return Call("PATCH", job_path(job_id), JobView.model_validate_json, body=body)
 
 
 def keep(job_id: str, kept: bool) -> Call[JobView]:

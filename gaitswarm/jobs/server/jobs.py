@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
 from typing import Final, TypeVar, Unpack
@@ -47,6 +47,7 @@ from gaitswarm.views import (
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.outage import Backoff
 from sim.identification.recorded_walk import RecordedWalk
 
@@ -147,12 +148,15 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
         state: JobState | str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List the server's jobs, page by page."""
         wanted, sorted_by = arguments.state(state), arguments.order(order)
-        found = self._items(lambda after: calls.jobs(wanted, parent, search, sorted_by, after))
+        found = self._items(
+            lambda after: calls.jobs(wanted, parent, search, where, sorted_by, after)
+        )
         return islice(found, limit)
 
     def job(self, job_id: str) -> JobView:
@@ -173,6 +177,18 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
     def prioritize(self, job_id: str, priority: int) -> JobView:
         """Send another priority for a job."""
         return self._send(job_calls.prioritize(job_id, priority))
+
+    def label(
+        self,
+        job_id: str,
+        *,
+        name: str | None = None,
+        note: str | None = None,
+        tags: Iterable[str] | None = None,
+        archived: bool | None = None,
+    ) -> JobView:
+        """Let the server write on a job."""
+        return self._send(job_calls.label(job_id, arguments.labels(name, note, tags, archived)))
 
     def keep(self, job_id: str, *, kept: bool = True) -> JobView:
         """Let the server keep a job, or release it."""

@@ -29,6 +29,7 @@ class AuditAction(StrEnum):
     DELETE = "delete"
     KEEP = "keep"
     RELEASE = "release"
+    LABEL = "label"
     ADD_RECORDING = "add_recording"
     CREATE_TOKEN = "create_token"  # noqa: S105
     REVOKE_TOKEN = "revoke_token"  # noqa: S105

@@ -12,6 +12,7 @@ from services.optimizer.errors import Conflict, InvalidRequest, Unreadable
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.iteration import Answered, Ask
+from services.optimizer.jobs.labels import Labels
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, changes_since
 from sim.identification.recorded_walk import Recordings
 
@@ -58,6 +59,10 @@ class JobOrder(StrEnum):
     """Best fitness first, jobs without one last."""
     NAME = "name"
     """By name whatever its case, jobs without one last."""
+    STATE = "state"
+    """Those that wait or run first, then those that have ended."""
+    EVALUATIONS = "evaluations"
+    """Most evaluations first."""
 
 
 TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
@@ -204,6 +209,8 @@ class Job:
         waiting: what it waits for while it runs, such as workers that are away; None if nothing.
         priority: the higher, the sooner it is claimed and the more slots its walks get; see
             `priority.py`.
+        labels: what people have written on it.
+        archived: whether it is out of the way in lists.
     """
 
     id: str
@@ -223,6 +230,13 @@ class Job:
     submitted_iterations: int = 0
     waiting: str | None = None
     priority: int = 0
+    labels: Labels = field(default_factory=Labels)
+    archived: bool = False
+
+    @property
+    def name(self) -> str:
+        """What it is called: by its user since, or else by its spec; "" for neither."""
+        return self.labels.name or self.stored_spec.name
 
     @property
     def spec(self) -> AnySpec:

@@ -15,17 +15,19 @@ from services.optimizer.jobs.job import (
     JobOrder,
     JobState,
 )
+from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.jobs.notification import Outbox
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.deletions import Deletions
+from services.optimizer.store.labelling import Labelling
 from services.optimizer.store.reading import Changes, CommittedHistory, Page, Queue
 from services.optimizer.store.running import Runs
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
-class Store(CommittedHistory, Deletions, Runs, Protocol):
+class Store(CommittedHistory, Deletions, Labelling, Runs, Protocol):
     """Thread-safe. Every method is one transaction: it happens wholly or not at all.
 
     Methods that take an id raise NotFound for an unknown one. Methods that take a claim raise
@@ -125,6 +127,7 @@ class Store(CommittedHistory, Deletions, Runs, Protocol):
         kind: str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
         limit: int = 50,
@@ -135,7 +138,8 @@ class Store(CommittedHistory, Deletions, Runs, Protocol):
             state: Only jobs in this state.
             kind: Only jobs whose specs say that they are of this kind.
             parent: Only jobs that were forked from the job of this id.
-            search: Only jobs whose name or id contains this, whatever its case.
+            search: Only jobs whose name, id, note or tags contain this, whatever its case.
+            where: Only jobs that this admits.
             order: By what they are sorted.
             after: `next` of the page before.
             limit: Most jobs on the page.

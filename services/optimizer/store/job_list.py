@@ -16,9 +16,6 @@ from sqlalchemy import (
     ColumnElement,
     Connection,
     Select,
-    Text,
-    case,
-    cast,
     false,
     func,
     select,
@@ -27,7 +24,9 @@ from sqlalchemy import (
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import Job, JobOrder, JobState
+from services.optimizer.jobs.labels import JobFilter
 from services.optimizer.store.job_views import SHOWN, shown_job
+from services.optimizer.store.labels import facet_columns, spec_field, to_facets
 from services.optimizer.store.reading import Page
 from services.optimizer.store.records import ID_ALPHABET, is_job_id
 from services.optimizer.store.rows import Row
@@ -35,7 +34,8 @@ from services.optimizer.store.tables import EXISTING, jobs
 
 _CURSOR: Final = re.compile(rf"([0-9]{{1,18}})\.([{ID_ALPHABET}]{{12}})", re.ASCII)
 _FITNESS_CURSOR: Final = re.compile(rf"fitness:([0-9.e+-]*):([{ID_ALPHABET}]{{12}})", re.ASCII)
-_NAME_CURSOR: Final = re.compile(rf"name:([{ID_ALPHABET}]{{12}})", re.ASCII)
+_PLACE_CURSOR: Final = re.compile(rf"([a-z]+):([{ID_ALPHABET}]{{12}})", re.ASCII)
+_STATES: Final = tuple(JobState)
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -107,22 +107,24 @@ def from_fitness_cursor(text: str) -> tuple[float | None, str]:
     raise no_cursor()
 
 
-def to_name_cursor(job_id: str) -> str:
-    """Place of a job in the list by name; a name may be long, and never changes.
+def to_place_cursor(order: JobOrder, job_id: str) -> str:
+    """Place of a job in a list whose order says nothing that fits into a cursor, as a long name.
 
     Args:
-        job_id: Of the job.
+        order: Of the list.
+        job_id: Of the job; a page goes on from where the job is by then.
 
     Returns:
         The cursor.
     """
-    return f"name:{job_id}"
+    return f"{order}:{job_id}"
 
 
-def from_name_cursor(text: str) -> str:
-    """Inverse of `to_name_cursor`.
+def from_place_cursor(order: JobOrder, text: str) -> str:
+    """Inverse of `to_place_cursor`.
 
     Args:
+        order: Of the list.
         text: What a page ended with.
 
     Returns:
@@ -131,10 +133,10 @@ def from_name_cursor(text: str) -> str:
     Raises:
         InvalidRequest: It is no such cursor; names the field `after`.
     """
-    match = _NAME_CURSOR.fullmatch(text)
-    if match is None:
+    match = _PLACE_CURSOR.fullmatch(text)
+    if match is None or match[1] != order:
         raise no_cursor()
-    return match[1]
+    return match[2]
 
 
 def no_cursor() -> InvalidRequest:
@@ -149,17 +151,20 @@ Among = tuple[ColumnElement[bool], ...]
 """Conditions on jobs, all of which hold for those that are wanted."""
 
 
-def among_jobs(state: JobState | None, parent: str | None) -> Among:
+def among_jobs(state: JobState | None, parent: str | None, archived: bool | None = None) -> Among:
     """Conditions on jobs that the database itself can tell.
 
     Args:
         state: Only jobs in this state; None for any.
         parent: Only jobs that were forked from the job of this id; None for any.
+        archived: Only jobs that are archived, or that are not; None for both.
 
     Returns:
         The conditions.
     """
     found: list[ColumnElement[bool]] = [EXISTING]
+    if archived is not None:
+        found.append(func.coalesce(jobs.c.archived, False).is_(archived))
     if state is not None:
         found.append(jobs.c.state == state)
     # An id that is none might have characters that a database refuses.
@@ -235,8 +240,25 @@ class _Entry(NamedTuple):
 
     id: str
     created_at: datetime
-    name: str
-    best_fitness: float | None
+    spec_name: str = ""
+    best_fitness: float | None = None
+    evaluations: int = 0
+    state: str = ""
+    labels: Any = None
+
+    @property
+    def name(self) -> str:
+        """As it is shown: its user's, or else its spec's."""
+        return str(self._label("name") or self.spec_name)
+
+    @property
+    def words(self) -> str:
+        """All that a search looks through, in one case."""
+        written = (self.name, self.id, self._label("note") or "", *(self._label("tags") or ()))
+        return "\n".join(written).casefold()
+
+    def _label(self, name: str) -> Any:
+        return self.labels.get(name) if isinstance(self.labels, dict) else None
 
 
 def sort_jobs(
@@ -245,6 +267,7 @@ def sort_jobs(
     among: Among,
     kind: str | None,
     search: str,
+    where: JobFilter,
     order: JobOrder,
     after: str | None,
 ) -> list[str]:
@@ -254,7 +277,8 @@ def sort_jobs(
         connection: An open transaction.
         among: Only jobs for which these hold.
         kind: Only jobs whose specs say that they are of this kind.
-        search: Only jobs whose name or id contains this, whatever its case.
+        search: Only jobs whose name, id, note or tags contain this, whatever its case.
+        where: Only jobs that this admits.
         order: By what they are sorted.
         after: Only jobs after this cursor.
 
@@ -267,12 +291,16 @@ def sort_jobs(
     query = _entries(connection).where(*among)
     if kind is not None:
         query = query.where(spec_field(connection, "kind") == kind)
-    wanted = search.casefold()
-    found = [
-        entry
-        for entry in map(_Entry._make, connection.execute(query))
-        if wanted in entry.name.casefold() or wanted in entry.id
-    ]
+    if where.needs_specs:
+        query = query.add_columns(*facet_columns(connection))
+    width, wanted = len(_Entry._fields), search.casefold()
+    found = []
+    for row in connection.execute(query):
+        entry = _Entry._make(row[:width])
+        if where.needs_specs and not where.admits(to_facets(row[width:])):
+            continue
+        if wanted in entry.words:
+            found.append(entry)
     newest_first = order is JobOrder.CREATED
     places = sorted(((_place(entry, order), entry.id) for entry in found), reverse=newest_first)
     if after is not None:
@@ -281,30 +309,17 @@ def sort_jobs(
     return [job_id for _, job_id in places]
 
 
-def _entries(connection: Connection) -> Select[tuple[str, datetime, str, float | None]]:
+def _entries(connection: Connection) -> Select[Any]:
     """A row of what `_Entry` holds for every job."""
-    return select(jobs.c.id, jobs.c.created_at, spec_field(connection, "name"), jobs.c.best_fitness)
-
-
-def spec_field(connection: Connection, name: str) -> ColumnElement[str]:
-    """Select a text of a job's spec.
-
-    Args:
-        connection: Tells the dialect.
-        name: Of a field of the spec.
-
-    Returns:
-        The text; "" where the spec has none of this name, or is no JSON.
-    """
-    document = cast(jobs.c.spec, Text)
-    if connection.dialect.name == "sqlite":
-        # It keeps any text, and fails at a path into one that is not JSON.
-        is_readable: ColumnElement[bool] = func.json_valid(document)
-    else:
-        # A zero byte, as JSON spells it, makes PostgreSQL fail at any path into the document.
-        is_readable = func.strpos(document, r"\u0000") == 0
-    found = case((is_readable, jobs.c.spec[name].as_string()), else_="")
-    return func.coalesce(cast(found, Text), "")
+    return select(
+        jobs.c.id,
+        jobs.c.created_at,
+        spec_field(connection, "name"),
+        jobs.c.best_fitness,
+        jobs.c.evaluations,
+        jobs.c.state,
+        jobs.c.labels,
+    )
 
 
 def job_rows(connection: Connection, ids: Sequence[str]) -> list[Row]:
@@ -337,8 +352,8 @@ def cursor_of(row: Row, order: JobOrder) -> str:
             return to_cursor(row["created_at"], row["id"])
         case JobOrder.FITNESS:
             return to_fitness_cursor(row["best_fitness"], row["id"])
-        case JobOrder.NAME:
-            return to_name_cursor(row["id"])
+        case _:
+            return to_place_cursor(order, row["id"])
 
 
 def _place(entry: _Entry, order: JobOrder) -> tuple[Any, ...]:
@@ -351,20 +366,24 @@ def _place(entry: _Entry, order: JobOrder) -> tuple[Any, ...]:
             return (fitness, entry.id)
         case JobOrder.NAME:
             return (not entry.name, entry.name.casefold(), entry.id)
+        case JobOrder.STATE:
+            return (_STATES.index(entry.state), entry.id)
+        case JobOrder.EVALUATIONS:
+            return (-entry.evaluations, entry.id)
 
 
 def _entry_before(connection: Connection, cursor: str, order: JobOrder) -> _Entry:
-    """The job that a page ended with, as it was then; only its place counts."""
+    """The job that a page ended with, as it was then or as it is; only its place counts."""
     nowhen = datetime.max.replace(tzinfo=UTC)
     match order:
         case JobOrder.CREATED:
             created_at, job_id = from_cursor(cursor)
-            return _Entry(job_id, created_at, "", None)
+            return _Entry(job_id, created_at)
         case JobOrder.FITNESS:
             fitness, job_id = from_fitness_cursor(cursor)
-            return _Entry(job_id, nowhen, "", fitness)
-        case JobOrder.NAME:
-            job_id = from_name_cursor(cursor)
+            return _Entry(job_id, nowhen, best_fitness=fitness)
+        case _:
+            job_id = from_place_cursor(order, cursor)
             row = connection.execute(_entries(connection).where(jobs.c.id == job_id)).first()
             if row is None:
                 raise no_cursor()

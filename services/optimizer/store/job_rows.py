@@ -14,6 +14,7 @@ from services.optimizer.jobs.chain import ChainDocuments
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
+from services.optimizer.jobs.labels import Labels
 from services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows import Row
@@ -109,7 +110,24 @@ def to_job(row: Row, documents: JobDocuments | None = None) -> Job:
         submitted_iterations=submitted_iterations,
         waiting=row["waiting"],
         priority=row["priority"],
+        labels=labels_of(row),
+        archived=bool(row["archived"]),
     )
+
+
+def labels_of(row: Row) -> Labels:
+    """What people have written on a job.
+
+    Args:
+        row: The job's row.
+
+    Returns:
+        Its labels; none where they cannot be read, as nothing depends on them.
+    """
+    try:
+        return Labels() if row["labels"] is None else Labels.model_validate(row["labels"])
+    except ValidationError:
+        return Labels()
 
 
 def submitted_spec(row: Row) -> AnySpec | UnreadableSpec:

@@ -8,7 +8,7 @@ from typing import Final
 from sqlalchemy import Connection, func, select
 
 from services.optimizer.jobs.job import JobState
-from services.optimizer.store.job_list import spec_field
+from services.optimizer.store.labels import spec_field
 from services.optimizer.store.reading import Queue
 from services.optimizer.store.tables import EXISTING, jobs
 

@@ -20,6 +20,7 @@ from services.optimizer.jobs.job import (
     commanded,
     extended,
 )
+from services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
 from services.optimizer.jobs.priority import check_can_be_prioritized
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.quota import Quota
@@ -52,6 +53,7 @@ from services.optimizer.store.job_list import (
 )
 from services.optimizer.store.job_rows import request_digest, to_job
 from services.optimizer.store.job_views import shown_job
+from services.optimizer.store.labels import count_facets, label_job
 from services.optimizer.store.migrate import create
 from services.optimizer.store.outbox import SqlOutbox
 from services.optimizer.store.queue import count_jobs
@@ -198,25 +200,44 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
         kind: str | None = None,
         parent: str | None = None,
         search: str = "",
+        where: JobFilter = ANY_JOB,
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
         limit: int = 50,
     ) -> Page[Job]:
         """Read a page of jobs."""
         limit = checked_limit(limit)
-        among = among_jobs(state, parent)
+        among = among_jobs(state, parent, where.archived)
         listed = _LISTED.get(order)
-        if not search and kind is None and listed is not None:
+        plain = not search and kind is None and not where.needs_specs
+        if plain and listed is not None:
             with self._database.transaction(write=False) as connection:
                 return listed(connection, among, after, limit)
         with self._database.transaction(write=False) as connection:
             found = sort_jobs(
-                connection, among=among, kind=kind, search=search, order=order, after=after
+                connection,
+                among=among,
+                kind=kind,
+                search=search,
+                where=where,
+                order=order,
+                after=after,
             )
             ids, more = found[:limit], len(found) > limit
             rows = job_rows(connection, ids)
         following = cursor_of(rows[-1], order) if more else None
         return Page(tuple(map(shown_job, rows)), following)
+
+    def facets(self, *, archived: bool | None = None) -> FacetCounts:
+        """Count jobs by what they are found by."""
+        with self._database.transaction(write=False) as connection:
+            return count_facets(connection, among_jobs(None, None, archived))
+
+    def label(self, job_id: str, change: LabelsChange, *, actor: str = LOCAL) -> Job:
+        """Change what is written on a job."""
+        with self._database.transaction(write=True) as connection:
+            now = self._clock(connection)
+            return to_job(label_job(connection, job_id, change, now=now, actor=actor))
 
     def queue(self) -> Queue:
         """Count the jobs."""

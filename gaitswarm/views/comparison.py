@@ -1,0 +1,75 @@
+"""Jobs beside each other: how they converged, how designs are spread, how specs differ."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from gaitswarm.views.base import View
+from services.optimizer.jobs.job import JobState
+
+
+class ConvergenceView(View):
+    """The best of a job as it went on; some of its iterations, the last among them."""
+
+    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    iterations: list[int] = Field(description="Index of each of them, from 0.", examples=[[0, 24]])
+    evaluations: list[int] = Field(description="Designs judged by then [1].", examples=[[25, 625]])
+    seconds: list[float] = Field(
+        description="Time spent in evaluating by then [s].", examples=[[0.6, 14.8]]
+    )
+    best_so_far: list[float | None] = Field(
+        description="Least fitness by then; null while every design has failed.",
+        examples=[[31.0, 17.2]],
+    )
+
+
+class ConvergencesView(View):
+    """The best of several jobs as they went on."""
+
+    items: list[ConvergenceView] = Field(
+        description="Jobs in the order in which they were asked for; those that are gone are left"
+        " out."
+    )
+
+
+class ComparedJobView(View):
+    """One of several jobs."""
+
+    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    name: str = Field(description="Name of the job.", examples=["chapter 4, preference A"])
+    state: JobState = Field(description="The state that it is in.", examples=["succeeded"])
+    best_fitness: float | None = Field(
+        description="Least fitness so far; null while every design has failed.", examples=[17.2]
+    )
+    evaluations: int = Field(description="Designs judged so far [1].", examples=[625])
+    failed: int = Field(description="Of these, those that failed [1].", examples=[12])
+    convergence: ConvergenceView = Field(description="How it came to its best.")
+    shares: list[float] = Field(
+        description="Shares of its designs that walk in every case, rising from 0 to 1 [1].",
+        examples=[[0.0, 0.5, 1.0]],
+    )
+    fitness: list[float] = Field(
+        description="Fitness that each of these shares is within: its distribution function.",
+        examples=[[17.2, 25.1, 310.0]],
+    )
+
+
+class SpecDifferenceView(View):
+    """What the specs of jobs say differently."""
+
+    field: str = Field(description="Path of the field.", examples=["optimizer.particles"])
+    values: list[str | None] = Field(
+        description="As JSON, of each job in its order; null where a spec has none.",
+        examples=[["25", "50"]],
+    )
+
+
+class JobComparisonView(View):
+    """Jobs beside each other, from what is stored; nothing is simulated."""
+
+    jobs: list[ComparedJobView] = Field(description="In the order in which they were asked for.")
+    differences: list[SpecDifferenceView] = Field(description="Fields whose values differ.")
+    comparable: bool = Field(
+        description="Whether all judge by the same measure: kind, robot, scenarios, preference and"
+        " worlds. If not, their fitness is not the same quantity."
+    )

@@ -1,0 +1,75 @@
+"""Jobs beside each other, over HTTP."""
+
+from __future__ import annotations
+
+import httpx2
+import pytest
+
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.search.swarm.pso import PsoSettings
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import PARTICLES, Commit
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def other(store: SqlStore, spec: JobSpec) -> Job:
+    """As `job`, of another seed, budget and swarm."""
+    settings = PsoSettings(particles=PARTICLES, inertia_end=0.3)
+    changes = {"seed": 9, "iterations": 2, "optimizer": settings, "name": "other"}
+    return store.create_job(spec.model_copy(update=changes))[0]
+
+
+def test_jobs_stand_beside_each_other_with_what_their_specs_say_differently(
+    client: httpx2.Client, job: Job, other: Job, commit: Commit
+) -> None:
+    commit(job, 3)
+    commit(other, 1)
+    answer = client.get(f"/v1/jobs/{job.id}/comparison", params={"also": other.id})
+    assert answer.status_code == 200, answer.text
+    view = answer.json()
+    assert [found["id"] for found in view["jobs"]] == [job.id, other.id]
+    fields = {difference["field"]: difference["values"] for difference in view["differences"]}
+    assert fields == {
+        "name": ['"small"', '"other"'],
+        "optimizer.inertia_end": [fields["optimizer.inertia_end"][0], "0.3"],
+        "iterations": ["3", "2"],
+        "seed": [str(job.spec.seed), "9"],
+    }
+    assert view["comparable"]
+    first = view["jobs"][0]
+    assert first["convergence"]["evaluations"] == [4, 8, 12]
+    assert first["convergence"]["seconds"] == pytest.approx([0.5, 1.0, 1.5])
+    assert first["convergence"]["best_so_far"] == [101.0, 100.0, 99.0]
+    # The first particle of each iteration fails; the fitness of the others is spread.
+    assert (first["evaluations"], first["failed"]) == (12, 3)
+    assert (first["fitness"][0], first["fitness"][-1]) == (99.0, 103.0)
+    assert (first["shares"][0], first["shares"][-1]) == (0.0, 1.0)
+
+
+def test_another_measure_is_told_and_a_job_without_designs_has_no_distribution(
+    client: httpx2.Client, store: SqlStore, job: Job, spec: JobSpec, commit: Commit
+) -> None:
+    commit(job, 1)
+    changed = store.create_job(spec.model_copy(update={"preference": "B"}))[0]
+    view = client.get(f"/v1/jobs/{job.id}/comparison", params={"also": changed.id}).json()
+    assert not view["comparable"]
+    assert {d["field"] for d in view["differences"]} == {"preference.bias", "preference.exponent"}
+    assert (view["jobs"][1]["fitness"], view["jobs"][1]["convergence"]["iterations"]) == ([], [])
+
+
+def test_a_job_that_is_named_twice_or_not_there_is_refused(client: httpx2.Client, job: Job) -> None:
+    assert client.get(f"/v1/jobs/{job.id}/comparison?also={job.id}").status_code == 422
+    assert client.get(f"/v1/jobs/{job.id}/comparison?also={'a' * 12}").status_code == 404
+
+
+def test_short_convergences_begin_and_end_where_jobs_do_and_leave_out_those_that_are_gone(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
+    commit(job, 3)
+    asked = {"job": [job.id, "a" * 12], "points": 2}
+    (found,) = client.get("/v1/job-convergences", params=asked).json()["items"]
+    assert (found["id"], found["iterations"]) == (job.id, [0, 2])
+    assert found["best_so_far"] == [101.0, 99.0]

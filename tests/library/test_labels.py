@@ -1,0 +1,63 @@
+"""What people write on jobs, in all four ways and by the terminal."""
+
+from __future__ import annotations
+
+import pytest
+
+import gaitswarm
+from services.optimizer.jobs.labels import JobFilter
+from tests.examples.commands import run_command
+from tests.library.conftest import Finished, Reach
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_job_is_named_noted_tagged_and_archived(reach: Reach, finished: Finished) -> None:
+    jobs = reach(finished.db)
+    before = jobs.job(finished.id)
+    job = jobs.label(finished.id, name="renamed", note="why", tags=["a", "b"])
+    assert (job.name, job.note, job.tags, job.archived) == ("renamed", "why", ["a", "b"], False)
+    job = jobs.label(finished.id, archived=True)
+    assert (job.name, job.tags, job.archived) == ("renamed", ["a", "b"], True)
+    # Nothing of it determines results.
+    assert (job.spec, job.head, job.best) == (before.spec, before.head, before.best)
+    assert [found.id for found in jobs.jobs(where=JobFilter(archived=True, tag="b"))] == [job.id]
+    assert list(jobs.jobs(where=JobFilter(archived=False))) == []
+    assert [found.id for found in jobs.jobs(where=JobFilter(controller="pi"))] == [job.id]
+    assert (job.robot, job.preference) == ("szabadka2-reconstructed", "A")
+
+
+def test_labels_that_are_too_long_are_refused(reach: Reach, finished: Finished) -> None:
+    jobs = reach(finished.db)
+    with pytest.raises(gaitswarm.InvalidRequest) as refused:
+        jobs.label(finished.id, name="x" * 201)
+    assert refused.value.field == "name"
+    with pytest.raises(gaitswarm.NotFound):
+        jobs.label("nowhere", note="x")
+
+
+def test_the_terminal_writes_and_finds_them(finished: Finished) -> None:
+    written = run_command(
+        *("label", finished.id, "--db", finished.db, "--name", "renamed", "--tag", "a", "--archive")
+    )
+    assert written.code == 0, written.err
+    assert "'renamed', tag a, archived" in " ".join(written.out.split())
+    listed = run_command("list", "--db", finished.db, "--tag", "a", "--archived", "--json").json
+    assert [job["name"] for job in listed] == ["renamed"]
+    assert run_command("list", "--db", finished.db, "--not-archived", "--json").json == []
+    emptied = run_command("label", finished.id, "--db", finished.db, "--no-tags", "--json").json
+    assert emptied["tags"] == []
+
+
+def test_jobs_are_set_beside_each_other(reach: Reach, finished: Finished) -> None:
+    jobs = reach(finished.db)
+    queued = jobs.submit(finished.result.job.spec, seed=8)
+    view = jobs.comparison([finished.id, queued.id])
+    assert [difference.field for difference in view.differences] == ["seed"]
+    assert view.comparable
+    assert view.jobs[0].best_fitness == finished.result.best.fitness
+    told = run_command("diff", finished.id, queued.id, "--db", finished.db)
+    assert told.code == 0, told.err
+    assert any(line.split() == ["seed", "7", "8"] for line in told.out.splitlines())
+    with pytest.raises(gaitswarm.InvalidRequest):
+        jobs.comparison([finished.id, finished.id])

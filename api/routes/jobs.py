@@ -29,6 +29,7 @@ from gaitswarm.views import (
     PriorityRequest,
     ResumeRequest,
 )
+from gaitswarm.views.job import JobKind
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
@@ -203,6 +204,7 @@ async def estimate_job(spec: SpecBody, service: Service, slots: Slots) -> Estima
 def list_jobs(
     service: Service,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
+    kind: Annotated[JobKind | None, Query(description="Only jobs of this kind.")] = None,
     parent: Annotated[
         JobIdText | None, Query(description="Only jobs that were forked from the job of this id.")
     ] = None,
@@ -249,6 +251,7 @@ def list_jobs(
     )
     page = service.jobs(
         state=state,
+        kind=kind,
         parent=parent,
         search=search,
         where=where,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import httpx2
 import pytest
 
@@ -69,7 +71,7 @@ def test_short_convergences_begin_and_end_where_jobs_do_and_leave_out_those_that
     client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
-    asked = {"job": [job.id, "a" * 12], "points": 2}
+    asked: dict[str, Any] = {"job": [job.id, "a" * 12], "points": 2}
     (found,) = client.get("/v1/job-convergences", params=asked).json()["items"]
     assert (found["id"], found["iterations"]) == (job.id, [0, 2])
     assert found["best_so_far"] == [101.0, 99.0]

@@ -135,7 +135,7 @@ def test_the_first_view_of_the_list_is_small(
     assert visited.received() <= FIRST_VIEW_BYTES
     assert largest_asset(visited) < 100_000
     expect(page.get_by_text("1000 jobs", exact=True)).to_be_visible()
-    page.get_by_label("Search by name or id").fill("short 0123")
+    page.get_by_label("Search by name, id, note or tag").fill("short 0123")
     expect(page.locator("[data-job]")).to_have_count(1)
 
 

@@ -14,6 +14,7 @@ import { setTitle } from './title'
 
 const NewJobPage = lazyPage('the form', () => import('./submission/page'))
 const JobPage = lazyPage('the job', () => import('./job/page'))
+const ComparePage = lazyPage('the comparison', () => import('./compare/page'))
 const TournamentsPage = lazyPage('the tournaments', () => import('./tournaments/page'))
 const WalkPage = lazyPage('the walk', () => import('./walk/page'))
 const ControllerPage = lazyPage('the controller', () => import('./controller/page'))
@@ -30,6 +31,7 @@ const TITLES: Readonly<Record<Route['page'], string | null>> = {
   jobs: 'Jobs',
   'new-job': 'New job',
   job: null,
+  compare: 'Compared jobs',
   tournaments: 'Tournaments',
   walk: 'Walk',
   controller: 'Controller',
@@ -102,6 +104,8 @@ function Page({ route }: { route: Route }) {
       return <NewJobPage />
     case 'job':
       return <JobPage id={route.id} tab={route.tab} />
+    case 'compare':
+      return <ComparePage />
     case 'tournaments':
       return <TournamentsPage id={route.id} />
     case 'walk':
@@ -135,6 +139,6 @@ function ThemeToggle() {
 }
 
 function isUnder(route: Route, page: Route['page']): boolean {
-  const under: readonly Route['page'][] = ['job', 'tournaments']
+  const under: readonly Route['page'][] = ['job', 'compare', 'tournaments']
   return route.page === page || (page === 'jobs' && under.includes(route.page))
 }

@@ -3,7 +3,7 @@
 import { ApiProblem, problemOf } from './problem'
 import type { paths } from './schema'
 
-type Method = 'get' | 'post' | 'put' | 'delete'
+type Method = 'get' | 'post' | 'put' | 'patch' | 'delete'
 
 /** Paths that have an operation of the method. */
 export type PathOf<M extends Method> = {
@@ -64,6 +64,16 @@ export async function put<P extends PathOf<'put'>>(
   const request = { ...posted(options.body, options.signal), method: 'PUT' }
   const response = await send(url(path, options.path), request)
   return (await response.json()) as Answer<P, 'put'>
+}
+
+/** PATCH a resource. */
+export async function patch<P extends PathOf<'patch'>>(
+  path: P,
+  options: Options & { path?: Params<P, 'patch'>; body: Body<P, 'patch'> },
+): Promise<Answer<P, 'patch'>> {
+  const request = { ...posted(options.body, options.signal), method: 'PATCH' }
+  const response = await send(url(path, options.path), request)
+  return (await response.json()) as Answer<P, 'patch'>
 }
 
 /** DELETE a resource. */

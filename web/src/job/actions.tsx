@@ -10,9 +10,10 @@ import { formatCount } from '../format/number'
 import { navigate } from '../router/navigation'
 import { withQuery } from '../router/routes'
 import { budgetSpent, iterationsSpent, spentInWords } from './budget'
+import { LabelDialog } from './label-dialog'
 import { PriorityDialog } from './priority-dialog'
 
-type Asking = 'cancel' | 'delete' | 'extend' | 'priority' | null
+type Asking = 'cancel' | 'delete' | 'extend' | 'label' | 'priority' | null
 
 export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: StoredJob) => void }) {
   const [asking, setAsking] = useState<Asking>(null)
@@ -60,6 +61,9 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
             Priority…
           </button>
         )}
+        <button type="button" disabled={busy} onClick={() => setAsking('label')}>
+          Label…
+        </button>
         {isReadable(job) && (
           <a class="button" href={withQuery('/jobs/new', { clone: job.id })}>
             Clone
@@ -125,6 +129,13 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
         onPrioritize={(priority) =>
           command(() => put('/v1/jobs/{job_id}/priority', { path, body: { priority } }))
         }
+        onDismiss={() => setAsking(null)}
+      />
+      <LabelDialog
+        key={`label ${job.id} ${asking === 'label'}`}
+        job={job}
+        open={asking === 'label'}
+        onLabel={command}
         onDismiss={() => setAsking(null)}
       />
       <ExtendDialog

@@ -32,6 +32,12 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
             <StreamNote live={live} />
           </div>
           <p class="muted small">{subtitle(job)}</p>
+          {((job.tags ?? []).length > 0 || job.note || job.archived) && (
+            <p class="small" data-labels>
+              {[...(job.archived ? ['archived'] : []), ...(job.tags ?? [])].join(' · ')}
+              {job.note && <span class="job-note">{job.note}</span>}
+            </p>
+          )}
           {job.kind === 'tournament' && (
             <p class="small">
               <a href={tournamentPath(job.id)}>Its tournament: all methods compared</a>

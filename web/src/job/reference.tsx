@@ -2,6 +2,7 @@
 
 import { useMemo } from 'preact/hooks'
 import { get, post } from '../api/client'
+import { jobsOfKind } from '../api/jobs-of-kind'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
@@ -82,14 +83,9 @@ export function ReferencePicker({
   onChoose: (choice: string) => void
 }) {
   const published = useResource('controllers', catalogue)
-  const others = useResource('others', (signal) =>
-    get('/v1/jobs', { query: { limit: 200 }, signal }).then((page) => page.items),
-  )
+  const others = useResource(`others ${job.kind}`, (signal) => jobsOfKind(job.kind, signal))
   const jobs = useMemo(
-    () =>
-      (others.data ?? []).filter(
-        (other) => other.id !== job.id && other.kind === job.kind && other.best_fitness !== null,
-      ),
+    () => (others.data ?? []).filter((other) => other.id !== job.id && other.best_fitness !== null),
     [others.data, job.id, job.kind],
   )
   return (

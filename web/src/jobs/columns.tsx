@@ -9,21 +9,43 @@ import { formatAge, formatDuration, formatMoment } from '../format/time'
 import { budgetSpent, spentInWords } from '../job/budget'
 import { fitnessUnit } from '../job/fitness'
 import { jobPath } from '../router/routes'
+import { Sparkline, type Sparklines } from './sparkline'
 
-/** now: [ms], for ages. */
-export function jobColumns(now: number): readonly Column<JobSummary>[] {
+/** What the rows of the list share. */
+interface Shared {
+  readonly lines: Sparklines
+  /** Ids of the jobs that are chosen. */
+  readonly chosen: readonly string[]
+  readonly onChoose: (id: string, on: boolean) => void
+}
+
+/** The server sorts. now: [ms], for ages. */
+export function jobColumns(
+  now: number,
+  { lines, chosen, onChoose }: Shared,
+): readonly Column<JobSummary>[] {
   return [
+    {
+      key: 'choose',
+      label: 'Choose',
+      cell: (job) => (
+        <input
+          type="checkbox"
+          aria-label={`Choose ${job.name || job.id}`}
+          checked={chosen.includes(job.id)}
+          onChange={(event) => onChoose(job.id, event.currentTarget.checked)}
+        />
+      ),
+    },
     {
       key: 'name',
       label: 'Name',
       header: true,
-      value: (job) => job.name || job.id,
       cell: (job) => <NameCell job={job} />,
     },
     {
       key: 'state',
       label: 'State',
-      value: (job) => job.state,
       cell: (job) => <StateBadge state={job.state} />,
     },
     {
@@ -37,15 +59,19 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
     {
       key: 'progress',
       label: 'Iterations',
-      value: (job) => job.evaluations / job.evaluations_planned,
       cell: (job) => <ProgressCell job={job} />,
     },
     {
       key: 'best',
       label: 'Best fitness',
       numeric: true,
-      value: (job) => job.best_fitness,
       cell: (job) => quantity(job.best_fitness, fitnessUnit(job), 5),
+    },
+    {
+      key: 'line',
+      label: 'How it came',
+      minor: true,
+      cell: (job) => <Sparkline line={lines.get(job.id)} />,
     },
     {
       key: 'rate',
@@ -53,7 +79,6 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
       unit: '1/s',
       numeric: true,
       minor: true,
-      value: (job) => job.evaluations_per_second,
       cell: (job) => formatNumber(job.evaluations_per_second, 3),
     },
     {
@@ -61,7 +86,6 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
       label: 'Time left',
       numeric: true,
       minor: true,
-      value: (job) => (job.state === 'succeeded' ? null : job.eta_seconds),
       cell: (job) => (job.state === 'succeeded' ? '–' : formatDuration(job.eta_seconds)),
     },
     {
@@ -69,7 +93,6 @@ export function jobColumns(now: number): readonly Column<JobSummary>[] {
       label: 'Age',
       numeric: true,
       minor: true,
-      value: (job) => -Date.parse(job.created_at),
       cell: (job) => (
         <time dateTime={job.created_at} title={`submitted ${formatMoment(job.created_at)}`}>
           {formatAge(job.created_at, now)}
@@ -91,6 +114,16 @@ function NameCell({ job }: { job: JobSummary }) {
           fork of <a href={jobPath(job.lineage.parent)}>{job.lineage.parent}</a>
         </span>
       )}
+      {(job.tags ?? []).length > 0 && (
+        <span class="small">
+          {(job.tags ?? []).map((tag) => (
+            <span key={tag} class="tag">
+              {tag}
+            </span>
+          ))}
+        </span>
+      )}
+      {job.note && <span class="muted small note">{job.note}</span>}
       {job.error && <span class="wrong">{job.error}</span>}
     </div>
   )

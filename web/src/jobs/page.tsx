@@ -1,42 +1,41 @@
-/** All jobs: how they stand and where to go on. */
+/** All jobs: how they stand and where to go on; the server finds, sorts and pages them. */
 
-import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
-import { get } from '../api/client'
-import { useNow, usePolling } from '../api/resource'
-import type { JobState, JobSummary } from '../api/types'
+import { useEffect, useState } from 'preact/hooks'
+import { patch } from '../api/client'
+import { useNow } from '../api/resource'
+import type { JobFacets } from '../api/types'
 import { CopyBlock } from '../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
-import { matching } from '../components/rows'
 import { Table } from '../components/table'
 import { formatCount } from '../format/number'
 import { setQuery, usePlace } from '../router/navigation'
+import { comparePath } from '../router/routes'
 import { jobColumns } from './columns'
-import { JobList } from './job-list'
+import { Filters, NO_FILTER } from './filters'
 import './jobs.css'
+import { isFiltered, listQuery, PAGE } from './list-query'
+import { useSparklines } from './sparkline'
+import { useFacets, useList } from './use-list'
 
-const STATES: readonly JobState[] = [
-  'queued',
-  'running',
-  'pausing',
-  'paused',
-  'succeeded',
-  'failed',
-  'cancelled',
-]
-
-const POLL_MS = 2000
+/** Jobs that can be compared at once. */
+const MOST_COMPARED = 12
 
 export function JobsPage() {
-  const { jobs, error, truncated, announcement } = useJobs()
-  const { query } = usePlace()
+  const place = usePlace()
+  const query = listQuery(place.query)
+  const key = JSON.stringify(query)
+  const [cursors, setCursors] = useState<readonly string[]>([])
+  // Another filter or order has other pages.
+  useEffect(() => setCursors([]), [key])
+  const [chosen, setChosen] = useState<readonly string[]>([])
+  const { page, error, announcement, reload } = useList(query, cursors.at(-1) ?? null)
+  const facets = useFacets(query.archived)
   const now = useNow(1000)
-  const text = query.get('search') ?? ''
-  const state = STATES.find((s) => s === query.get('state')) ?? null
-  const shown = useMemo(() => {
-    const inState = state === null ? (jobs ?? []) : (jobs ?? []).filter((j) => j.state === state)
-    return matching(inState, text, (job) => `${job.name} ${job.id} ${job.controller ?? ''}`)
-  }, [jobs, text, state])
-  const columns = jobColumns(now)
+  const lines = useSparklines(page?.items ?? [])
+  const jobs = page?.items ?? null
+  const toggle = (id: string, on: boolean) =>
+    setChosen(on ? [...chosen, id] : chosen.filter((each) => each !== id))
+  const none = jobs !== null && jobs.length === 0 && cursors.length === 0
   return (
     <>
       <header class="page-header">
@@ -58,31 +57,29 @@ export function JobsPage() {
           />
         )}
         {jobs === null && error === null && <Loading what="jobs" />}
-        {jobs !== null && jobs.length === 0 && <NoJobs />}
-        {jobs !== null && jobs.length > 0 && (
+        {none && !isFiltered(query) && !query.archived && <NoJobs />}
+        {jobs !== null && !(none && !isFiltered(query) && !query.archived) && (
           <section class="card" aria-label="List of jobs">
-            <Filters text={text} state={state} jobs={jobs} shown={shown.length} />
-            {truncated && (
-              <p class="muted small">
-                The newest {formatCount(jobs.length)} jobs; older ones are found by{' '}
-                <code>gaitswarm list</code>.
-              </p>
-            )}
-            {shown.length === 0 ? (
+            <Filters query={query} facets={facets}>
+              {countWords(facets, isFiltered(query), jobs.length, page!.next, cursors.length)}
+            </Filters>
+            <Chosen chosen={chosen} archived={query.archived} onDone={reload} onClear={setChosen} />
+            {none ? (
               <Empty title="No job fits the filter">
-                <button type="button" onClick={() => setQuery({ search: null, state: null })}>
+                <button type="button" onClick={() => setQuery(NO_FILTER)}>
                   Show all jobs
                 </button>
               </Empty>
             ) : (
               <Table
                 caption="Jobs"
-                columns={columns}
-                rows={shown}
+                columns={jobColumns(now, { lines, chosen, onChoose: toggle })}
+                rows={jobs}
                 rowKey={(job) => job.id}
                 rowData={(job) => ({ 'data-job': job.id, 'data-state': job.state })}
               />
             )}
+            <Pages cursors={cursors} next={page!.next} onPage={setCursors} />
           </section>
         )}
       </div>
@@ -93,93 +90,102 @@ export function JobsPage() {
   )
 }
 
-/** The jobs, renewed while the tab is shown, and the last change of a state in words. */
-function useJobs() {
-  const [jobs, setJobs] = useState<readonly JobSummary[] | null>(null)
-  const [error, setError] = useState<unknown>(null)
-  const [announcement, setAnnouncement] = useState('')
-  const before = useRef(new Map<string, JobState>())
-  const [list] = useState(
-    () =>
-      new JobList(
-        (query) => get('/v1/jobs', { query }),
-        (now) => {
-          setJobs(now)
-          const news = changeOfState(before.current, now)
-          if (news !== null) setAnnouncement(news)
-          before.current = new Map(now.map((job) => [job.id, job.state]))
-        },
-      ),
-  )
-  const busy = useRef(false)
-  const attempt = (ask: () => Promise<void>) => {
-    if (busy.current) return
-    busy.current = true
-    ask()
-      .then(() => setError(null), setError)
-      .finally(() => {
-        busy.current = false
-      })
+/** How many jobs fit, where that is known without asking for all pages. */
+function countWords(
+  facets: JobFacets | null,
+  filtered: boolean,
+  shown: number,
+  next: string | null,
+  earlier: number,
+): string {
+  if (!filtered && facets) return facets.total === 1 ? '1 job' : `${formatCount(facets.total)} jobs`
+  if (next === null) {
+    const count = earlier * PAGE + shown
+    return count === 1 ? '1 job' : `${formatCount(count)} jobs`
   }
-  useEffect(() => attempt(() => list.loadAll()), [list])
-  usePolling(() => attempt(() => (jobs === null ? list.loadAll() : list.refresh())), POLL_MS)
-  return { jobs, error, announcement, truncated: list.truncated }
+  return `more than ${formatCount((earlier + 1) * PAGE)} jobs`
 }
 
-function changeOfState(
-  before: ReadonlyMap<string, JobState>,
-  now: readonly JobSummary[],
-): string | null {
-  const changed = now.filter((j) => before.has(j.id) && before.get(j.id) !== j.state)
-  if (changed.length === 0) return null
-  return changed.map((job) => `${job.name || job.id} is ${job.state}`).join('; ')
-}
-
-function Filters({
-  text,
-  state,
-  jobs,
-  shown,
+/** What can be done with several jobs at once. */
+function Chosen({
+  chosen,
+  archived,
+  onDone,
+  onClear,
 }: {
-  text: string
-  state: JobState | null
-  jobs: readonly JobSummary[]
-  shown: number
+  chosen: readonly string[]
+  archived: boolean
+  onDone: () => void
+  onClear: (chosen: readonly string[]) => void
 }) {
-  const counts = useMemo(() => {
-    const found = new Map<JobState, number>()
-    for (const job of jobs) found.set(job.state, (found.get(job.state) ?? 0) + 1)
-    return found
-  }, [jobs])
+  const [error, setError] = useState<unknown>(null)
+  if (chosen.length === 0) return null
+  const archive = () => {
+    setError(null)
+    const body = { archived: !archived }
+    Promise.all(
+      chosen.map((id) => patch('/v1/jobs/{job_id}', { path: { job_id: id }, body })),
+    ).then(() => {
+      onClear([])
+      onDone()
+    }, setError)
+  }
   return (
-    <search class="row filters">
-      <label>
-        <span class="visually-hidden">Search by name or id</span>
-        <input
-          type="search"
-          placeholder="Search by name or id"
-          value={text}
-          onInput={(event) => setQuery({ search: event.currentTarget.value || null })}
-        />
-      </label>
-      <label>
-        <span class="visually-hidden">State</span>
-        <select
-          value={state ?? ''}
-          onChange={(event) => setQuery({ state: event.currentTarget.value || null })}
+    <>
+      <div class="row chosen" data-chosen={chosen.length}>
+        <strong aria-live="polite">{formatCount(chosen.length)} chosen</strong>
+        {chosen.length <= MOST_COMPARED ? (
+          <a class="button compact" href={comparePath(chosen)}>
+            Compare
+          </a>
+        ) : (
+          <span class="muted small">at most {MOST_COMPARED} can be compared</span>
+        )}
+        <button type="button" class="compact" onClick={archive}>
+          {archived ? 'Take back from the archive' : 'Archive'}
+        </button>
+        <button type="button" class="compact" onClick={() => onClear([])}>
+          Choose none
+        </button>
+      </div>
+      {error !== null && <ErrorNotice what="That was not done." error={error} />}
+    </>
+  )
+}
+
+function Pages({
+  cursors,
+  next,
+  onPage,
+}: {
+  /** Where the pages before begin after, but for the first. */
+  cursors: readonly string[]
+  next: string | null
+  onPage: (cursors: readonly string[]) => void
+}) {
+  if (cursors.length === 0 && next === null) return null
+  return (
+    <fieldset class="pager" aria-label="Pages of Jobs">
+      <span>page {cursors.length + 1}</span>
+      <span class="row">
+        <button
+          type="button"
+          class="compact"
+          disabled={cursors.length === 0}
+          onClick={() => onPage(cursors.slice(0, -1))}
         >
-          <option value="">all states ({formatCount(jobs.length)})</option>
-          {STATES.filter((s) => counts.has(s) || s === state).map((s) => (
-            <option key={s} value={s}>
-              {s} ({formatCount(counts.get(s) ?? 0)})
-            </option>
-          ))}
-        </select>
-      </label>
-      <span class="muted small" aria-live="polite">
-        {shown === 1 ? '1 job' : `${formatCount(shown)} jobs`}
+          Previous
+        </button>
+        <button
+          type="button"
+          class="compact"
+          disabled={next === null}
+          onClick={() => next !== null && onPage([...cursors, next])}
+        >
+          Next
+        </button>
       </span>
-    </search>
+    </fieldset>
   )
 }
 

@@ -5,6 +5,7 @@ export type Route =
   | { readonly page: 'jobs' }
   | { readonly page: 'new-job' }
   | { readonly page: 'job'; readonly id: string; readonly tab: string }
+  | { readonly page: 'compare' }
   | { readonly page: 'tournaments'; readonly id: string | null }
   | { readonly page: 'walk' }
   | { readonly page: 'controller' }
@@ -21,6 +22,8 @@ export function routeOf(path: string): Route {
       if (second === undefined) return { page: 'jobs' }
       if (second === 'new' && rest.length === 0) return { page: 'new-job' }
       return { page: 'job', id: second, tab: rest.join('/') }
+    case 'compare':
+      return second === undefined ? { page: 'compare' } : { page: 'not-found' }
     case 'tournaments':
       if (rest.length > 0) return { page: 'not-found' }
       return { page: 'tournaments', id: second ?? null }
@@ -37,6 +40,11 @@ export function routeOf(path: string): Route {
 export function jobPath(id: string, tab = ''): string {
   const base = `/jobs/${encodeURIComponent(id)}`
   return tab === '' ? base : `${base}/${tab}`
+}
+
+/** The path of a comparison of jobs. */
+export function comparePath(ids: readonly string[]): string {
+  return `/compare?jobs=${ids.map(encodeURIComponent).join(',')}`
 }
 
 /** The path of a tournament; any of its jobs stands for it. */

@@ -1,12 +1,10 @@
-/** Choosing a design: published ones, and the best ones of recent jobs. */
+/** Choosing a design: published ones, and the best ones of jobs. */
 
 import { useId } from 'preact/hooks'
 import { get } from '../api/client'
+import { jobsOfKind } from '../api/jobs-of-kind'
 import { useResource } from '../api/resource'
 import { type DesignSource, sourceOfWord, wordOf } from './design-source'
-
-/** Jobs that are offered; others are reached from their own pages. */
-const RECENT_JOBS = 50
 
 export function DesignPicker({
   label,
@@ -25,17 +23,15 @@ export function DesignPicker({
 }) {
   const id = useId()
   const controllers = useResource('controllers', (signal) => get('/v1/controllers', { signal }))
-  const jobs = useResource('jobs', (signal) =>
-    get('/v1/jobs', { query: { limit: RECENT_JOBS }, signal }),
-  )
+  const jobs = useResource('jobs', (signal) => jobsOfKind('tuning', signal))
   const published = (controllers.data?.items ?? []).flatMap((controller) =>
     Object.keys(controller.published).map((study) => ({
       word: wordOf({ kind: 'published', controller: controller.name, study }),
       text: `${controller.name}: ${study}`,
     })),
   )
-  const best = (jobs.data?.items ?? [])
-    .filter((job) => job.kind === 'tuning' && job.best_fitness !== null)
+  const best = (jobs.data ?? [])
+    .filter((job) => job.best_fitness !== null)
     .map((job) => ({ word: wordOf({ kind: 'best', job: job.id }), text: job.name || job.id }))
   const word = chosen ? wordOf(chosen) : ''
   const listed = word === '' || [...published, ...best].some((option) => option.word === word)

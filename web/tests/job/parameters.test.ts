@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import type { Convergence, FittedParameter, Job, JobSummary } from '../../src/api/types'
+import type { FittedParameter, Identifiability, Job, JobSummary } from '../../src/api/types'
 import {
   isCategorical,
   outline,
@@ -34,7 +34,7 @@ const voltage: FittedParameter = {
   explanation: 'all runs agree on a small part of the range',
 }
 const mass: FittedParameter = { ...voltage, name: 'body_mass', trust: 'unknown', explanation: 'no' }
-const found: Convergence = {
+const found: Identifiability = {
   jobs: ['a', 'b'],
   fitness: [0.03, 0.031],
   thresholds: [1, 0.1, 0.01],

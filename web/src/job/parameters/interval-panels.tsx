@@ -1,6 +1,6 @@
 /** Small charts of the intervals, one for each parameter (fig. 2.14). */
 
-import type { Convergence, FittedParameter } from '../../api/types'
+import type { FittedParameter, Identifiability } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
 import { ChartFrame } from '../../components/chart-frame'
 import { type Column, Table } from '../../components/table'
@@ -20,7 +20,7 @@ export function IntervalPanels({
   labels,
   judgedAt,
 }: {
-  found: Convergence
+  found: Identifiability
   /** Those that have intervals. */
   shown: readonly FittedParameter[]
   labels: readonly string[]
@@ -71,7 +71,7 @@ export function IntervalPanels({
   )
 }
 
-function Panel({ found, parameter }: { found: Convergence; parameter: FittedParameter }) {
+function Panel({ found, parameter }: { found: Identifiability; parameter: FittedParameter }) {
   const { name, unit, low, high, best, bests, trust } = parameter
   const { thresholds } = found
   const decisive = parameter.intervals[thresholds.indexOf(DECISIVE)]
@@ -116,7 +116,7 @@ function IntervalTable({
   found,
   shown,
 }: {
-  found: Convergence
+  found: Identifiability
   shown: readonly FittedParameter[]
 }) {
   const columns: Column<FittedParameter>[] = [

@@ -1,6 +1,6 @@
 /** Intervals of fitted parameters among good designs (fig. 2.14 of the thesis). Pure. */
 
-import type { Convergence, FittedParameter } from '../../api/types'
+import type { FittedParameter, Identifiability } from '../../api/types'
 import type { Value } from '../../format/value'
 
 export type Trust = NonNullable<FittedParameter['trust']>
@@ -21,7 +21,7 @@ export function isCategorical({ choices }: FittedParameter): boolean {
 
 /** Width of the interval at a threshold, as a share of the range searched; null if there is none. */
 export function widthAt(
-  { thresholds }: Convergence,
+  { thresholds }: Identifiability,
   parameter: FittedParameter,
   threshold: number,
 ): number | null {
@@ -38,7 +38,7 @@ export function rankOf({ trust }: FittedParameter): number | null {
 }
 
 /** The verdicts that were given, each with its meaning and the number of parameters. */
-export function verdicts({ parameters }: Convergence) {
+export function verdicts({ parameters }: Identifiability) {
   return TRUSTS.map((trust) => {
     const found = parameters.filter((parameter) => parameter.trust === trust)
     return { trust, count: found.length, explanation: found[0]?.explanation ?? null }
@@ -59,7 +59,7 @@ export function shareOf(value: Value, { low, high }: FittedParameter): number {
 
 /** Outline of the intervals over the thresholds, as an SVG path in a box of that size. */
 export function outline(
-  { thresholds }: Convergence,
+  { thresholds }: Identifiability,
   parameter: FittedParameter,
   width: number,
   height: number,

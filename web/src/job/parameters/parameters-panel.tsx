@@ -5,7 +5,7 @@ import { get } from '../../api/client'
 import { ApiProblem } from '../../api/problem'
 import { readableJob } from '../../api/readable'
 import { usePolling, useResource } from '../../api/resource'
-import type { Convergence, FittedParameter, Job } from '../../api/types'
+import type { FittedParameter, Identifiability, Job } from '../../api/types'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { matching } from '../../components/rows'
 import { setQuery, usePlace } from '../../router/navigation'
@@ -105,7 +105,7 @@ function Parameters({
   labels,
 }: {
   job: Job
-  found: Convergence
+  found: Identifiability
   labels: readonly string[]
 }) {
   const [text, setText] = useState('')

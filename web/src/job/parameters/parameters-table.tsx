@@ -1,6 +1,6 @@
 /** The fitted parameters as a table: values, widths of their intervals, verdicts. */
 
-import type { Convergence, FittedParameter } from '../../api/types'
+import type { FittedParameter, Identifiability } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
 import { type Column, Table } from '../../components/table'
 import { formatExact, percent, writtenUnit } from '../../format/number'
@@ -15,7 +15,7 @@ export function ParametersTable({
   labels,
   agreement,
 }: {
-  found: Convergence
+  found: Identifiability
   shown: readonly FittedParameter[]
   /** Of the runs. */
   labels: readonly string[]
@@ -45,7 +45,7 @@ export function ParametersTable({
 }
 
 function columns(
-  found: Convergence,
+  found: Identifiability,
   labels: readonly string[],
 ): readonly Column<FittedParameter>[] {
   const several = labels.length > 1

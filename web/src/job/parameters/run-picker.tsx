@@ -1,6 +1,6 @@
 /** The runs that are compared: this job, and others that may have fitted the same. */
 
-import { get } from '../../api/client'
+import { jobsOfKind } from '../../api/jobs-of-kind'
 import { useResource } from '../../api/resource'
 import type { Job, JobSummary } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
@@ -22,9 +22,7 @@ export function RunPicker({
   also: readonly string[]
   onChoose: (also: readonly string[]) => void
 }) {
-  const listed = useResource('fits', (signal) =>
-    get('/v1/jobs', { query: { limit: 200 }, signal }).then((page) => page.items),
-  )
+  const listed = useResource(`fits ${job.kind}`, (signal) => jobsOfKind(job.kind, signal))
   const words = caseWords(job.kind)
   const { same, others } = candidates(listed.data ?? [], job)
   const known = new Set([...same, ...others].map(({ id }) => id))

@@ -1,7 +1,7 @@
 /** What the runs say of the parameters as a whole, and which of them are to be shown. */
 
 import type { ComponentChildren } from 'preact'
-import type { Convergence } from '../../api/types'
+import type { Identifiability } from '../../api/types'
 import { formatCount } from '../../format/number'
 import { type Trust, verdicts } from './intervals'
 
@@ -26,7 +26,7 @@ export function Verdicts({
   text,
   onText,
 }: {
-  found: Convergence
+  found: Identifiability
   /** The verdict that is shown alone; null for all. */
   chosen: Trust | null
   onChoose: (trust: Trust | null) => void

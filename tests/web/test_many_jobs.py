@@ -1,0 +1,130 @@
+"""The list of many jobs, and several of them beside each other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.examples.servers import Server, ServerProcess
+from tests.web.conftest import SMALL_JOB
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def two_jobs(server: ServerProcess, finished_job: str) -> tuple[str, str]:
+    """The finished job, and the same with another seed and a smaller budget."""
+    other = server.submit(SMALL_JOB | {"name": "other", "seed": 6, "iterations": 3})
+    server.wait_for(other, "succeeded")
+    return finished_job, other
+
+
+def rows(page: Page) -> list[str]:
+    listed = page.locator("[data-job]")
+    return [row.get_attribute("data-job") or "" for row in listed.all()]
+
+
+def test_filters_orders_and_search_are_the_servers_and_in_the_address(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    fuzzy = server.submit(SMALL_JOB)
+    pi = server.submit(SMALL_JOB | {"name": "gains", "controller": "pi", "preference": "B"})
+    page = visit(server.url).go("/jobs")
+    expect(page.get_by_text("2 jobs", exact=True)).to_be_visible()
+    page.get_by_label("Controller", exact=True).select_option("pi")
+    expect(page).to_have_url(re.compile("controller=pi"))
+    expect(page.locator("[data-job]")).to_have_count(1)
+    assert rows(page) == [pi]
+    page.reload()
+    expect(page.get_by_text("1 job", exact=True)).to_be_visible()
+    page.get_by_label("Preference", exact=True).select_option("A")
+    page.get_by_role("button", name="Show all jobs").click()
+    expect(page.locator("[data-job]")).to_have_count(2)
+    page.get_by_label("Order").select_option("name")
+    expect(page.locator("[data-job]").first).to_have_attribute("data-job", pi)
+    page.get_by_label("Search by name, id, note or tag").fill(fuzzy)
+    expect(page.locator("[data-job]")).to_have_count(1)
+
+
+def test_every_job_is_reached_by_pages(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    ids = [server.submit(SMALL_JOB | {"name": f"job {k}"}) for k in range(53)]
+    page = visit(server.url).go("/jobs")
+    expect(page.get_by_text("53 jobs", exact=True)).to_be_visible()
+    expect(page.locator("[data-job]")).to_have_count(50)
+    page.get_by_role("button", name="Next").click()
+    expect(page.locator("[data-job]")).to_have_count(3)
+    assert rows(page) == ids[2::-1]
+    expect(page.get_by_text("page 2", exact=True)).to_be_visible()
+    page.get_by_role("button", name="Previous").click()
+    expect(page.locator("[data-job]")).to_have_count(50)
+
+
+def test_chosen_jobs_are_compared(
+    server: ServerProcess, two_jobs: tuple[str, str], visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/jobs?order=name")
+    expect(page.locator(f"[data-job='{two_jobs[0]}'] .sparkline polyline")).to_be_attached()
+    for job_id in two_jobs:
+        page.locator(f"[data-job='{job_id}']").get_by_role("checkbox").check()
+    page.get_by_role("link", name="Compare").click()
+    expect(page).to_have_url(re.compile(f"/compare.jobs={two_jobs[0]},{two_jobs[1]}$"))
+    expect(page.locator("[data-compared]")).to_have_count(2)
+    differences = page.get_by_role("table", name="Differences of the specs")
+    fields = differences.get_by_role("rowheader")
+    expect(fields).to_have_text(["name", "iterations", "seed"])
+    expect(page.get_by_role("img", name=re.compile("^Convergence of 2"))).to_be_visible()
+    page.get_by_role("main").get_by_role("combobox").select_option("seconds")
+    expect(page).to_have_url(re.compile("by=seconds"))
+    expect(
+        page.get_by_role("img", name="Convergence of 2 jobs by time of evaluation")
+    ).to_be_visible()
+    page.get_by_role("button", name=re.compile("^Show as table.*Distribution")).click()
+    shares = page.get_by_role("table", name="Fitness by share of the designs")
+    expect(shares.locator("tbody tr")).to_have_count(7)
+    best = server.job(two_jobs[0])["best_fitness"]
+    expect(shares.locator("tbody tr").first).to_contain_text(f"{best:.3f}"[:5])
+
+
+def test_jobs_that_cannot_be_compared_are_told(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/compare")
+    expect(page.get_by_role("heading", name="No job is chosen")).to_be_visible()
+    page = visit(server.url, allowed="status of 404").go("/compare?jobs=aaaaaaaaaaaa")
+    expect(page.get_by_role("alert")).to_contain_text("The jobs cannot be compared.")
+
+
+def test_a_job_is_labelled_and_archived(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    job_id, other = server.submit(SMALL_JOB), server.submit(SMALL_JOB | {"name": "other"})
+    page = visit(server.url).go(f"/jobs/{job_id}")
+    page.get_by_role("button", name="Label").click()
+    page.get_by_label("Name", exact=True).fill("renamed")
+    page.get_by_label("Tags, separated by commas").fill("thesis, wide")
+    page.get_by_label("Note", exact=True).fill("P is at its bound")
+    page.get_by_role("button", name="Write them down").click()
+    expect(page.get_by_role("heading", name="renamed")).to_be_visible()
+    expect(page.locator("[data-labels]")).to_contain_text("thesis · wide")
+    page.goto("/jobs")
+    row = page.locator(f"[data-job='{job_id}']")
+    expect(row).to_contain_text("P is at its bound")
+    page.get_by_label("Tag", exact=True).select_option("wide")
+    expect(page.locator("[data-job]")).to_have_count(1)
+    row.get_by_role("checkbox").check()
+    page.get_by_role("button", name="Archive").click()
+    expect(page.get_by_text("No job fits the filter")).to_be_visible()
+    page.get_by_role("button", name="Show all jobs").click()
+    expect(page.locator("[data-job]")).to_have_count(1)
+    assert rows(page) == [other]
+    page.get_by_label("archived", exact=True).check()
+    expect(row).to_be_visible()

@@ -1,0 +1,154 @@
+/** Jobs beside each other: how they converged, how their designs are spread, how their specs differ. */
+
+import { get } from '../api/client'
+import { useResource } from '../api/resource'
+import type { JobComparison } from '../api/types'
+import { Empty, ErrorNotice, Loading } from '../components/feedback'
+import { Table } from '../components/table'
+import { formatCount, formatNumber, NONE, percent } from '../format/number'
+import { usePlace } from '../router/navigation'
+import { jobPath } from '../router/routes'
+import { ConvergenceCard } from './convergence-card'
+import { DistributionCard } from './distribution-card'
+import { colourOf } from './series'
+import './compare.css'
+
+export default function ComparePage() {
+  const { query } = usePlace()
+  const ids = [...new Set((query.get('jobs') ?? '').split(',').filter((id) => id !== ''))]
+  const [first, ...also] = ids
+  const found = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
+    get('/v1/jobs/{job_id}/comparison', { path: { job_id: first }, query: { also }, signal }),
+  )
+  return (
+    <>
+      <header class="page-header">
+        <h1>Compared jobs</h1>
+        <a class="button" href="/jobs">
+          All jobs
+        </a>
+      </header>
+      <div class="stack">
+        {ids.length === 0 && (
+          <section class="card">
+            <Empty title="No job is chosen">
+              <p>
+                Choose some in the <a href="/jobs">list of jobs</a>.
+              </p>
+            </Empty>
+          </section>
+        )}
+        {found.error && (
+          <ErrorNotice
+            what="The jobs cannot be compared."
+            error={found.error}
+            retry={found.reload}
+          />
+        )}
+        {found.loading && !found.data && <Loading what="the jobs" />}
+        {found.data && <Comparison found={found.data} />}
+      </div>
+    </>
+  )
+}
+
+function Comparison({ found }: { found: JobComparison }) {
+  return (
+    <>
+      {!found.comparable && (
+        <div class="notice" data-tone="warn" role="status" data-comparable="false">
+          <strong>They judge by different measures.</strong>
+          <p>Their fitness is not the same quantity: see what their specs say differently.</p>
+        </div>
+      )}
+      <section class="card" aria-labelledby="compared">
+        <h2 id="compared">The jobs</h2>
+        <Table
+          caption="Compared jobs"
+          rows={found.jobs}
+          rowKey={({ id }) => id}
+          rowData={({ id }) => ({ 'data-compared': id })}
+          columns={[
+            {
+              key: 'name',
+              label: 'Job',
+              header: true,
+              value: ({ name, id }) => name || id,
+              cell: (job) => (
+                <>
+                  <i
+                    class="compared-mark"
+                    style={{ background: `var(${colourOf(found.jobs.indexOf(job))})` }}
+                    aria-hidden="true"
+                  />
+                  <a href={jobPath(job.id)}>{job.name || job.id}</a>
+                </>
+              ),
+            },
+            { key: 'state', label: 'State', value: ({ state }) => state },
+            {
+              key: 'best',
+              label: 'Best fitness',
+              numeric: true,
+              value: ({ best_fitness }) => best_fitness,
+              cell: ({ best_fitness }) => formatNumber(best_fitness, 5),
+            },
+            {
+              key: 'evaluations',
+              label: 'Evaluations',
+              numeric: true,
+              value: ({ evaluations }) => evaluations,
+              cell: ({ evaluations }) => formatCount(evaluations),
+            },
+            {
+              key: 'failed',
+              label: 'Failed',
+              numeric: true,
+              value: ({ failed, evaluations }) => failed / evaluations,
+              cell: ({ failed, evaluations }) =>
+                evaluations === 0 ? NONE : percent(failed / evaluations, 2),
+            },
+          ]}
+        />
+      </section>
+      <ConvergenceCard jobs={found.jobs} />
+      <DistributionCard jobs={found.jobs} />
+      <Differences found={found} />
+    </>
+  )
+}
+
+function Differences({ found: { jobs, differences } }: { found: JobComparison }) {
+  return (
+    <section class="card" aria-labelledby="differences" data-differences={differences.length}>
+      <h2 id="differences">What their specs say differently</h2>
+      {differences.length === 0 ? (
+        <Empty title="Nothing">
+          <p>Their specs are the same.</p>
+        </Empty>
+      ) : (
+        <Table
+          caption="Differences of the specs"
+          rows={differences}
+          rowKey={({ field }) => field}
+          columns={[
+            {
+              key: 'field',
+              label: 'Field',
+              header: true,
+              value: ({ field }) => field,
+              cell: ({ field }) => <code>{field}</code>,
+            },
+            ...jobs.map(({ id, name }, k) => ({
+              key: id,
+              label: name || id,
+              cell: ({ values }: JobComparison['differences'][number]) => (
+                <code class="spec-value">{values[k] ?? NONE}</code>
+              ),
+            })),
+          ]}
+        />
+      )}
+    </section>
+  )
+}

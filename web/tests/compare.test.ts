@@ -1,0 +1,51 @@
+import { describe, expect, test } from 'vitest'
+import { type ComparedJob, convergences, distributions } from '../src/compare/series'
+
+const job = (changes: Partial<ComparedJob['convergence']>, fitness: number[]): ComparedJob => ({
+  id: 'k2q7zr5dm9xw',
+  name: '',
+  state: 'succeeded',
+  best_fitness: 1,
+  evaluations: 8,
+  failed: 0,
+  convergence: {
+    id: 'k2q7zr5dm9xw',
+    iterations: [0, 1],
+    evaluations: [4, 8],
+    seconds: [1, 2],
+    best_so_far: [3, 2],
+    ...changes,
+  },
+  shares: fitness.map((_, k) => k / (fitness.length - 1)),
+  fitness,
+})
+
+const short = job({}, [2, 4, 6])
+const long = job(
+  { iterations: [0, 1, 2], evaluations: [2, 4, 6], seconds: [2, 4, 6], best_so_far: [null, 5, 1] },
+  [1, 5],
+)
+
+describe('convergence of several jobs', () => {
+  test('holds what a job has found until it finds better, and ends where the job does', () => {
+    const { x, lines } = convergences([short, long], 'evaluations')
+    expect(x).toEqual([2, 4, 6, 8])
+    expect(lines).toEqual([
+      [null, 3, 3, 2],
+      [null, 5, 1, null],
+    ])
+  })
+
+  test('counts iterations that are done', () => {
+    expect(convergences([short, long], 'iterations').x).toEqual([1, 2, 3])
+  })
+})
+
+test('distribution functions rise from 0 to 1 over the fitness of all', () => {
+  const { x, lines } = distributions([short, long])
+  expect(x).toEqual([1, 2, 4, 5, 6])
+  expect(lines).toEqual([
+    [0, 0, 0.5, 0.5, 1],
+    [0, 0, 0, 1, 1],
+  ])
+})

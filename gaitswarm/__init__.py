@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.kinds.tournament import TournamentSpec
     from services.optimizer.jobs.kinds.tuning import JobSpec
     from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+    from services.optimizer.jobs.labels import JobFilter
     from services.optimizer.jobs.preference import PREFERENCES, Preference
     from services.optimizer.run.outage import Backoff
     from services.optimizer.search.automatic import AutoSettings

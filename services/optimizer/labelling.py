@@ -3,17 +3,59 @@
 from __future__ import annotations
 
 from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.labels import FacetCounts, LabelsChange
+from services.optimizer.jobs.job import Job, JobOrder, JobState
+from services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
 from services.optimizer.store.base import Store
+from services.optimizer.store.reading import Page
 
 
 class Labelling:
-    """Labels jobs, and counts them by what they are found by. Thread-safe, as the store is."""
+    """Lists jobs, labels them, and counts them by what they are found by. Thread-safe, as the store is."""
 
     __slots__ = ()
 
     store: Store
+
+    def jobs(
+        self,
+        *,
+        state: JobState | None = None,
+        kind: str | None = None,
+        parent: str | None = None,
+        search: str = "",
+        where: JobFilter = ANY_JOB,
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
+    ) -> Page[Job]:
+        """List jobs, page by page. Jobs submitted meanwhile do not shift later pages.
+
+        Args:
+            state: only jobs in it; None for any.
+            kind: only jobs whose specs say that they are of this kind; None for any.
+            parent: only jobs that were forked from the job of this id; None for any.
+            search: only jobs whose name, id, note or tags contain this, whatever its case.
+            where: only jobs that this admits.
+            order: how they are sorted.
+            after: `next` of the page before, of the same order.
+            limit: most jobs on a page.
+
+        Returns:
+            A page; `next` is None on the last one.
+
+        Raises:
+            InvalidRequest: `after` is no cursor of that order.
+        """
+        return self.store.jobs(
+            state=state,
+            kind=kind,
+            parent=parent,
+            search=search,
+            where=where,
+            order=order,
+            after=after,
+            limit=limit,
+        )
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
         """Count jobs by what they are found by.

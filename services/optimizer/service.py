@@ -19,8 +19,7 @@ from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.estimate import Estimate, MeasuredRates, checked_length, estimate
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.iteration import Evaluation, Iteration
-from services.optimizer.jobs.job import Claim, Job, JobOrder, JobState, refusal
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from services.optimizer.jobs.job import Claim, Job, refusal
 from services.optimizer.jobs.priority import check_priority
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.jobs.quota import Quota
@@ -250,47 +249,6 @@ class JobService(Questions, Commands, Deletion, Labelling):
             NotFound: no job of that id.
         """
         return self.store.job(job_id)
-
-    def jobs(
-        self,
-        *,
-        state: JobState | None = None,
-        kind: str | None = None,
-        parent: str | None = None,
-        search: str = "",
-        where: JobFilter = ANY_JOB,
-        order: JobOrder = JobOrder.CREATED,
-        after: str | None = None,
-        limit: int = 50,
-    ) -> Page[Job]:
-        """List jobs, page by page. Jobs submitted meanwhile do not shift later pages.
-
-        Args:
-            state: only jobs in it; None for any.
-            kind: only jobs whose specs say that they are of this kind; None for any.
-            parent: only jobs that were forked from the job of this id; None for any.
-            search: only jobs whose name, id, note or tags contain this, whatever its case.
-            where: only jobs that this admits.
-            order: how they are sorted.
-            after: `next` of the page before, of the same order.
-            limit: most jobs on a page.
-
-        Returns:
-            A page; `next` is None on the last one.
-
-        Raises:
-            InvalidRequest: `after` is no cursor of that order.
-        """
-        return self.store.jobs(
-            state=state,
-            kind=kind,
-            parent=parent,
-            search=search,
-            where=where,
-            order=order,
-            after=after,
-            limit=limit,
-        )
 
     def check_unchanged(self, job: Job) -> None:
         """Check that a job's next numbers, computed here, depend on what those that it has do.

@@ -6,7 +6,6 @@ import { ofLegGroups } from '../src/submission/catalogue'
 import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
 import { optimizerDraft, settingsOf, withPreset } from '../src/submission/optimizer'
 import { boundsInWords, fieldsOf } from '../src/submission/schema-fields'
-import { widened } from '../src/submission/widen'
 import { counts, walksEach, worldsFields } from '../src/submission/worlds'
 import { CATALOGUE, DOCUMENT } from './catalogue-example'
 
@@ -393,22 +392,5 @@ describe('fields of the schema', () => {
 
   test('of a schema that is not there are an error', () => {
     expect(() => fieldsOf(DOCUMENT, 'Nothing')).toThrow('no schema Nothing')
-  })
-})
-
-describe('other bounds', () => {
-  test('replace those of searched variables alone', () => {
-    const fixed = { ...empty.variables.FOMF, mode: 'fixed' as const }
-    const draft = { ...empty, variables: { ...empty.variables, FOMF: fixed } }
-    const wider = widened(draft, 'P:-1:2.5,FOMF:0:9,unknown:0:1')
-    expect(wider.variables.P).toMatchObject({ low: '-1', high: '2.5' })
-    expect(wider.variables.FOMF).toEqual(fixed)
-    expect(wider.variables.unknown).toBeUndefined()
-  })
-
-  test('that cannot be read change nothing', () => {
-    for (const asked of ['', 'P', 'P:1', 'P:a:b', 'P::2', 'P:1:2:3']) {
-      expect(widened(empty, asked)).toEqual(empty)
-    }
   })
 })

@@ -10,7 +10,7 @@ from typing import TypeVar
 import httpx2
 from pydantic import BaseModel
 
-from gaitswarm.jobs.server import calls
+from gaitswarm.jobs.server import analysis_calls, calls
 from gaitswarm.jobs.server.attempts import (
     unreachable,
 )
@@ -88,19 +88,19 @@ class AsyncServerFindings(ABC):
         self, job_id: str, preference: PreferenceInput, *, top: int = 20
     ) -> RankingView:
         """Let the server rank a job's designs."""
-        return await self._send(calls.ranking(job_id, arguments.ranking(preference, top)))
+        return await self._send(analysis_calls.ranking(job_id, arguments.ranking(preference, top)))
 
     async def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Let the server judge a job's designs by fewer scenarios."""
-        return await self._send(calls.scenarios(job_id, tolerance))
+        return await self._send(analysis_calls.scenarios(job_id, tolerance))
 
     async def importance(self, job_id: str) -> ImportanceView:
         """Let the server estimate indices."""
-        return await self._send(calls.importance(job_id))
+        return await self._send(analysis_calls.importance(job_id))
 
     async def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
         """Let the server compare jobs."""
-        return await self._send(calls.comparison(arguments.runs(job_ids)))
+        return await self._send(analysis_calls.comparison(arguments.runs(job_ids)))
 
     async def preferences(
         self,
@@ -122,15 +122,15 @@ class AsyncServerFindings(ABC):
             seed=seed,
             precision=precision,
         )
-        return await self._send(calls.preferences(job_id, request))
+        return await self._send(analysis_calls.preferences(job_id, request))
 
     async def front(self, job_id: str, *, most: int = 1000) -> FrontView:
         """Let the server find a job's front."""
-        return await self._send(calls.front(job_id, most))
+        return await self._send(analysis_calls.front(job_id, most))
 
     async def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
         """Let the server find a design's preference."""
-        return await self._send(calls.preference_for(job_id, iteration, particle))
+        return await self._send(analysis_calls.preference_for(job_id, iteration, particle))
 
     async def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Let the server compare runs."""

@@ -11,7 +11,7 @@ import httpx2
 from pydantic import BaseModel
 
 from gaitswarm.jobs.findings import Findings
-from gaitswarm.jobs.server import calls
+from gaitswarm.jobs.server import analysis_calls, calls
 from gaitswarm.jobs.server.attempts import (
     unreachable,
 )
@@ -87,19 +87,19 @@ class ServerFindings(Findings, Tournaments, ABC):
 
     def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
         """Let the server rank a job's designs."""
-        return self._send(calls.ranking(job_id, arguments.ranking(preference, top)))
+        return self._send(analysis_calls.ranking(job_id, arguments.ranking(preference, top)))
 
     def scenarios(self, job_id: str, *, tolerance: float = 0.01) -> ScenarioFamiliesView:
         """Let the server judge a job's designs by fewer scenarios."""
-        return self._send(calls.scenarios(job_id, tolerance))
+        return self._send(analysis_calls.scenarios(job_id, tolerance))
 
     def importance(self, job_id: str) -> ImportanceView:
         """Let the server estimate indices."""
-        return self._send(calls.importance(job_id))
+        return self._send(analysis_calls.importance(job_id))
 
     def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
         """Let the server compare jobs."""
-        return self._send(calls.comparison(arguments.runs(job_ids)))
+        return self._send(analysis_calls.comparison(arguments.runs(job_ids)))
 
     def preferences(
         self,
@@ -121,15 +121,15 @@ class ServerFindings(Findings, Tournaments, ABC):
             seed=seed,
             precision=precision,
         )
-        return self._send(calls.preferences(job_id, request))
+        return self._send(analysis_calls.preferences(job_id, request))
 
     def front(self, job_id: str, *, most: int = 1000) -> FrontView:
         """Let the server find a job's front."""
-        return self._send(calls.front(job_id, most))
+        return self._send(analysis_calls.front(job_id, most))
 
     def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
         """Let the server find a design's preference."""
-        return self._send(calls.preference_for(job_id, iteration, particle))
+        return self._send(analysis_calls.preference_for(job_id, iteration, particle))
 
     def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Let the server compare runs."""

@@ -10,7 +10,7 @@ from services.optimizer.store.reading import Page
 
 
 class Labelling:
-    """Lists jobs, labels them, and counts them by what they are found by. Thread-safe, as the store is."""
+    """Lists, labels and counts jobs. Thread-safe, as the store is."""
 
     __slots__ = ()
 

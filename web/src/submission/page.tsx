@@ -91,9 +91,9 @@ function startingFrom(draft: Draft, query: URLSearchParams): Draft {
   return jobs === null ? draft : { ...draft, start: { ...draft.start, jobs } }
 }
 
-/** Whether the form has no fields for a job, as it is of another kind. */
+/** Whether the form would lose something of a job: what it is, or a plug-in's case. */
 function isDocument({ spec }: Job): boolean {
-  return spec.kind !== 'tuning'
+  return spec.kind !== 'tuning' || (spec.case ?? null) !== null
 }
 
 function withSeed(job: Job, seed: string | null): Job {

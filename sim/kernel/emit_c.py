@@ -114,6 +114,7 @@ class _Emitter:
         self._lines: list[str] = []
         self._circular: set[str] = set()
         self._inverse: set[str] = set()
+        self._read: set[str] = set()
 
     def source(self, name: str) -> str:
         f = self._function
@@ -127,7 +128,12 @@ class _Emitter:
         self._replay(lambda k, op, operands: self._emit(k, op, operands, uses))
         names = [*(f"i{k}" for k in range(f.n_in())), *(f"o{k}" for k in range(f.n_out()))]
         sizes = [*map(f.nnz_in, range(f.n_in())), *map(f.nnz_out, range(f.n_out()))]
-        empty = [f"(void){name};" for name, size in zip(names, sizes, strict=True) if not size]
+        unread = {f"i{k}" for k in range(f.n_in())} - self._read
+        empty = [
+            f"(void){name};"
+            for name, size in zip(names, sizes, strict=True)
+            if not size or name in unread
+        ]
         body = "\n".join(f"  {line}" for line in [*empty, *self._lines, *self._outputs])
         return f"static void {name}({', '.join(arguments)})\n{{\n{body}\n}}\n"
 
@@ -176,6 +182,7 @@ class _Emitter:
             value = f"SPLAT({float(f.instruction_constant(k)).hex()})"
         elif op == "OP_INPUT":
             argument, element = f.instruction_input(k)
+            self._read.add(f"i{argument}")
             value = f"i{argument}[{element}]"
             if self._uniform[argument]:
                 value = f"SPLAT({value})"

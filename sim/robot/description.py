@@ -267,6 +267,7 @@ class RobotDescription(Data):
                 raise ValueError(f"leg_groups.{group}: name one leg at least, and none twice")
         return self
 
+    @model_validator(mode="after")
     def _is_commanded_as_its_actuators_are(self) -> RobotDescription:
         kinds = {self.actuators[name].kind: name for leg in self.legs for name in leg.actuators}
         if len(kinds) > 1:

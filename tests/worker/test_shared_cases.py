@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import signal
 from types import ModuleType, SimpleNamespace
 from typing import Any, cast
 from unittest.mock import Mock, patch
@@ -82,3 +83,13 @@ def test_a_task_is_sent_without_cases_and_a_process_reads_them_once(
     for part, outcome in zip(PARTS, first.outcomes, strict=True):
         rows = whole[part.case].objectives[part.start : part.stop]
         assert outcome.objectives.tobytes() == rows.tobytes()
+
+
+def test_a_walk_is_interrupted_though_its_process_was_started_to_ignore_that() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    interrupted = SimpleNamespace(receive=lambda: signal.raise_signal(signal.SIGINT))
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            run_sent(cast(Any, SimpleNamespace(shared=interrupted)))
+    finally:
+        signal.signal(signal.SIGINT, before)

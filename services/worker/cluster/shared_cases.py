@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import uuid
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -132,6 +134,19 @@ def run_sent(sent_task: SentTask) -> Answer | Failure:
     Returns:
         As of `run_in_worker`.
     """
+    _heed_interrupts()
     cases = sent_task.shared.receive()
     chosen = tuple(cases[index] for index in sent_task.chosen)
     return run_in_worker(replace(sent_task.task, cases=chosen))
+
+
+def _heed_interrupts() -> None:
+    """Let SIGINT interrupt this process, as it does by default. Only in a process's main thread.
+
+    Ray cancels a task by it. A shell's script makes what it starts in the background ignore it,
+    which Ray's workers inherit: Ray would then raise a TypeError in place of the cancellation.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -6,9 +6,9 @@ import json
 import struct
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import httpx2
 import numpy as np
@@ -25,6 +25,8 @@ from services.monitoring.metrics import Metrics
 from services.optimizer.service import JobService
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import line_with, output
+
+_QUICK_EVENTS: Final = {"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"}
 
 
 class Served:
@@ -111,13 +113,21 @@ class Server(Served):
 
 
 class ServerProcess(Served):
-    """`gaitswarm serve` as a process, with a runner unless told otherwise, and a client of it."""
+    """`gaitswarm serve` as a process, with a runner unless told otherwise, and a client of it.
 
-    def __init__(self, database: Path, *options: str) -> None:
+    database: a file, or a URL. environment: beside this process's.
+    """
+
+    def __init__(
+        self,
+        database: Path | str,
+        *options: str,
+        environment: Mapping[str, str] = _QUICK_EVENTS,
+    ) -> None:
         chosen = options or ("--evaluator", "in-process")
         self.process = ForkedCommand(
             *("serve", "--db", str(database), "--port", "0", *chosen),
-            environment={"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"},
+            environment=environment,
             stdout=None,
         )
         self.url = line_with(self.process.stderr, r"serves (http://[\d.:]+) and")[1]

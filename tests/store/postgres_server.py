@@ -58,13 +58,15 @@ def server_binaries() -> Path:
 class PostgresServer:
     """A server of the tests' own.
 
-    url: without the database, `postgresql://...:port`.
+    url: without the database, `postgresql://...:port`. durable: whether what was committed survives
+    a power cut, which takes time.
     """
 
     binaries: Path
     folder: Path
     port: int
     user: pwd.struct_passwd | None
+    durable: bool = False
 
     @property
     def url(self) -> str:
@@ -72,9 +74,10 @@ class PostgresServer:
 
     def start(self) -> None:
         """Start it, and wait until it answers."""
-        options = f"-c listen_addresses=127.0.0.1 -c port={self.port} -k {self.folder} -c fsync=off"
+        fsync = "on" if self.durable else "off"
+        options = f"-c listen_addresses=127.0.0.1 -c port={self.port} -k {self.folder}"
         log = self.folder / "log"
-        self._control("start", "-l", log, "-o", options)
+        self._control("start", "-l", log, "-o", f"{options} -c fsync={fsync}")
 
     def stop(self) -> None:
         """Let it die as in a crash: no goodbye to clients, and recovery at the next start."""
@@ -86,8 +89,8 @@ class PostgresServer:
 
 
 @contextmanager
-def postgres_server(binaries: Path) -> Iterator[PostgresServer]:
-    """A running server; it is gone at the end."""
+def postgres_server(binaries: Path, *, durable: bool = False) -> Iterator[PostgresServer]:
+    """A running server; it is gone at the end. durable: as of `PostgresServer`."""
     folder = Path(tempfile.mkdtemp(prefix="gaitswarm-pg-"))
     user = _unprivileged_user()
     try:
@@ -95,7 +98,7 @@ def postgres_server(binaries: Path) -> Iterator[PostgresServer]:
             os.chown(folder, user.pw_uid, user.pw_gid)
         trust = ["-U", "gaitswarm", "-A", "trust", "-E", "UTF8", "-N"]
         _run([binaries / "initdb", "-D", folder / "data", *trust], user)
-        server = PostgresServer(binaries, folder, _free_port(), user)
+        server = PostgresServer(binaries, folder, _free_port(), user, durable)
         server.start()
         try:
             yield server

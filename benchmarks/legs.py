@@ -44,7 +44,7 @@ def robots() -> dict[str, tuple[Robot, Scenario]]:
     }
     path = FOLDER / QUADRUPEDS["a1"]
     if path.is_file():
-        made = propose_robot(path.read_text(encoding="utf-8"), "a1")
+        made = propose_robot(path.read_text(encoding="utf-8"), "a1", "dc")
         fast = Scenario.model_validate(made.job["scenarios"][1])
         found["a1"] = parse_robot(made.toml, made.urdf), fast
     return found

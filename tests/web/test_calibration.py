@@ -58,7 +58,16 @@ def test_the_list_of_jobs_says_what_it_is(
     row.get_by_role("link", name="two laws of friction").click()
     tabs = page.get_by_role("navigation", name="Parts of the job")
     expect(tabs.get_by_role("link")).to_have_text(
-        ["Overview", "Targets", "Walks", "Parameters", "Variables", "Iterations", "Spec"]
+        [
+            "Overview",
+            "Targets",
+            "Walks",
+            "Parameters",
+            "Analysis",
+            "Variables",
+            "Iterations",
+            "Spec",
+        ]
     )
     best = server.job(calibration)["best"]["design"]["contact_law"]
     expect(page.get_by_role("definition").filter(has_text=best.replace("_", " "))).to_be_visible()

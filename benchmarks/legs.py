@@ -77,9 +77,9 @@ def main() -> None:
     for contestant in contestants.values():
         us_per_step(*contestant)  # Compiles, and makes the plans.
     for _ in range(options.rounds):
-        for name, contestant in contestants.items():
-            seen[name].append(us_per_step(*contestant))
-    medians = {name: statistics.median(times) for name, times in seen.items()}
+        for row, contestant in contestants.items():
+            seen[row].append(us_per_step(*contestant))
+    medians = {row: statistics.median(times) for row, times in seen.items()}
     rows = [
         {
             "robot": name,

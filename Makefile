@@ -7,8 +7,9 @@ DB ?=
 ARGS ?=
 COMPILE := $(UV) pip compile --universal --generate-hashes --no-header --no-annotate --quiet
 
-# Tests run on every processor; each worker takes a gigabyte of memory.
-WORKERS := --numprocesses auto --maxprocesses 8 --dist worksteal
+# Some tests wait more than they compute: three workers for every two processors. Each takes a
+# gigabyte of memory.
+WORKERS := --numprocesses $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) * 3 + 1) / 2 ))) --maxprocesses 8 --dist worksteal
 
 # An empty DB means the default database of the user.
 ifneq ($(DB),)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from cli.job_ids import full_id
 from cli.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
@@ -99,6 +100,7 @@ def _best_of_job(
     from sim.catalogue import design_numbers
 
     with open_jobs(server, db) as jobs:
+        job_id = full_id(jobs, job_id)
         try:
             spec = jobs.job(job_id).spec
         except NotFound as error:

@@ -11,7 +11,14 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-JobId = Annotated[str, typer.Argument(metavar="ID", help="Identifier of the job.")]
+from cli.job_ids import completed
+
+JobId = Annotated[
+    str,
+    typer.Argument(
+        metavar="ID", callback=completed, help="Identifier of the job, or its beginning."
+    ),
+]
 
 JobName = Annotated[str | None, typer.Option(help="Name of the job, for people.")]
 
@@ -36,13 +43,15 @@ Notify = Annotated[
 
 Server = Annotated[
     str | None,
-    typer.Option(metavar="URL", help="Ask this server. [env: GAITSWARM_SERVER]"),
+    # Read before the id of a job, which may have to be looked up there.
+    typer.Option(metavar="URL", is_eager=True, help="Ask this server. [env: GAITSWARM_SERVER]"),
 ]
 
 Db = Annotated[
     str | None,
     typer.Option(
         metavar="URL",
+        is_eager=True,
         help="Use this database: a file, sqlite:///FILE or postgresql://... [env: GAITSWARM_DB;"
         " default: gaitswarm/gaitswarm.db in the user's data directory]",
     ),

@@ -55,17 +55,17 @@ SHORT: Final = {
 
 
 def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
-    """One row a job."""
-    table = Table("id", "name", "state", box=None)
-    table.add_column("priority", justify="right")
-    for column in ("iterations", "best fitness", "submitted (UTC)"):
-        table.add_column(column)
-    for job in jobs:
+    """One row a job; their priorities only where one is not the usual."""
+    rows = list(jobs)
+    urgent = any(job.priority for job in rows)
+    last = ("iterations", "best fitness", "submitted (UTC)")
+    table = Table("id", "name", "state", *(["priority"] if urgent else []), *last, box=None)
+    for job in rows:
         table.add_row(
             job.id,
             _name(job),
             Text(job.state.value, style=_STYLES.get(job.state.value, "")),
-            str(job.priority),
+            *([str(job.priority)] if urgent else []),
             _spent(job),
             number(job.best_fitness),
             f"{job.created_at:%Y-%m-%d %H:%M}",

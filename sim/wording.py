@@ -51,6 +51,10 @@ _PLAIN: Final = {
 """By pydantic's type of error; in braces what its context holds."""
 
 
+_LONGEST_KEY: Final = 100
+"""That is compared with the known ones; comparing takes time by its length."""
+
+
 def message_of(error: Mapping[str, Any]) -> str:
     """What is wrong with a value, and what it must be.
 
@@ -94,7 +98,7 @@ def _number(value: object) -> object:
 
 
 def _hint(key: str, known: Sequence[str]) -> str:
-    near = get_close_matches(key, known, n=1)
+    near = get_close_matches(key, known, n=1) if len(key) <= _LONGEST_KEY else []
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
 
 

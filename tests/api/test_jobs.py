@@ -266,7 +266,7 @@ def test_links_lead_to_the_jobs_resources_and_allowed_commands(
     links = client.get(f"/v1/jobs/{job.id}").json()["links"]
 
     resources = {"best", "iterations", "events", "distribution", "particles", "export", "ranking"}
-    assert set(links) == {"self", *resources, "pause", "cancel", "extend", "keep"}
+    assert set(links) == {"self", *resources, "pause", "cancel", "extend", "keep", "priority"}
     for name in resources - {"best", "events", "ranking"}:
         assert client.get(links[name]).status_code == 200
     assert client.post(links["pause"]).status_code == 202

@@ -178,7 +178,7 @@ def test_a_robot_of_ones_own_can_be_watched(client: httpx2.Client) -> None:
         ({"design": {**PUBLISHED_A, "FI1R": -5.0}}, "design", "FI1R"),
         ({"design": {**PUBLISHED_A, "stride": 0.9}}, "scenario", "misses its foot trajectory"),
         ({"design": {**PUBLISHED_A, "cycle_time": 1e6}}, "scenario", "40 s allowed with logs"),
-        ({"scenarios": ["1"]}, "scenarios", "Extra"),
+        ({"scenarios": ["1"]}, "scenarios", "unknown key"),
     ],
 )
 def test_a_request_that_makes_no_sense_is_refused_by_field(

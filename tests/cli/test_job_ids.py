@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -39,8 +40,9 @@ def test_a_beginning_of_no_id_is_refused_as_any_unknown_one(
 
 
 def test_a_beginning_of_several_ids_is_refused_with_these(
-    gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
+    finished: Finished, tmp_path: Path
 ) -> None:
+    shutil.copy(finished.db, tmp_path / "jobs.db")
     with open_jobs(None, str(tmp_path / "jobs.db")) as jobs:
         ids = [jobs.submit(controller="pi").id for _ in range(40)]
         shared = next(a[:1] for a in ids if sum(b[:1] == a[:1] for b in ids) > 1)

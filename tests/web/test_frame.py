@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -51,12 +51,20 @@ def chart_range(page: Page) -> list[float]:
     return [float(end) for end in (text or "").split()]
 
 
-def test_a_zoom_stays_while_iterations_arrive(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
+@pytest.fixture
+def endless_job(server: ServerProcess) -> Iterator[str]:
+    """A job that runs until the test is over."""
     job_id = server.submit(SMALL_JOB | {"iterations": 5000})
-    page = visit(server.url).go(f"/jobs/{job_id}")
+    yield job_id
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+
+
+def test_a_zoom_stays_while_iterations_arrive(
+    server: ServerProcess, endless_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{endless_job}")
     wait_for_iteration(page, 10)
+    expect(page.locator(".u-over").first).to_be_visible()
     box = page.locator(".u-over").first.bounding_box()
     assert box is not None
     middle = box["y"] + box["height"] / 2
@@ -71,7 +79,6 @@ def test_a_zoom_stays_while_iterations_arrive(
     assert chart_range(page) == zoomed
     page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
     expect(page.locator(".uplot").first).to_have_attribute("data-range", re.compile("^0 "))
-    server.client.post(f"/v1/jobs/{job_id}/cancel")
 
 
 def test_a_new_order_begins_on_the_first_page(
@@ -90,6 +97,7 @@ def test_bounds_of_a_selection_in_the_wrong_order_are_those_of_the_same_stretch(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}/variables")
+    expect(page.locator("[data-selected]")).to_have_attribute("data-selected", "48")
     page.get_by_text("Select by numbers").click()
     least, most = page.get_by_label("FI1R from"), page.get_by_label("FI1R to")
     least.fill("5000")

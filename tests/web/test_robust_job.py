@@ -40,7 +40,7 @@ def test_a_robust_job_is_set_up_in_the_form_and_its_cost_is_told_first(
     page.get_by_role("button", name="Submit the job").click()
     expect(worlds).to_have_attribute("aria-invalid", "true")
     expect(worlds).to_be_focused()
-    expect(part.get_by_text(re.compile("less than or equal to 100"))).to_be_visible()
+    expect(part.get_by_text(re.compile("at most 100"))).to_be_visible()
     worlds.fill("2")
     page.get_by_role("button", name="Submit the job").click()
 

@@ -25,6 +25,16 @@ settings.register_profile("gaitswarm", deadline=None)
 settings.load_profile("gaitswarm")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the tests that start Ray clusters.
+
+    The processes of a test run are dealt consecutive tests, so that one of them runs all of these:
+    two clusters at a time would wait for each other's processors until their time is out. And they
+    wait often, while the other processes compute.
+    """
+    items.sort(key=lambda item: item.path.parent.name != "worker")
+
+
 @pytest.fixture(autouse=True)
 def _no_user_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A data directory of the test's own, and none of the user's settings."""

@@ -53,6 +53,7 @@ class HybridEvaluator:
         self._changing = threading.Lock()
         self._ray: RayEvaluator | None = None
         self._without_ray = False
+        self._walked_on_ray = False
         self._closed = False
 
     @property
@@ -81,20 +82,30 @@ class HybridEvaluator:
         """Have the walks run by Ray if it is ready, and by this process otherwise."""
         ray = self._ready_ray()
         if ray is None:
+            # Lost between two requests, if the last one was run by it.
+            if self._walked_on_ray and not (self._without_ray or self._closed):
+                self._say_lost()
             return self._walk_here(request, should_stop)
         try:
-            return ray.evaluate(request, should_stop)
+            outcomes = ray.evaluate(request, should_stop)
         except EvaluatorUnavailable:
             # Not if walks have killed their workers: they would kill this process.
             if self._closed or not ray.lost:
                 raise
-            _log.warning("walks go on in this process until Ray is open again")
+            self._say_lost()
         except ProvenanceChanged as error:
             # Workers have imported the code later than this process, if it is theirs that differs.
             outcomes = self._walk_here(request, should_stop)
             self._do_without_ray(error)
             return outcomes
+        else:
+            self._walked_on_ray = True
+            return outcomes
         return self._walk_here(request, should_stop)
+
+    def _say_lost(self) -> None:
+        self._walked_on_ray = False
+        _log.warning("walks go on in this process until Ray is open again")
 
     def close(self) -> None:
         """End Ray and the threads; waits for what they are just doing. Idempotent."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import signal
+from contextlib import suppress
 from types import ModuleType, SimpleNamespace
 from typing import Any, cast
 from unittest.mock import Mock, patch
@@ -12,7 +13,7 @@ import pytest
 
 from services.worker.cluster.shared_cases import CaseShelf, run_sent, sent
 from services.worker.cutting import Part
-from services.worker.tasks import Answer, Task
+from services.worker.tasks import Answer, Failure, Task
 from sim.case import Case
 from tests.worker.requests import bits, request, walked_at_once
 
@@ -93,3 +94,28 @@ def test_a_walk_is_interrupted_though_its_process_was_started_to_ignore_that() -
             run_sent(cast(Any, SimpleNamespace(shared=interrupted)))
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize(
+    ("error", "ends"),
+    [
+        (AttributeError("module 'numpy' has no attribute 'matrix'"), True),
+        (AttributeError("partially initialized module 'scipy' has no attribute 'linalg'"), True),
+        (ImportError("cannot import name 'x' from partially initialized module 'y'"), True),
+        (AttributeError("'Walk' object has no attribute 'x'"), False),
+        (ValueError("module 'numpy' has no attribute 'matrix'"), False),
+    ],
+)
+def test_a_worker_ends_whose_modules_a_cancellation_has_left_half_imported(
+    error: Exception, ends: bool
+) -> None:
+    shared = SimpleNamespace(receive=lambda: WANTED.cases)
+    walks = Task.of(WANTED.cases, WANTED.designs, PARTS, WANTED.provenance)
+    task = SimpleNamespace(shared=shared, chosen=(0,), task=walks)
+    with (
+        patch("services.worker.cluster.shared_cases.run_in_worker", return_value=Failure(error)),
+        patch("os._exit", side_effect=SystemExit) as left,
+        suppress(SystemExit),
+    ):
+        assert run_sent(cast(Any, task)) == Failure(error)
+    assert left.called is ends

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
 import signal
+import sys
 import threading
 import uuid
 from collections import OrderedDict
@@ -17,6 +20,8 @@ from sim.case import Case
 
 _KEPT: Final = 32
 """Lists of cases, of as many jobs: those that were used last."""
+
+_MISSING_IN_MODULE: Final = re.compile(r"module '[\w.]+' has no attribute")
 
 _received: Final[OrderedDict[str, tuple[Case, ...]]] = OrderedDict()
 """In a worker, by key."""
@@ -132,12 +137,34 @@ def run_sent(sent_task: SentTask) -> Answer | Failure:
         sent_task: What is to be run.
 
     Returns:
-        As of `run_in_worker`.
+        As of `run_in_worker`; nothing where the process has to end, as one does whose modules a
+        cancellation has left half imported. Ray then reports that the worker has died.
     """
     _heed_interrupts()
     cases = sent_task.shared.receive()
     chosen = tuple(cases[index] for index in sent_task.chosen)
-    return run_in_worker(replace(sent_task.task, cases=chosen))
+    answer = run_in_worker(replace(sent_task.task, cases=chosen))
+    if isinstance(answer, Failure) and is_half_imported(answer.error):
+        note = f"gaitswarm: this worker ends, since a module is half imported: {answer.error}\n"
+        sys.stderr.write(note)
+        sys.stderr.flush()
+        os._exit(1)
+    return answer
+
+
+def is_half_imported(error: Exception) -> bool:
+    """Whether an error is what code says of a module whose import was interrupted.
+
+    Args:
+        error: What a task has raised.
+
+    Returns:
+        Whether a name that the module ought to have is missing in it.
+    """
+    said = str(error)
+    return isinstance(error, AttributeError | ImportError) and (
+        "partially initialized module" in said or _MISSING_IN_MODULE.match(said) is not None
+    )
 
 
 def _heed_interrupts() -> None:

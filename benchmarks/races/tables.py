@@ -1,0 +1,174 @@
+"""The tables of docs/optimizers.md, from recorded runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from benchmarks.races.plans import CHAPTER_3, FUNCTION, PLANS, ROBOT
+from benchmarks.races.records import EARLIER, Record
+from benchmarks.races.statistics import (
+    MEASURE,
+    Medians,
+    correlation,
+    medians_of,
+    probability,
+    read_medians,
+    results_of,
+    with_more_runs,
+)
+from services.optimizer.analysis.tournaments.tournament import Results, Runs
+from services.optimizer.search.registry import OPTIMIZERS
+
+_BUDGET: Final = 625
+_LOOKED_AT: Final = (100, 250, 625)
+_LONG: Final = PLANS["chapter-4-long"].evaluations
+_CALLS: Final = PLANS["function"].evaluations
+
+_LARGE: Final = 1000.0
+"""Values from here on are shown without decimals."""
+
+_SMALL_P: Final = 0.01
+
+
+def all_tables(records: Iterable[Record], earlier: Path = EARLIER) -> list[str]:
+    """Every table for which there are runs, as Markdown, in the order of the document.
+
+    Args:
+        records: Runs.
+        earlier: File of medians of runs on the robot that were not kept.
+
+    Returns:
+        The tables.
+    """
+    records = list(records)
+    robot = results_of(records, ROBOT, _BUDGET)
+    function = results_of(records, FUNCTION, _CALLS)
+    known = with_more_runs(medians_of(robot, _LOOKED_AT), read_medians(earlier, _LOOKED_AT))
+    found = [medians_table(known, ROBOT, _LOOKED_AT)]
+    if robot:
+        found.append(spread_table(robot))
+    for problems, budget, looked_at in (
+        (ROBOT, _LONG, (625, 1250, 2500)),
+        (CHAPTER_3, _BUDGET, _LOOKED_AT),
+    ):
+        if results := results_of(records, problems, budget):
+            found.append(medians_table(medians_of(results, looked_at), problems, looked_at))
+            found.append(spread_table(results))
+    if function:
+        found.append(calls_table(function[FUNCTION[0]]))
+        found.append(correlation_table(function[FUNCTION[0]], known))
+    return found
+
+
+def medians_table(
+    medians: Mapping[str, Medians], problems: Sequence[str], checkpoints: Sequence[int]
+) -> str:
+    """Medians after some evaluations on every problem; the least of a column is bold."""
+    methods = sorted(medians, key=lambda m: medians[m].level)
+    head = ["method", "runs"]
+    columns = [[_shown(m) for m in methods], [str(medians[m].runs) for m in methods]]
+    for problem in problems:
+        for k, count in enumerate(checkpoints):
+            head.append(str(count) if k else f"{_short(problem)}: {count}")
+            columns.append(_bold_least([medians[m].by_problem[problem][k] for m in methods]))
+    return _markdown(head, columns)
+
+
+def spread_table(results: Results) -> str:
+    """Quartiles at the end on every problem, and the test against the default search."""
+    problems = list(results)
+    budget = next(iter(results[problems[0]].values())).budget
+    medians = medians_of(results, (budget,))
+    methods = sorted(medians, key=lambda m: medians[m].level)
+    head, columns = ["method"], [[_shown(m) for m in methods]]
+    for problem in problems:
+        of = results[problem]
+        head += [f"{_short(problem)}: quartiles", "p"]
+        columns.append([_quartiles(of[m]) for m in methods])
+        columns.append(
+            ["-" if m == MEASURE else _p(probability(of[m], of[MEASURE])) for m in methods]
+            if MEASURE in of
+            else ["-" for _ in methods]
+        )
+    return _markdown(head, columns)
+
+
+def calls_table(by_method: Mapping[str, Runs]) -> str:
+    """Calls until the target is reached, of a test function."""
+    calls = {m: _call_quartiles(runs) for m, runs in by_method.items()}
+    order = sorted(calls, key=lambda m: (calls[m][1], -by_method[m].solved.sum(), m))
+    rows = [
+        [
+            _shown(m),
+            str(len(by_method[m])),
+            str(int(by_method[m].solved.sum())),
+            _count(calls[m][1]),
+            f"{_count(calls[m][0])} to {_count(calls[m][2])}",
+            f"{by_method[m].median_after(_CALLS):.2g}",
+        ]
+        for m in order
+    ]
+    head = ["method", "runs", "solved", "median calls", "first to third quartile", "median at end"]
+    return _markdown(head, list(map(list, zip(*rows, strict=True))))
+
+
+def correlation_table(function: Mapping[str, Runs], robot: Mapping[str, Medians]) -> str:
+    """Spearman's correlation of ranks on the function with those on the robot."""
+    sets = [("A, B and C", ROBOT), *((_short(problem), (problem,)) for problem in ROBOT)]
+    head = ["robot", *(f"after {count}" for count in _LOOKED_AT)]
+    columns = [[name for name, _ in sets]]
+    for k in range(len(_LOOKED_AT)):
+        found = [correlation(function, robot, problems, k).value for _, problems in sets]
+        columns.append([f"{c.value:.2f} ({c.low:.2f} to {c.high:.2f})" for c in found])
+    return _markdown(head, columns)
+
+
+def _call_quartiles(runs: Runs) -> list[float]:
+    """Of the calls until the target was reached, +inf for a run that did not."""
+    calls = np.where(runs.solved, runs.to_target, np.inf)
+    return [float(q) for q in np.quantile(calls, (0.25, 0.5, 0.75), method="inverted_cdf")]
+
+
+def _short(problem: str) -> str:
+    """Of a preference its letter alone."""
+    return problem.removeprefix("chapter-4.")
+
+
+def _shown(method: str) -> str:
+    """In code style a method of jobs, in italics another library's."""
+    return f"`{method}`" if method in OPTIMIZERS else f"*{method}*"
+
+
+def _bold_least(values: Sequence[float]) -> list[str]:
+    shown = [_value(value) for value in values]
+    least = _value(min(values))
+    return [f"**{text}**" if text == least else text for text in shown]
+
+
+def _quartiles(runs: Runs) -> str:
+    low, _, high = runs.quartiles()[:, -1].tolist()
+    return f"{_value(low)} to {_value(high)}"
+
+
+def _value(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:,.0f}".replace(",", " ") if value >= _LARGE else f"{value:.2f}"
+
+
+def _count(value: float) -> str:
+    return f"{value:.0f}" if math.isfinite(value) else "-"
+
+
+def _p(value: float) -> str:
+    return f"{value:.2f}" if value >= _SMALL_P else f"{value:.1g}"
+
+
+def _markdown(head: Sequence[str], columns: Sequence[Sequence[str]]) -> str:
+    rows = [head, ["---"] * len(head), *zip(*columns, strict=True)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)

@@ -50,7 +50,7 @@ CHAPTER_3: Final = ("chapter-3.pi", "chapter-3.fuzzy-pi")
 FUNCTION: Final = ("D7C0R0I1",)
 GLOBALS: Final = ("global-unirandi", "global-nelder-mead", "global-bfgs")
 ANCHORS: Final = ("cma-es", "pso", "pso-thesis", "random")
-LOCAL: Final = ("sa", "dts", "nelder-mead", *GLOBALS)
+LOCAL: Final = ("dts", "nelder-mead", "sa", *GLOBALS)
 OTHERS: Final = ("pso-ps", "ps", "tlbo", "de", "ga", "gsa", "mads")
 
 PLANS: Final = {

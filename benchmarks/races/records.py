@@ -77,7 +77,7 @@ class Record:
         return (self.problem, self.method, self.settings, self.evaluations, self.seed)
 
     def row(self) -> tuple[object, ...]:
-        """As of `HEADER`; values to the last bit, nothing for what there is not."""
+        """As of `HEADER`; values to nine digits, nothing for what there is not."""
         return (
             *(getattr(self, name) for name in _RUN),
             *(_text(value) for value in self.best),
@@ -148,7 +148,7 @@ def _record(path: Path, line: int, row: list[str]) -> Record:
 
 
 def _text(value: float) -> str:
-    return "" if math.isnan(value) else repr(int(value) if value == round(value) else value)
+    return "" if math.isnan(value) else f"{value:.9g}"
 
 
 def _number(text: str) -> float:

@@ -39,7 +39,7 @@ def results_of(
         evaluations: Budget of the runs that are wanted.
 
     Returns:
-        The methods that have a run on every problem, in order of their names.
+        Problems and methods of which there is a run; methods in order of their names.
     """
     mine = [r for r in records if r.evaluations == evaluations and r.problem in problems]
     methods = sorted({r.method for r in mine})
@@ -51,8 +51,7 @@ def results_of(
             if rows:
                 runs = _runs(rows, evaluations, known.space.dimension, known.target)
                 found.setdefault(problem, {})[method] = runs
-    everywhere = [m for m in methods if all(m in found.get(p, {}) for p in problems)]
-    return {p: {m: found[p][m] for m in everywhere} for p in problems if everywhere}
+    return found
 
 
 def probability(runs: Runs, measure: Runs) -> float:
@@ -68,18 +67,33 @@ class Medians:
     """What a method came to on several problems.
 
     Attributes:
-        runs: Of each problem; the fewest.
+        runs: Of each problem that it was raced on; the fewest.
         by_problem: Medians after some evaluations, by problem.
     """
 
     runs: int
     by_problem: Mapping[str, tuple[float, ...]]
 
-    @property
-    def level(self) -> float:
-        """Mean logarithm of the last medians: by it methods are put in order in tables."""
-        lasts = [medians[-1] for medians in self.by_problem.values()]
-        return sum(map(math.log, lasts)) / len(lasts)
+
+def in_order(medians: Mapping[str, Medians]) -> list[str]:
+    """Methods as tables have them: by their last medians over the least of all, multiplied up.
+
+    Args:
+        medians: By method, each on one problem at least.
+
+    Returns:
+        The names; of a method that was raced on some problems alone, these count.
+    """
+    least: dict[str, float] = {}
+    for of_method in medians.values():
+        for problem, values in of_method.by_problem.items():
+            least[problem] = min(values[-1], least.get(problem, math.inf))
+
+    def level(method: str) -> float:
+        lasts = medians[method].by_problem.items()
+        return sum(math.log(values[-1] / least[problem]) for problem, values in lasts) / len(lasts)
+
+    return sorted(medians, key=level)
 
 
 def medians_of(results: Results, checkpoints: Sequence[int]) -> dict[str, Medians]:
@@ -92,16 +106,14 @@ def medians_of(results: Results, checkpoints: Sequence[int]) -> dict[str, Median
     Returns:
         By method; the lower one of two middle runs.
     """
-    return {
-        method: Medians(
-            min(len(of[method]) for of in results.values()),
-            {
-                problem: tuple(of[method].median_after(count) for count in checkpoints)
-                for problem, of in results.items()
-            },
-        )
-        for method in next(iter(results.values()), {})
-    }
+    runs: dict[str, int] = {}
+    found: dict[str, dict[str, tuple[float, ...]]] = {}
+    for problem, by_method in results.items():
+        for method, of in by_method.items():
+            runs[method] = min(len(of), runs.get(method, len(of)))
+            medians = tuple(of.median_after(count) for count in checkpoints)
+            found.setdefault(method, {})[problem] = medians
+    return {method: Medians(runs[method], of) for method, of in found.items()}
 
 
 def read_medians(path: Path, checkpoints: Sequence[int]) -> dict[str, Medians]:
@@ -159,9 +171,9 @@ def correlation(
         checkpoint: Which of the medians.
 
     Returns:
-        Of the methods in both.
+        Of the methods on the function and on all of these problems.
     """
-    methods = [m for m in function if m in robot]
+    methods = [m for m in function if m in robot and robot[m].by_problem.keys() >= set(problems)]
     there = ranks({m: function[m] for m in methods})
     here = np.zeros(len(methods))
     for problem in problems:

@@ -15,6 +15,7 @@ from benchmarks.races.statistics import (
     MEASURE,
     Medians,
     correlation,
+    in_order,
     medians_of,
     probability,
     read_medians,
@@ -34,6 +35,9 @@ _LARGE: Final = 1000.0
 
 _SMALL_P: Final = 0.01
 
+_ENOUGH: Final = 4
+"""Runs of which medians, quartiles and tests are told."""
+
 
 def all_tables(records: Iterable[Record], earlier: Path = EARLIER) -> list[str]:
     """Every table for which there are runs, as Markdown, in the order of the document.
@@ -49,19 +53,21 @@ def all_tables(records: Iterable[Record], earlier: Path = EARLIER) -> list[str]:
     robot = results_of(records, ROBOT, _BUDGET)
     function = results_of(records, FUNCTION, _CALLS)
     known = with_more_runs(medians_of(robot, _LOOKED_AT), read_medians(earlier, _LOOKED_AT))
-    found = [medians_table(known, ROBOT, _LOOKED_AT)]
-    if robot:
-        found.append(spread_table(robot))
+    sure = {method: medians for method, medians in known.items() if medians.runs >= _ENOUGH}
+    found = [medians_table(sure, ROBOT, _LOOKED_AT)]
+    if few := [method for method in known if method not in sure]:
+        found.append(few_runs_table(robot, few))
+    found += spread_table(robot)
     for problems, budget, looked_at in (
         (ROBOT, _LONG, (625, 1250, 2500)),
         (CHAPTER_3, _BUDGET, _LOOKED_AT),
     ):
         if results := results_of(records, problems, budget):
             found.append(medians_table(medians_of(results, looked_at), problems, looked_at))
-            found.append(spread_table(results))
+            found += spread_table(results)
     if function:
         found.append(calls_table(function[FUNCTION[0]]))
-        found.append(correlation_table(function[FUNCTION[0]], known))
+        found.append(correlation_table(function[FUNCTION[0]], sure, known))
     return found
 
 
@@ -69,33 +75,49 @@ def medians_table(
     medians: Mapping[str, Medians], problems: Sequence[str], checkpoints: Sequence[int]
 ) -> str:
     """Medians after some evaluations on every problem; the least of a column is bold."""
-    methods = sorted(medians, key=lambda m: medians[m].level)
+    methods = in_order(medians)
     head = ["method", "runs"]
     columns = [[_shown(m) for m in methods], [str(medians[m].runs) for m in methods]]
     for problem in problems:
         for k, count in enumerate(checkpoints):
             head.append(str(count) if k else f"{_short(problem)}: {count}")
-            columns.append(_bold_least([medians[m].by_problem[problem][k] for m in methods]))
+            of = [medians[m].by_problem.get(problem) for m in methods]
+            columns.append(_bold_least([values[k] if values else math.inf for values in of]))
     return _markdown(head, columns)
 
 
-def spread_table(results: Results) -> str:
-    """Quartiles at the end on every problem, and the test against the default search."""
-    problems = list(results)
-    budget = next(iter(results[problems[0]].values())).budget
-    medians = medians_of(results, (budget,))
-    methods = sorted(medians, key=lambda m: medians[m].level)
+def few_runs_table(results: Results, methods: Sequence[str]) -> str:
+    """What every run came to, of methods that have too few for a median."""
+    columns = [[_shown(method) for method in methods]]
+    for of in results.values():
+        runs = [of[m].final.tolist() if m in of else [] for m in methods]
+        columns.append([", ".join(map(_value, sorted(values))) or "-" for values in runs])
+    return _markdown(["method", *map(_short, results)], columns)
+
+
+def spread_table(results: Results) -> list[str]:
+    """Quartiles at the end on every problem, and the test against the default search.
+
+    Args:
+        results: Runs by problem, then by method.
+
+    Returns:
+        The table, of the methods that have `_ENOUGH` runs; none if there is no such method.
+    """
+    kept = {p: {m: r for m, r in of.items() if len(r) >= _ENOUGH} for p, of in results.items()}
+    problems = [problem for problem, of in kept.items() if MEASURE in of]
+    if not problems:
+        return []
+    budget = kept[problems[0]][MEASURE].budget
+    methods = in_order(medians_of({p: kept[p] for p in problems}, (budget,)))
     head, columns = ["method"], [[_shown(m) for m in methods]]
     for problem in problems:
-        of = results[problem]
+        of = kept[problem]
         head += [f"{_short(problem)}: quartiles", "p"]
-        columns.append([_quartiles(of[m]) for m in methods])
-        columns.append(
-            ["-" if m == MEASURE else _p(probability(of[m], of[MEASURE])) for m in methods]
-            if MEASURE in of
-            else ["-" for _ in methods]
-        )
-    return _markdown(head, columns)
+        columns.append([_quartiles(of[m]) if m in of else "-" for m in methods])
+        tested = {m: _p(probability(of[m], of[MEASURE])) for m in of if m != MEASURE}
+        columns.append([tested.get(m, "-") for m in methods])
+    return [_markdown(head, columns)]
 
 
 def calls_table(by_method: Mapping[str, Runs]) -> str:
@@ -117,15 +139,31 @@ def calls_table(by_method: Mapping[str, Runs]) -> str:
     return _markdown(head, list(map(list, zip(*rows, strict=True))))
 
 
-def correlation_table(function: Mapping[str, Runs], robot: Mapping[str, Medians]) -> str:
-    """Spearman's correlation of ranks on the function with those on the robot."""
-    sets = [("A, B and C", ROBOT), *((_short(problem), (problem,)) for problem in ROBOT)]
-    head = ["robot", *(f"after {count}" for count in _LOOKED_AT)]
-    columns = [[name for name, _ in sets]]
-    for k in range(len(_LOOKED_AT)):
-        found = [correlation(function, robot, problems, k).value for _, problems in sets]
-        columns.append([f"{c.value:.2f} ({c.low:.2f} to {c.high:.2f})" for c in found])
-    return _markdown(head, columns)
+def correlation_table(
+    function: Mapping[str, Runs], sure: Mapping[str, Medians], known: Mapping[str, Medians]
+) -> str:
+    """Spearman's correlation of ranks on the function with those on the robot.
+
+    Args:
+        function: Runs by method.
+        sure: Medians on the robot of enough runs, by method.
+        known: The same with those of few runs.
+
+    Returns:
+        The table; its last row is of all that were raced under preference A.
+    """
+    sets: list[tuple[str, tuple[str, ...], Mapping[str, Medians]]] = [("A, B and C", ROBOT, sure)]
+    sets += [(_short(problem), (problem,), sure) for problem in ROBOT]
+    if len(known) > len(sure):
+        sets.append(("A, with those of few runs", ROBOT[:1], known))
+    rows = []
+    for name, problems, robot in sets:
+        found = [correlation(function, robot, problems, k) for k in range(len(_LOOKED_AT))]
+        values = [f.value for f in found]
+        shown = [f"{v.value:.2f} ({v.low:.2f} to {v.high:.2f})" for v in values]
+        rows.append([name, str(found[0].methods), *shown])
+    head = ["robot", "methods", *(f"after {count}" for count in _LOOKED_AT)]
+    return _markdown(head, list(map(list, zip(*rows, strict=True))))
 
 
 def _call_quartiles(runs: Runs) -> list[float]:

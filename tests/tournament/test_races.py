@@ -19,7 +19,13 @@ from benchmarks.races.statistics import (
     results_of,
     with_more_runs,
 )
-from benchmarks.races.tables import all_tables, calls_table, medians_table, spread_table
+from benchmarks.races.tables import (
+    all_tables,
+    calls_table,
+    few_runs_table,
+    medians_table,
+    spread_table,
+)
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "optimizers.md"
 
@@ -49,8 +55,10 @@ RECORDS = [
     record("cma-es", 0, 3.0, 2.0, 0.001, to_target=90.0),
     record("cma-es", 1, 4.0, 1.0, 0.0005, to_target=60.0),
     record("cma-es", 2, 5.0, 3.0, 1.5),
-    *(record("pymoo-pso", k, 2.0, 2.0, 2.0 + k) for k in range(3)),
-    *(record("random", k, 9.0, 8.0, 7.0 + k) for k in range(3)),
+    record("cma-es", 3, 6.0, 4.0, 2.5),
+    record("de", 0, 1.0, 0.9, 0.8),
+    *(record("pymoo-pso", k, 2.0, 2.0, 2.0 + k) for k in range(4)),
+    *(record("random", k, 9.0, 8.0, 7.0 + k) for k in range(4)),
 ]
 
 
@@ -89,37 +97,41 @@ def test_a_file_that_is_none_of_runs_is_refused(tmp_path: Path, text: str, messa
         read_all(tmp_path)
 
 
-def test_runs_come_back_from_a_file_to_the_bit(tmp_path: Path) -> None:
+def test_runs_come_back_from_a_file_to_nine_digits(tmp_path: Path) -> None:
     path = tmp_path / "runs.csv"
     for one in RECORDS:
         append(path, replace(one, best=tuple(value / 3.0 for value in one.best)))
-    assert [r.best[0] for r in read(path)] == [r.best[0] / 3.0 for r in RECORDS]
+    expected = [r.best[0] / 3.0 for r in RECORDS]
+    assert [r.best[0] for r in read(path)] == pytest.approx(expected, rel=1e-8)
+    assert [r.to_target for r in read(path)][:2] == [90.0, 60.0]
     assert [r.row()[:6] for r in read(path)] == [r.row()[:6] for r in RECORDS]
 
 
 def test_tables_have_the_medians_quartiles_and_tests_of_the_runs() -> None:
     results = results_of(RECORDS, FUNCTION, 100)
-    assert medians_table(
-        medians_of(results, (25, 50, 100)), FUNCTION, (25, 50, 100)
-    ).splitlines() == [
+    medians = medians_of(results, CHECKPOINTS[:3])
+    assert medians_table(medians, FUNCTION, CHECKPOINTS[:3]).splitlines() == [
         "| method | runs | D7C0R0I1: 25 | 50 | 100 |",
         "| --- | --- | --- | --- | --- |",
-        "| `cma-es` | 3 | 4.00 | **2.00** | **0.00** |",
-        "| *pymoo-pso* | 3 | **2.00** | **2.00** | 3.00 |",
-        "| `random` | 3 | 9.00 | 8.00 | 8.00 |",
+        "| `cma-es` | 4 | 4.00 | 2.00 | **0.00** |",
+        "| `de` | 1 | **1.00** | **0.90** | 0.80 |",
+        "| *pymoo-pso* | 4 | 2.00 | 2.00 | 3.00 |",
+        "| `random` | 4 | 9.00 | 8.00 | 8.00 |",
     ]
-    # Three runs against three that are all greater: one of the twenty orders on either side.
-    assert spread_table(results).splitlines()[-1] == "| `random` | 7.00 to 9.00 | 0.10 |"
+    # Four runs against four that are all greater: one of the seventy orders on either side.
+    spread = spread_table(results)[0].splitlines()
+    assert spread[-1] == "| `random` | 7.00 to 9.00 | 0.03 |"
+    # One run has no quartiles.
+    assert not any("`de`" in line for line in spread)
+    assert few_runs_table(results, ["de"]).splitlines()[-1] == "| `de` | 0.80 |"
     by_method = results[FUNCTION[0]]
     assert probability(by_method["cma-es"], by_method["cma-es"]) == pytest.approx(1.0)
-    assert calls_table(by_method).splitlines()[2:4] == [
-        "| `cma-es` | 3 | 2 | 90 | 60 to - | 0.001 |",
-        "| *pymoo-pso* | 3 | 0 | - | - to - | 3 |",
-    ]
+    assert calls_table(by_method).splitlines()[2] == "| `cma-es` | 4 | 2 | 90 | 60 to - | 0.001 |"
 
 
 def test_ranks_that_agree_and_ranks_that_are_opposed_correlate_fully() -> None:
-    of_methods = results_of(RECORDS, FUNCTION, 100)[FUNCTION[0]]
+    enough = [r for r in RECORDS if r.method != "de"]
+    of_methods = results_of(enough, FUNCTION, 100)[FUNCTION[0]]
     medians = medians_of({FUNCTION[0]: of_methods}, (25, 100))
     same = correlation(of_methods, medians, FUNCTION, 1)
     assert (same.methods, same.value.value, same.value.low) == (3, 1.0, 1.0)

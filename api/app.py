@@ -33,6 +33,7 @@ from api.routes import (
     calibration,
     catalogue,
     certificate,
+    commands,
     comparison,
     events,
     firmware,
@@ -104,6 +105,7 @@ def create_app(
     )
     for module in (
         jobs,
+        commands,
         labels,
         notifications,
         history,

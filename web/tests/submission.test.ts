@@ -5,6 +5,7 @@ import { errorsByField, specOf, withKinds } from '../src/submission/build-spec'
 import { ofLegGroups } from '../src/submission/catalogue'
 import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
 import { optimizerDraft, settingsOf, withPreset } from '../src/submission/optimizer'
+import { ofKind, withRobotJob } from '../src/submission/robot-job'
 import { boundsInWords, fieldsOf } from '../src/submission/schema-fields'
 import { counts, walksEach, worldsFields } from '../src/submission/worlds'
 import { CATALOGUE, DOCUMENT } from './catalogue-example'
@@ -392,5 +393,38 @@ describe('fields of the schema', () => {
 
   test('of a schema that is not there are an error', () => {
     expect(() => fieldsOf(DOCUMENT, 'Nothing')).toThrow('no schema Nothing')
+  })
+})
+
+describe("a robot's own folder", () => {
+  const files: Draft = { ...empty, name: 'mine', ...ofKind(empty, 'files', empty) }
+  const slow = { name: 'slow', cycle_time: 2 }
+
+  test('brings its scenarios and variables in place of those of the robot that ships', () => {
+    expect(specOf(files).scenarios).toEqual([])
+    const job = JSON.stringify({
+      controller: 'pi',
+      scenarios: [slow],
+      variables: [{ name: 'P', low: 1, high: 2 }],
+      fixed: { FOMF: 2 },
+    })
+    const spec = specOf(withRobotJob(files, CATALOGUE, job))
+    expect(spec).toMatchObject({ name: 'mine', robot: { toml: '', urdf: '' }, scenarios: [slow] })
+    expect(spec.variables).toEqual([{ name: 'P', low: 1, high: 2 }])
+    expect(spec.fixed).toEqual({ FOMF: 2 })
+    expect(spec.iterations).toBe(25)
+  })
+
+  test('is left behind for a robot that ships', () => {
+    const back = { ...files, ...ofKind(files, 'shipped', empty) }
+    expect(specOf(back)).toEqual(specOf({ ...empty, name: 'mine' }))
+  })
+
+  test.each([
+    ['{', /no JSON/],
+    ['[]', /one JSON object/],
+    ['{"controller": "none"}', /controller none/],
+  ])('is refused where it is %s', (text, message) => {
+    expect(() => withRobotJob(files, CATALOGUE, text)).toThrow(message)
   })
 })

@@ -5,6 +5,7 @@ import { get, post } from '../api/client'
 import { jobsOfKind } from '../api/jobs-of-kind'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
+import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
 import type { Design } from '../format/value'
 
@@ -29,6 +30,7 @@ async function load(job: Job, choice: string, signal: AbortSignal): Promise<Refe
     return { label: other.name || other.id, scenarios: other.best.scenarios }
   }
   const controllers = await catalogue()
+  if (!isPublished((job.spec as JobSpec).robot)) throw new Error(NOT_PUBLISHED)
   const design = controllers.find((c) => c.name === name)?.published[study]
   if (!design) throw new Error(`there is no published design ${study} of ${name}`)
   const result = await walkOf(job.spec as JobSpec, name as JobSpec['controller'], design)
@@ -82,7 +84,9 @@ export function ReferencePicker({
   choice: string
   onChoose: (choice: string) => void
 }) {
-  const published = useResource('controllers', catalogue)
+  const tuning = job.kind === 'tuning'
+  const hasPublished = tuning && isPublished((job.spec as JobSpec).robot)
+  const published = useResource(hasPublished ? 'controllers' : null, catalogue)
   const others = useResource(`others ${job.kind}`, (signal) => jobsOfKind(job.kind, signal))
   const jobs = useMemo(
     () => (others.data ?? []).filter((other) => other.id !== job.id && other.best_fitness !== null),
@@ -93,7 +97,7 @@ export function ReferencePicker({
       <span class="label">Compare with</span>
       <select value={choice} onChange={(event) => onChoose(event.currentTarget.value)}>
         <option value="none">nothing</option>
-        {job.kind === 'tuning' && (
+        {hasPublished && (
           <optgroup label="Published designs">
             {(published.data ?? []).flatMap((controller) =>
               Object.keys(controller.published).map((study) => (
@@ -116,6 +120,7 @@ export function ReferencePicker({
           ))}
         </optgroup>
       </select>
+      {tuning && !hasPublished && <span class="muted small">{NOT_PUBLISHED}</span>}
     </label>
   )
 }

@@ -1,6 +1,7 @@
 /** The winner scenario by scenario: utilities and objectives, beside those of a reference. */
 
-import type { Job, Preference, ScenarioResult } from '../api/types'
+import { isPublished } from '../api/robots'
+import type { Job, JobSpec, Preference, ScenarioResult } from '../api/types'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { change, formatNumber } from '../format/number'
@@ -27,7 +28,8 @@ interface Row {
 
 export function ScenariosPanel({ job }: { job: Job }) {
   const { query } = usePlace()
-  const byDefault = job.kind === 'tuning' ? 'published:fuzzy-pi:A' : 'none'
+  const hasPublished = job.kind === 'tuning' && isPublished((job.spec as JobSpec).robot)
+  const byDefault = hasPublished ? 'published:fuzzy-pi:A' : 'none'
   const choice = query.get('against') ?? byDefault
   const reference = useReference(job, choice)
   const recordings = useRecordings(job)

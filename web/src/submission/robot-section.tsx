@@ -1,8 +1,11 @@
 /** The robot: as it is, a variant of it, or one's own from its files. */
 
+import { useState } from 'preact/hooks'
+import { NOT_PUBLISHED } from '../api/robots'
 import { errorsUnder } from './build-spec'
-import type { RobotDraft } from './draft'
+import { emptyDraft, type RobotDraft } from './draft'
 import { ChoiceField, NumberField, Problems } from './number-field'
+import { ofKind, withRobotJob } from './robot-job'
 import type { SectionProps } from './section'
 
 const KINDS = [
@@ -29,7 +32,7 @@ export function RobotSection(props: SectionProps) {
               key={kind}
               type="button"
               aria-pressed={robot.kind === kind}
-              onClick={() => change({ kind })}
+              onClick={() => onChange(ofKind(draft, kind, emptyDraft(catalogue)))}
             >
               {label}
             </button>
@@ -90,7 +93,14 @@ export function RobotSection(props: SectionProps) {
               accept=".urdf,.xml"
               onText={(urdf) => change({ urdf })}
             />
+            <JobFile {...props} />
           </div>
+        )}
+        {robot.kind === 'files' && (
+          <p class="muted small">
+            <code>gaitswarm robot init FILE.urdf --output FOLDER</code> makes all three files.{' '}
+            {NOT_PUBLISHED}
+          </p>
         )}
         <Problems
           messages={errorsUnder(errors, 'robot').filter(
@@ -103,15 +113,45 @@ export function RobotSection(props: SectionProps) {
   )
 }
 
+/** The robot's own scenarios, controller and variables take the place of Szabadka-II's. */
+function JobFile({ draft, catalogue, onChange }: SectionProps) {
+  const [text, setText] = useState('')
+  const [wrong, setWrong] = useState<string | undefined>()
+  const read = (found: string) => {
+    try {
+      onChange(withRobotJob(draft, catalogue, found))
+      setText(found)
+      setWrong(undefined)
+    } catch (error) {
+      setWrong(error instanceof Error ? error.message : String(error))
+    }
+  }
+  return (
+    <FileField
+      name="job.json"
+      text={text}
+      accept=".json"
+      optional="its scenarios, controller and variables"
+      error={wrong}
+      onText={read}
+    />
+  )
+}
+
 function FileField({
   name,
   text,
   accept,
+  optional,
+  error,
   onText,
 }: {
   name: string
   text: string
   accept: string
+  /** What is in it, of a file that can be left out. */
+  optional?: string
+  error?: string
   onText: (text: string) => void
 }) {
   const id = `file-${name.replace('.', '-')}`
@@ -122,14 +162,22 @@ function FileField({
         id={id}
         type="file"
         accept={accept}
+        aria-invalid={error !== undefined}
         onChange={async (event) => {
           const file = event.currentTarget.files?.[0]
           if (file) onText(await file.text())
         }}
       />
       <span class="hint">
-        {text === '' ? 'not chosen yet' : `${text.length.toLocaleString('en')} characters read`}
+        {text === ''
+          ? (optional ?? 'not chosen yet')
+          : `${text.length.toLocaleString('en')} characters read`}
       </span>
+      {error !== undefined && (
+        <span class="wrong" role="alert">
+          {error}
+        </span>
+      )}
     </div>
   )
 }

@@ -14,6 +14,7 @@ type Own = Readonly<Record<string, string>>
 
 export function ScenariosSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { presets, own } = draft
+  const hasPresets = draft.robot.kind !== 'files' || presets.length > 0
   const toggle = (name: string) => {
     const wanted = presets.includes(name) ? presets.filter((p) => p !== name) : [...presets, name]
     // In the catalogue's order, however they were ticked.
@@ -34,7 +35,14 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
       <h2 id="part-scenarios">Scenarios</h2>
       <div class="stack">
         <Problems messages={errors.has('scenarios') ? [errors.get('scenarios')!] : []} />
-        <PresetTable catalogue={catalogue} chosen={presets} onToggle={toggle} />
+        {hasPresets ? (
+          <PresetTable catalogue={catalogue} chosen={presets} onToggle={toggle} />
+        ) : (
+          <p class="muted">
+            The presets are walks of Szabadka-II. This robot walks in scenarios of its own: those of
+            its job.json, or such as are added here.
+          </p>
+        )}
         {own.map((scenario, index) => (
           <OwnScenario
             // The place is all that tells them apart.

@@ -11,6 +11,7 @@ export function DesignPicker({
   chosen,
   chosenLabel,
   none,
+  note,
   onChoose,
 }: {
   label: string
@@ -19,6 +20,8 @@ export function DesignPicker({
   chosenLabel: string
   /** What the choice of no design is called; without it there must be one. */
   none?: string
+  /** Why published designs are not offered; without it they are. */
+  note?: string
   onChoose: (source: DesignSource | null) => void
 }) {
   const id = useId()
@@ -45,9 +48,10 @@ export function DesignPicker({
       >
         {none !== undefined && <option value="">{none}</option>}
         {!listed && <option value={word}>{chosenLabel}</option>}
-        <Options label="Published designs" options={published} />
+        {note === undefined && <Options label="Published designs" options={published} />}
         <Options label="Best of a job" options={best} />
       </select>
+      {note !== undefined && <span class="hint">{note}</span>}
     </div>
   )
 }

@@ -1,15 +1,17 @@
 /** How long a force is drawn. */
 
-/** Length that the largest force should nearly reach [m]; about a leg's. */
-const LONGEST = 0.25
+import type { Extent } from './extent'
 
-/** Round numbers of newtons for ten centimetres, one cell of the ground's grid. */
+/** Length that the largest force should nearly reach, as a share of the robot's span; a leg's. */
+const LONGEST = 0.47
+
+/** Round numbers of newtons for one cell of the ground's grid. */
 const STEPS = [1, 2, 5]
 
-/** Newtons that ten centimetres stand for, so that forces up to `largest` [N] stay in view. */
-export function newtonsPerCell(largest: number): number {
+/** Newtons that a cell stands for, so that forces up to `largest` [N] stay in view. */
+export function newtonsPerCell(largest: number, { cell, span }: Extent): number {
   if (!(largest > 0)) return 10
-  const needed = (largest * 0.1) / LONGEST
+  const needed = (largest * cell) / (LONGEST * span)
   let power = 10 ** Math.floor(Math.log10(needed))
   for (;;) {
     for (const step of STEPS) if (step * power >= needed) return step * power

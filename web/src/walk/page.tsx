@@ -3,6 +3,7 @@
 import { useMemo, useState } from 'preact/hooks'
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
+import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Scenario } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { setQuery } from '../router/navigation'
@@ -44,7 +45,8 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
     resolveDesign(against!, signal, like),
   )
   const own = first.data?.scenarios ?? []
-  const listed = presets.data?.items ?? []
+  const hasPublished = first.data === null || isPublished(first.data.robot)
+  const listed = hasPublished ? (presets.data?.items ?? []) : []
   const wanted = query.get('scenario') ?? own[0]?.name ?? listed[0]?.name ?? 'normal-fast'
   const scenario = own.find(({ name }) => name === wanted) ?? wanted
   const one = useWalk(first.data, scenario, rate)
@@ -71,6 +73,7 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
           chosen={against}
           chosenLabel={second.data?.label ?? 'This design'}
           none="Nothing"
+          note={hasPublished ? undefined : NOT_PUBLISHED}
           onChoose={(chosen) => setQuery({ against: chosen && wordOf(chosen) })}
         />
         <RatePicker rate={rate} />

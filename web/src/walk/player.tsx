@@ -1,9 +1,10 @@
 /** The replay: a scene in three dimensions with its controls. */
 
-import { useEffect, useRef, useState } from 'preact/hooks'
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
 import { formatExact } from '../format/number'
 import { useTheme } from '../theme'
+import { extentOf, lengthInWords } from './extent'
 import { newtonsPerCell, typicalLargest } from './force-scale'
 import type { Playback } from './playback'
 import { PlayerControls, type ViewChoices } from './player-controls'
@@ -32,7 +33,11 @@ export function Player({
   const driver = useRef<ReplayDriver | null>(null)
   const [failure, setFailure] = useState<string | null>(null)
   const theme = useTheme()
-  const newtons = newtonsPerCell(Math.max(...walks.map(({ replay }) => largestForce(replay))))
+  const extent = useMemo(() => extentOf(replaysOf(walks)), [walks])
+  const newtons = useMemo(
+    () => newtonsPerCell(Math.max(...walks.map(({ replay }) => largestForce(replay))), extent),
+    [walks, extent],
+  )
 
   useEffect(() => {
     const replayDriver = new ReplayDriver(playback, walks[0].replay, player.current!)
@@ -44,7 +49,7 @@ export function Player({
       ({ WalkScene }) => {
         if (leave.now) return
         try {
-          const built = new WalkScene(replaysOf(walks), 0.1 / newtons, choices, () =>
+          const built = new WalkScene(replaysOf(walks), extent, newtons, choices, () =>
             replayDriver.request(),
           )
           scene.current = built
@@ -98,7 +103,7 @@ export function Player({
       <div class="player-stage" ref={stage}>
         {failure !== null && <NoScene reason={failure} />}
       </div>
-      <SceneLegend walks={walks} newtons={newtons} choices={choices} />
+      <SceneLegend walks={walks} cell={extent.cell} newtons={newtons} choices={choices} />
       <PlayerControls
         playback={playback}
         comparing={walks.length > 1}
@@ -124,10 +129,13 @@ function NoScene({ reason }: { reason: string }) {
 
 function SceneLegend({
   walks,
+  cell,
   newtons,
   choices,
 }: {
   walks: readonly Recorded[]
+  /** Of the grid [m]. */
+  cell: number
   newtons: number
   choices: ViewChoices
 }) {
@@ -148,10 +156,10 @@ function SceneLegend({
       {choices.forces && (
         <span data-force-scale={newtons}>
           <i class="arrow" aria-hidden="true" />
-          force of the ground, 10&nbsp;cm for {formatExact(newtons)}&nbsp;N
+          force of the ground, {lengthInWords(cell)} for {formatExact(newtons)}&nbsp;N
         </span>
       )}
-      <span>grid of 10&nbsp;cm</span>
+      <span data-grid={cell}>grid of {lengthInWords(cell)}</span>
       {ground.slope_deg !== 0 && (
         <span data-slope={ground.slope_deg}>
           slope of {formatExact(Math.abs(ground.slope_deg))}°,{' '}

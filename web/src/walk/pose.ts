@@ -68,3 +68,23 @@ function shareBetween(from: number, to: number, time: number): number {
   if (!(to > from)) return 0
   return Math.min(1, Math.max(0, (time - from) / (to - from)))
 }
+
+/** A vector turned by a unit quaternion x y z w. */
+export function rotate(turn: readonly number[], vector: readonly number[]): number[] {
+  const [x, y, z, w] = turn
+  const [a, b, c] = vector
+  const [p, q, r] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)]
+  return [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p]
+}
+
+/** The turn that does `second`, then `first`; unit quaternions x y z w. */
+export function multiply(first: readonly number[], second: readonly number[]): number[] {
+  const [x, y, z, w] = first
+  const [a, b, c, d] = second
+  return [
+    w * a + x * d + y * c - z * b,
+    w * b - x * c + y * d + z * a,
+    w * c + x * b - y * a + z * d,
+    w * d - x * a - y * b - z * c,
+  ]
+}

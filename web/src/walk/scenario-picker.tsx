@@ -33,13 +33,15 @@ export function ScenarioPicker({
             ))}
           </optgroup>
         )}
-        <optgroup label={own.length > 0 ? 'Other presets' : 'Presets'}>
-          {others.map((scenario) => (
-            <option key={scenario.name} value={scenario.name}>
-              {described(scenario)}
-            </option>
-          ))}
-        </optgroup>
+        {others.length > 0 && (
+          <optgroup label={own.length > 0 ? 'Other presets' : 'Presets'}>
+            {others.map((scenario) => (
+              <option key={scenario.name} value={scenario.name}>
+                {described(scenario)}
+              </option>
+            ))}
+          </optgroup>
+        )}
       </select>
     </div>
   )

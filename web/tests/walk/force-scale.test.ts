@@ -1,6 +1,8 @@
 import { expect, test } from 'vitest'
 import { newtonsPerCell, typicalLargest } from '../../src/walk/force-scale'
 
+const HEXAPOD = { span: 0.53, width: 0.5, height: 0.2, cell: 0.1 }
+
 test.each([
   [0, 10],
   [20, 10],
@@ -8,7 +10,7 @@ test.each([
   [60, 50],
   [0.02, 0.01],
 ])('forces up to %d N are drawn with a cell for %d N', (largest, expected) => {
-  expect(newtonsPerCell(largest)).toBeCloseTo(expected)
+  expect(newtonsPerCell(largest, HEXAPOD)).toBeCloseTo(expected)
 })
 
 test('a rare impact does not set the scale', () => {

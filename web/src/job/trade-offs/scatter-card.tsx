@@ -2,6 +2,7 @@
 
 import { useMemo, useState } from 'preact/hooks'
 import { useResource } from '../../api/resource'
+import { isPublished } from '../../api/robots'
 import type { Front, Job, JobSpec } from '../../api/types'
 import { Scatter } from '../../charts/scatter'
 import { ChartFrame, LegendEntry } from '../../components/chart-frame'
@@ -45,7 +46,8 @@ export function ScatterCard({
     return [...(behind ? [behind] : []), frontCloud(front, x, y)]
   }, [front, all, x, y])
   // In worlds an objective is no mean over scenarios.
-  const comparable = !(job.spec as JobSpec).worlds
+  const { worlds, robot } = job.spec as JobSpec
+  const comparable = !worlds && isPublished(robot)
   const asked = comparable && query.has('published')
   const published = usePublished(job, front, asked)
   const marks = useMemo(

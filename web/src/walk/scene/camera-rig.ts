@@ -13,24 +13,33 @@ export const VIEWS = {
 
 export type ViewName = keyof typeof VIEWS
 
-const NEAREST = 0.25
-const FURTHEST = 6
+/** How near and how far the camera may be, and what it sees at all, in spans of the robot. */
+const NEAREST = 0.47
+const FURTHEST = 11.3
+const SEEN = [0.038, 113] as const
 
 export class CameraRig {
-  readonly camera = new PerspectiveCamera(32, 1, 0.02, 60)
+  readonly camera = new PerspectiveCamera(32, 1)
   follow = true
   /** Half the height of what is to be seen [m]. */
-  reach = 0.3
+  reach = 1
   private readonly controls: OrbitControls
   private readonly target = new Vector3()
   private readonly step = new Vector3()
   private aspect = 1
 
-  constructor(canvas: HTMLCanvasElement, onChange: () => void) {
+  constructor(
+    canvas: HTMLCanvasElement,
+    /** Of the robot [m]. */
+    private readonly span: number,
+    onChange: () => void,
+  ) {
+    this.camera.near = SEEN[0] * span
+    this.camera.far = SEEN[1] * span
     this.camera.up.set(0, 0, 1)
     this.controls = new OrbitControls(this.camera, canvas)
-    this.controls.minDistance = NEAREST
-    this.controls.maxDistance = FURTHEST
+    this.controls.minDistance = NEAREST * span
+    this.controls.maxDistance = FURTHEST * span
     this.controls.maxPolarAngle = 0.56 * Math.PI
     this.controls.addEventListener('change', onChange)
     // The wheel scrolls the page, as long as the scene was not clicked or reached by Tab.
@@ -57,10 +66,11 @@ export class CameraRig {
   /** Look from a direction, all of the robot in view. */
   look(from: ViewName): void {
     const narrow = Math.min(1, this.aspect)
-    const distance = this.reach / (narrow * Math.tan((16 * Math.PI) / 180))
+    const wanted = this.reach / (narrow * Math.tan((16 * Math.PI) / 180))
+    const distance = Math.min(FURTHEST * this.span, wanted)
     const direction = new Vector3(...VIEWS[from]).normalize()
     this.controls.target.copy(this.target)
-    this.camera.position.copy(this.target).addScaledVector(direction, Math.min(FURTHEST, distance))
+    this.camera.position.copy(this.target).addScaledVector(direction, distance)
     this.controls.update()
   }
 
@@ -79,7 +89,10 @@ export class CameraRig {
   /** Come nearer by a factor. */
   zoom(factor: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target)
-    const length = Math.min(FURTHEST, Math.max(NEAREST, offset.length() / factor))
+    const length = Math.min(
+      FURTHEST * this.span,
+      Math.max(NEAREST * this.span, offset.length() / factor),
+    )
     this.camera.position.copy(this.controls.target).add(offset.setLength(length))
     this.controls.update()
   }

@@ -15,10 +15,11 @@ import { sampleChannel } from '../pose'
 import type { Replay } from '../replay'
 import type { Palette } from './palette'
 
-const DISC = 0.024
-const SHAFT = 0.0035
-const HEAD = 0.011
-const HEAD_LENGTH = 0.026
+/** Radii, and the length of an arrow's head, in spans of the robot. */
+const DISC = 0.046
+const SHAFT = 0.0066
+const HEAD = 0.021
+const HEAD_LENGTH = 0.05
 const UP = new Vector3(0, 1, 0)
 
 export class FootMarks {
@@ -39,13 +40,15 @@ export class FootMarks {
     private readonly scale: number,
     /** Height of discs over the ground [m]; that of another walk's differs, so that one covers. */
     private readonly height: number,
+    /** Of the robot [m]. */
+    span: number,
   ) {
     const legs = replay.header.robot.legs.length
     this.positions = new Float32Array(3 * legs)
     this.forces = new Float32Array(3 * legs)
     for (let leg = 0; leg < legs; leg++) {
-      const disc = new Mesh(new CircleGeometry(DISC, 32), this.discMaterial)
-      const arrow = new Arrow(this.arrowMaterial)
+      const disc = new Mesh(new CircleGeometry(DISC * span, 32), this.discMaterial)
+      const arrow = new Arrow(this.arrowMaterial, span)
       this.discs.push(disc)
       this.arrows.push(arrow)
       this.object.add(disc, arrow.object)
@@ -85,23 +88,27 @@ class Arrow {
   private readonly turn = new Quaternion()
   private readonly direction = new Vector3()
 
-  constructor(material: MeshBasicMaterial) {
-    this.shaft = new Mesh(new CylinderGeometry(SHAFT, SHAFT, 1, 12), material)
-    this.head = new Mesh(new ConeGeometry(HEAD, HEAD_LENGTH, 20), material)
+  private readonly headLength: number
+
+  constructor(material: MeshBasicMaterial, span: number) {
+    this.headLength = HEAD_LENGTH * span
+    const radius = SHAFT * span
+    this.shaft = new Mesh(new CylinderGeometry(radius, radius, 1, 12), material)
+    this.head = new Mesh(new ConeGeometry(HEAD * span, this.headLength, 20), material)
     this.shaft.renderOrder = 1
     this.head.renderOrder = 1
     this.object.add(this.shaft, this.head)
   }
 
   point(x: number, y: number, z: number, vector: Vector3, length: number): void {
-    const shaft = Math.max(1e-4, length - HEAD_LENGTH)
-    const head = Math.min(1, length / HEAD_LENGTH)
+    const shaft = Math.max(1e-4, length - this.headLength)
+    const head = Math.min(1, length / this.headLength)
     this.object.position.set(x, y, z)
     this.direction.copy(vector).normalize()
     this.object.quaternion.copy(this.turn.setFromUnitVectors(UP, this.direction))
     this.shaft.scale.set(1, shaft, 1)
     this.shaft.position.y = shaft / 2
     this.head.scale.setScalar(Math.max(1e-3, head))
-    this.head.position.y = length - (head * HEAD_LENGTH) / 2
+    this.head.position.y = length - (head * this.headLength) / 2
   }
 }

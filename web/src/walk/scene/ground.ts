@@ -1,4 +1,4 @@
-/** The ground: a plane with a grid of ten centimetres, which fades into the distance. */
+/** The ground: a plane with a grid of round lengths, which fades into the distance. */
 
 import {
   Group,
@@ -9,15 +9,23 @@ import {
   ShadowMaterial,
   Vector2,
 } from 'three'
+import type { Extent } from '../extent'
 import { lyingText } from './label'
 import type { Palette } from './palette'
 
-/** Edge of the plane [m]; it is moved along with the robot. */
-const EDGE = 24
+/** Edge of the plane, in spans of the robot; it is moved along with it. */
+const EDGE = 45
 
-/** Distance between labels [m], and how far they are drawn at most. */
-const LABEL_EVERY = 0.5
+/** Cells between thick lines, which have the labels, and how many labels are drawn at most. */
+const LABEL_EVERY = 5
 const MOST_LABELS = 40
+
+/** Height of labels, and how far they lie over the ground so that they are seen, in spans. */
+const TEXT = 0.095
+const LIFT = 0.004
+
+/** Between which distances the grid fades, in spans. */
+const FADES = [1.7, 8.5] as const
 
 const VERTEX = `
 varying vec2 place;
@@ -34,6 +42,8 @@ uniform vec3 background;
 uniform vec3 cell;
 uniform vec3 metre;
 uniform vec2 centre;
+uniform float size;
+uniform vec2 fades;
 varying vec2 place;
 
 float grid(vec2 p, float size, float width) {
@@ -46,9 +56,9 @@ float grid(vec2 p, float size, float width) {
 }
 
 void main() {
-  vec3 colour = mix(ground, cell, grid(place, 0.1, 1.1));
-  colour = mix(colour, metre, grid(place, 0.5, 1.5));
-  float far = smoothstep(0.9, 4.5, distance(place, centre));
+  vec3 colour = mix(ground, cell, grid(place, size, 1.1));
+  colour = mix(colour, metre, grid(place, 5.0 * size, 1.5));
+  float far = smoothstep(fades.x, fades.y, distance(place, centre));
   gl_FragColor = vec4(mix(colour, background, far), 1.0);
   #include <colorspace_fragment>
 }`
@@ -64,8 +74,10 @@ export class Ground {
     private readonly length: number,
     /** Where the labels stand, across the way [m]. */
     private readonly beside: number,
+    private readonly extent: Extent,
     shadows: boolean,
   ) {
+    const edge = EDGE * extent.span
     const material = new ShaderMaterial({
       vertexShader: `uniform vec2 origin;${VERTEX}`,
       fragmentShader: FRAGMENT,
@@ -76,12 +88,14 @@ export class Ground {
         metre: { value: null },
         origin: { value: new Vector2() },
         centre: { value: new Vector2() },
+        size: { value: extent.cell },
+        fades: { value: new Vector2(...FADES).multiplyScalar(extent.span) },
       },
     })
-    this.plane = new Mesh(new PlaneGeometry(EDGE, EDGE), material)
+    this.plane = new Mesh(new PlaneGeometry(edge, edge), material)
     this.plane.renderOrder = -2
-    this.shade = new Mesh(new PlaneGeometry(EDGE, EDGE), new ShadowMaterial())
-    this.shade.position.z = 0.001
+    this.shade = new Mesh(new PlaneGeometry(edge, edge), new ShadowMaterial())
+    this.moveTo(0, 0)
     this.shade.receiveShadow = true
     this.shade.visible = shadows
     this.object.add(this.plane, this.shade, this.labels)
@@ -100,7 +114,7 @@ export class Ground {
   /** Keep the plane under the robot; its lines stay where they are. */
   moveTo(x: number, y: number): void {
     this.plane.position.set(x, y, 0)
-    this.shade.position.set(x, y, 0.001)
+    this.shade.position.set(x, y, 0.5 * LIFT * this.extent.span)
     const { origin, centre } = this.plane.material.uniforms
     origin.value.set(x, y)
     centre.value.set(x, y)
@@ -113,10 +127,13 @@ export class Ground {
       label.geometry.dispose()
     }
     this.labels.clear()
-    const count = Math.min(MOST_LABELS, Math.ceil(this.length / LABEL_EVERY) + 1)
+    const { cell, span } = this.extent
+    const every = LABEL_EVERY * cell
+    const digits = Math.max(1, Math.ceil(-Math.log10(every)))
+    const count = Math.min(MOST_LABELS, Math.ceil(this.length / every) + 1)
     for (let k = 0; k <= count; k++) {
-      const label = lyingText(`${(k * LABEL_EVERY).toFixed(1)} m`, colour, 0.05)
-      label.position.set(k * LABEL_EVERY, this.beside, 0.002)
+      const label = lyingText(`${(k * every).toFixed(digits)} m`, colour, TEXT * span)
+      label.position.set(k * every, this.beside, LIFT * span)
       this.labels.add(label)
     }
   }

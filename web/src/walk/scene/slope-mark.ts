@@ -11,12 +11,13 @@ import {
 } from 'three'
 import { proportion, textTexture } from './label'
 
-/** Of the level line, and of the arc about its end [m]. */
-const LENGTH = 0.6
-const RADIUS = 0.42
+/** Of the level line, and of the arc about its end, in spans of the robot. */
+const LENGTH = 1.13
+const RADIUS = 0.79
 
-/** Of the number of degrees [m]. */
-const HEIGHT = 0.055
+/** Of the number of degrees, and how far it is from the arc, in spans. */
+const HEIGHT = 0.104
+const INSIDE = 0.17
 
 export class SlopeMark {
   /** Stands on the level, so it belongs to the scene, not to the tilted ground. */
@@ -32,17 +33,19 @@ export class SlopeMark {
     private readonly degrees: number,
     /** Up the ground, a unit vector of the scene. */
     uphill: Vector3,
+    /** Of the robot [m]. */
+    private readonly span: number,
   ) {
     const level = uphill.clone().setZ(0).normalize()
     const angle = (Math.abs(degrees) * Math.PI) / 180
     const direction = (at: number) => level.clone().multiplyScalar(Math.cos(at)).setZ(Math.sin(at))
-    const base = level.clone().multiplyScalar(LENGTH)
-    const top = uphill.clone().multiplyScalar(LENGTH / Math.cos(angle))
+    const base = level.clone().multiplyScalar(LENGTH * span)
+    const top = uphill.clone().multiplyScalar((LENGTH * span) / Math.cos(angle))
     const arc = Array.from({ length: 25 }, (_, k) =>
-      direction((k / 24) * angle).multiplyScalar(RADIUS),
+      direction((k / 24) * angle).multiplyScalar(RADIUS * span),
     )
     this.object.add(this.line([top, new Vector3(), base, top]), this.line(arc))
-    this.label.position.copy(direction(angle / 2).multiplyScalar(RADIUS - 0.09))
+    this.label.position.copy(direction(angle / 2).multiplyScalar((RADIUS - INSIDE) * span))
     this.object.add(this.label)
     // The level lies under the ground: over it, but behind robots.
     for (const part of this.object.children) part.renderOrder = -1
@@ -61,7 +64,8 @@ export class SlopeMark {
   recolour(colour: string): void {
     this.material.color.setStyle(colour)
     const map = textTexture(`${Math.abs(this.degrees).toFixed(0)}°`, colour)
-    this.label.scale.set(HEIGHT * proportion(map), HEIGHT, 1)
+    const height = HEIGHT * this.span
+    this.label.scale.set(height * proportion(map), height, 1)
     this.label.material.map?.dispose()
     this.label.material.map = map
     this.label.material.needsUpdate = true

@@ -9,6 +9,7 @@ import {
   Vector3,
   type WebGLRenderer,
 } from 'three'
+import type { Extent } from '../extent'
 import type { Replay } from '../replay'
 import { CameraRig, type ViewName } from './camera-rig'
 import { disposeTree } from './dispose'
@@ -29,17 +30,28 @@ export interface SceneOptions {
   readonly trail: boolean
 }
 
-/** Distance between two robots side by side [m]. */
-const BESIDE = 0.75
+/** Distance between two robots side by side, in widths of one. */
+const BESIDE = 1.55
 
-/** Height over the ground that is looked at [m]. */
-const MIDDLE = 0.09
+/** Height over the ground that is looked at, in heights of the robot. */
+const MIDDLE = 0.45
 
-/** Half the height that the camera shows of one robot, and of two side by side [m]. */
-const REACH = 0.3
-const REACH_BESIDE = 0.54
+/** Half the height that the camera shows of one robot, in spans, and what it shows more of two
+ * side by side, in distances between them. */
+const REACH = 0.58
+const REACH_BESIDE = 0.32
 
-const LIGHT = new Vector3(0.7, -1.1, 2.2)
+/** Where labels stand, and marks of slopes, from the middle of a robot, in widths. */
+const LABELS = 0.78
+const SLOPE = 0.7
+
+/** Height of the first walk's marks of feet, and how much lower the second's are, in spans. */
+const MARKS = 0.006
+const MARKS_LOWER = 0.002
+
+/** Where the light comes from, and half the edge of what has a shadow, in spans. */
+const LIGHT = new Vector3(1.3, -2.1, 4.2)
+const SHADED = 1.7
 const DOWN = new Vector3(0, 0, -1)
 
 interface Lane {
@@ -63,34 +75,50 @@ export class WalkScene {
   private readonly rig: CameraRig
   private readonly centre = new Vector3()
 
-  /** metresPerNewton: of force arrows; onChange: something else is to be drawn. */
+  /** newtons: an arrow's for one cell of the grid; onChange: something else is to be drawn. */
   constructor(
     replays: readonly Replay[],
-    metresPerNewton: number,
+    private readonly extent: Extent,
+    newtons: number,
     options: SceneOptions,
     onChange: () => void,
   ) {
     this.renderer = createRenderer()
-    this.lanes = replays.map((replay, k) => laneOf(replay, metresPerNewton, 0.003 - 0.001 * k))
+    const { span, width, cell } = extent
+    this.lanes = replays.map((replay, k) => {
+      const height = (MARKS - MARKS_LOWER * k) * span
+      return laneOf(replay, new FootMarks(replay, cell / newtons, height, span))
+    })
     const { gravity, ground } = replays[0].header
     const tilt = new Quaternion().setFromUnitVectors(new Vector3(...gravity).normalize(), DOWN)
     this.world.quaternion.copy(tilt)
     const length = Math.max(...replays.map((r) => r.value('link_pose', r.frames - 1, 0)))
     this.ground = new Ground(
       length,
-      -0.38 - (replays.length > 1 ? BESIDE / 2 : 0),
+      -LABELS * width - (replays.length > 1 ? this.beside / 2 : 0),
+      extent,
       this.renderer.shadowMap.enabled,
     )
     this.world.add(this.ground.object, ...this.lanes.map((lane) => lane.group))
-    this.slope = slopeMark(ground, tilt)
+    this.slope = slopeMark(ground, tilt, span)
     this.scene.add(this.world, this.sky, this.sun, this.sun.target)
     if (this.slope) this.scene.add(this.slope.object)
     this.prepareShadows()
-    this.rig = new CameraRig(this.canvas, onChange)
+    this.rig = new CameraRig(this.canvas, span, onChange)
     this.recolour()
     this.setOptions(options)
     this.show(0)
     this.rig.look('three-quarter')
+  }
+
+  /** Distance between two robots side by side [m]. */
+  private get beside(): number {
+    return BESIDE * this.extent.width
+  }
+
+  /** Height over the ground that is looked at [m]. */
+  private get middle(): number {
+    return MIDDLE * this.extent.height
   }
 
   get canvas(): HTMLCanvasElement {
@@ -115,28 +143,29 @@ export class WalkScene {
     }
     this.ground.moveTo(this.centre.x, this.centre.y)
     // Not the body itself: its own rise and fall is to be seen.
-    this.centre.z = MIDDLE
+    this.centre.z = this.middle
     this.world.localToWorld(this.centre)
     this.slope?.moveTo(this.centre)
     this.sun.target.position.copy(this.centre)
-    this.sun.position.copy(this.centre).add(LIGHT)
+    this.sun.position.copy(this.centre).addScaledVector(LIGHT, this.extent.span)
     this.rig.moveTarget(this.centre)
   }
 
   setOptions(options: SceneOptions): void {
     const beside = options.arrangement === 'beside' && this.lanes.length > 1
     this.lanes.forEach(({ group, figure, feet, trail }, k) => {
-      group.position.y = beside ? (k - 0.5) * BESIDE : 0
+      group.position.y = beside ? (k - 0.5) * this.beside : 0
       figure.setGhost(k > 0 && !beside)
       feet.setForces(options.forces && (beside || k === 0))
       trail.object.visible = options.trail
     })
     const { ground } = this.lanes[0].replay.header
-    const room = beside ? BESIDE / 2 : 0
-    this.slope?.placeAt(slopeCorner(ground, this.world.quaternion, room))
+    const room = SLOPE * this.extent.width + (beside ? this.beside / 2 : 0)
+    const corner = slopeCorner(ground, room, this.extent.span, this.middle)
+    this.slope?.placeAt(corner.applyQuaternion(this.world.quaternion))
     this.slope?.moveTo(this.centre)
     this.rig.follow = options.follow
-    const reach = beside ? REACH_BESIDE : REACH
+    const reach = REACH * this.extent.span + (beside ? REACH_BESIDE * this.beside : 0)
     if (reach === this.rig.reach) return
     this.rig.reach = reach
     this.rig.look('three-quarter')
@@ -191,46 +220,53 @@ export class WalkScene {
 
   private prepareShadows(): void {
     const { shadow } = this.sun
+    const { span } = this.extent
     this.sun.castShadow = true
     shadow.mapSize.set(1024, 1024)
     shadow.radius = 3
     shadow.bias = -0.0004
-    shadow.normalBias = 0.004
+    shadow.normalBias = 0.0075 * span
     Object.assign(shadow.camera, {
-      left: -0.9,
-      right: 0.9,
-      top: 0.9,
-      bottom: -0.9,
-      near: 1,
-      far: 4,
+      left: -SHADED * span,
+      right: SHADED * span,
+      top: SHADED * span,
+      bottom: -SHADED * span,
+      near: 1.9 * span,
+      far: 7.6 * span,
     })
   }
 }
 
-/** discs: height of the feet's marks [m]. */
-function laneOf(replay: Replay, metresPerNewton: number, discs: number): Lane {
+function laneOf(replay: Replay, feet: FootMarks): Lane {
   const group = new Group()
   const figure = new RobotFigure(replay)
-  const feet = new FootMarks(replay, metresPerNewton, discs)
   const trail = new Trail(replay)
   group.add(figure.object, feet.object, trail.object)
   return { replay, group, figure, feet, trail }
 }
 
 /** None on level ground. tilt: from the ground's world to the scene. */
-function slopeMark(ground: Replay['header']['ground'], tilt: Quaternion): SlopeMark | null {
+function slopeMark(
+  ground: Replay['header']['ground'],
+  tilt: Quaternion,
+  span: number,
+): SlopeMark | null {
   if (ground.slope_deg === 0) return null
-  return new SlopeMark(ground.slope_deg, uphill(ground).applyQuaternion(tilt))
+  return new SlopeMark(ground.slope_deg, uphill(ground).applyQuaternion(tilt), span)
 }
 
-/** Where the mark stands clear of the robots, from what is looked at. room: for robots [m]. */
-function slopeCorner(ground: Replay['header']['ground'], tilt: Quaternion, room: number): Vector3 {
+/** Where the mark stands clear of the robots, from what is looked at, in the ground's world [m]. */
+function slopeCorner(
+  ground: Replay['header']['ground'],
+  room: number,
+  span: number,
+  middle: number,
+): Vector3 {
   const rises = uphill(ground)
   return new Vector3(-rises.y, rises.x, 0)
-    .multiplyScalar(0.34 + room)
-    .addScaledVector(rises, -0.1)
-    .setZ(0.003 - MIDDLE)
-    .applyQuaternion(tilt)
+    .multiplyScalar(room)
+    .addScaledVector(rises, -0.19 * span)
+    .setZ(MARKS * span - middle)
 }
 
 /** Up the ground, in the ground's world. */

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 from urllib.parse import unquote
@@ -41,22 +41,41 @@ def find_mesh(name: str, folder: Path, packages: Sequence[Path] = ()) -> Path | 
     Returns:
         The file; None if there is none.
     """
-    scheme, separator, rest = name.partition("://")
-    if not separator:
-        return _file(folder / name)
+    scheme, _, rest = name.partition("://")
     if scheme == "file":
         return _file(Path(unquote(rest)))
-    if scheme not in ("package", "model"):
-        return None
+    places = (_file(path) for _, path in mesh_places(name, folder, packages))
+    return next((found for found in places if found is not None), None)
+
+
+def mesh_places(
+    name: str, folder: Path, packages: Sequence[Path] = ()
+) -> Iterator[tuple[Path, Path]]:
+    """Where `find_mesh` looks for a mesh that is beside the URDF or in a package.
+
+    Args:
+        name: As the URDF has it.
+        folder: Of the URDF.
+        packages: Folders to look in, before those of ROS_PACKAGE_PATH.
+
+    Yields:
+        The folder that the name is relative to, the robot's or a package's, and the path in it,
+        which may lead out of it.
+    """
+    scheme, separator, rest = name.partition("://")
+    if not separator:
+        yield folder, folder / name
+    if not separator or scheme not in ("package", "model"):
+        return
     package, _, path = rest.partition("/")
+    if package in ("", ".", ".."):
+        return
     own = folder.resolve()
     variable = os.environ.get(_VARIABLE, "")
     places = [own, *own.parents, *packages, *map(Path, filter(None, variable.split(os.pathsep)))]
     for place in places:
         for root in ([place] if place.resolve().name == package else []) + [place / package]:
-            if found := _file(root / path):
-                return found
-    return None
+            yield root, root / path
 
 
 def _file(path: Path) -> Path | None:

@@ -26,6 +26,11 @@ def _network(text: str) -> str:
     return str(ip_network(text, strict=False)) if "/" in text else str(ip_address(text))
 
 
+def _paths(value: object) -> object:
+    """Of a list as PATH is one."""
+    return [part for part in value.split(os.pathsep) if part] if isinstance(value, str) else value
+
+
 Network = Annotated[str, AfterValidator(_network)]
 
 
@@ -89,6 +94,10 @@ class Settings(BaseSettings):
         ge=1,
         le=1000,
         description="A job with which so many runner processes in a row went down fails.",
+    )
+    robots: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(_paths)] = Field(
+        default=(),
+        description="Folders of robots, or of such folders, whose meshes a server gives out.",
     )
     webhook_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=(),

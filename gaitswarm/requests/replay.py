@@ -6,13 +6,14 @@ from typing import Final
 
 from pydantic import Field
 
+from gaitswarm.mesh_library import urdf_digest
 from gaitswarm.requests.design import resolved
 from gaitswarm.requests.walk import WorldRequest
 from gaitswarm.views.replay import encoded_replay
 from services.optimizer.errors import InvalidRequest
 from sim.outcome import Status
 from sim.replay import CONTROL_RATE, replay
-from sim.robot import load_robot
+from sim.robot import RobotFiles, load_robot
 from sim.scenario import ScenarioChoice
 
 MOST_POSES: Final = 1_000_000
@@ -70,4 +71,5 @@ def run_replay(request: ReplayRequest) -> bytes:
         rate=request.rate,
         status=Status(walk.outcome.statuses[0]),
         objectives=walk.outcome.objectives[0],
+        urdf=urdf_digest(request.robot.urdf) if isinstance(request.robot, RobotFiles) else None,
     )

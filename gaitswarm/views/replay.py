@@ -13,6 +13,7 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite, framed, unframed
 from gaitswarm.views.evaluation import StatusName
+from gaitswarm.views.meshes import LinkMeshView
 from gaitswarm.views.simulation import QUANTITIES
 from sim.kernel.parameters import gravity_on
 from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
@@ -83,6 +84,9 @@ class LinkView(View):
         description="Link that carries it; null for the body.", examples=["body"]
     )
     shapes: list[ShapeView] = Field(description="What it looks like; it may be invisible.")
+    meshes: list[LinkMeshView] = Field(
+        description="What it looks like by the URDF's meshes; a robot may have none."
+    )
 
     @classmethod
     def from_link(cls, link: VisibleLink) -> LinkView:
@@ -92,13 +96,19 @@ class LinkView(View):
             link: as the simulator has it.
         """
         shapes = [ShapeView.from_shape(shape) for shape in link.shapes]
-        return cls(name=link.name, parent=link.parent, shapes=shapes)
+        meshes = [LinkMeshView.from_mesh(mesh) for mesh in link.meshes]
+        return cls(name=link.name, parent=link.parent, shapes=shapes, meshes=meshes)
 
 
 class MovingRobotView(View):
     """What there is to see of the robot that walks."""
 
     name: str = Field(description="Name of the robot.", examples=["szabadka2"])
+    urdf: str | None = Field(
+        description="SHA-256 of its robot.urdf, by which its meshes are asked for; null for a robot"
+        " that ships, which has none.",
+        examples=[None],
+    )
     links: list[LinkView] = Field(description="All links, parents first; the body is the first.")
     joints: list[str] = Field(
         description="Joints in the order of channels.", examples=[["right_front_coxa"]]
@@ -179,6 +189,7 @@ def encoded_replay(
     rate: float,
     status: Status,
     objectives: NDArray[np.float64],
+    urdf: str | None = None,
 ) -> bytes:
     """Encode a walk to be looked at.
 
@@ -189,6 +200,7 @@ def encoded_replay(
         rate: frames a second, as asked for [Hz].
         status: how the walk ended.
         objectives: (6,) raw objectives f1..f6, in their units, NaN where there is none.
+        urdf: digest of the robot's URDF, if its meshes may be asked for.
 
     Returns:
         `framed` ReplayHeaderView and numbers by frame.
@@ -208,6 +220,7 @@ def encoded_replay(
         scenario=scenario,
         robot=MovingRobotView(
             name=robot.description.name,
+            urdf=urdf,
             links=[LinkView.from_link(link) for link in walk.links],
             joints=list(robot.joint_names),
             legs=legs,

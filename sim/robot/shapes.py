@@ -15,6 +15,7 @@ from sim.robot.description import Leg
 from sim.robot.legs import LegKinematics
 from sim.robot.robot import Robot
 from sim.robot.urdf import SolidKind
+from sim.robot.visual_meshes import VisualMesh, material_colours, visual_meshes
 
 Floats = NDArray[np.float64]
 
@@ -57,12 +58,14 @@ class VisibleLink:
     Attributes:
         name: as in the URDF.
         parent: name of the link that carries it, None for the body.
-        shapes: what it looks like.
+        shapes: what it looks like, in simple solids.
+        meshes: what it looks like in the URDF's own meshes, if that has any.
     """
 
     name: str
     parent: str | None
     shapes: tuple[Shape, ...]
+    meshes: tuple[VisualMesh, ...] = ()
 
 
 def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
@@ -84,6 +87,7 @@ def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
     """
     carriers = {joint.child: joint.parent for joint in robot.urdf.joints}
     derived = _derived(robot)
+    colours = material_colours(robot.urdf.text)
     roles: dict[str, Role] = {}
     links = []
     for name, link in robot.urdf.links.items():
@@ -97,7 +101,7 @@ def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
         ) or ((own,) if own else ())
         if parent is None and load > 0.0:
             shapes = (*shapes, _load(robot, load))
-        links.append(VisibleLink(name, parent, shapes))
+        links.append(VisibleLink(name, parent, shapes, visual_meshes(link, colours)))
     return tuple(links)
 
 

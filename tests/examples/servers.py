@@ -26,7 +26,7 @@ from services.optimizer.service import JobService
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import line_with, output
 
-_QUICK_EVENTS: Final = {"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"}
+QUICK_EVENTS: Final = {"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"}
 
 
 class Served:
@@ -122,7 +122,7 @@ class ServerProcess(Served):
         self,
         database: Path | str,
         *options: str,
-        environment: Mapping[str, str] = _QUICK_EVENTS,
+        environment: Mapping[str, str] = QUICK_EVENTS,
     ) -> None:
         chosen = options or ("--evaluator", "in-process")
         self.process = ForkedCommand(

@@ -15,7 +15,7 @@ from api.page import FOLDER, is_built
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.servers import Server, ServerProcess
+from tests.examples.servers import QUICK_EVENTS, Server, ServerProcess
 from tests.examples.walks import SHORT_WALK
 from tests.web.chromium import ARGUMENTS, find_chromium
 from tests.web.visit import Visit
@@ -93,9 +93,19 @@ def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def server(tmp_path_factory: pytest.TempPathFactory, _chromium: str) -> Iterator[ServerProcess]:
+def robots(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of robots whose meshes the server gives out."""
+    return tmp_path_factory.mktemp("robots")
+
+
+@pytest.fixture(scope="session")
+def server(
+    tmp_path_factory: pytest.TempPathFactory, robots: Path, _chromium: str
+) -> Iterator[ServerProcess]:
     """`gaitswarm serve` with a runner, on a database of its own."""
-    server = ServerProcess(tmp_path_factory.mktemp("server") / "jobs.db")
+    folder = tmp_path_factory.mktemp("server")
+    environment = {**QUICK_EVENTS, "GAITSWARM_ROBOTS": str(robots)}
+    server = ServerProcess(folder / "jobs.db", environment=environment)
     yield server
     server.close()
 

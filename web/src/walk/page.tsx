@@ -20,7 +20,13 @@ import './walk.css'
 import { WalkPlots } from './walk-plots'
 import { FailureNotices } from './walk-result'
 
-const CHOICES: ViewChoices = { arrangement: 'ghost', follow: true, forces: true, trail: true }
+const CHOICES: ViewChoices = {
+  arrangement: 'ghost',
+  follow: true,
+  forces: true,
+  trail: true,
+  meshes: true,
+}
 
 interface Address {
   readonly source: DesignSource

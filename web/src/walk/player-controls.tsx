@@ -19,6 +19,7 @@ const LOOKS: readonly { readonly view: ViewName; readonly label: string }[] = [
 export function PlayerControls({
   playback,
   comparing,
+  meshed,
   choices,
   onChoose,
   onLook,
@@ -26,6 +27,8 @@ export function PlayerControls({
   playback: Playback
   /** Whether there are two walks. */
   comparing: boolean
+  /** Whether there are meshes to be seen. */
+  meshed: boolean
   choices: ViewChoices
   onChoose: (choices: ViewChoices) => void
   onLook: (view: ViewName) => void
@@ -57,6 +60,9 @@ export function PlayerControls({
         )}
         <Check label="Forces" on={choices.forces} onChange={(forces) => set({ forces })} />
         <Check label="Trail" on={choices.trail} onChange={(trail) => set({ trail })} />
+        {meshed && (
+          <Check label="Meshes" on={choices.meshes} onChange={(meshes) => set({ meshes })} />
+        )}
         <span class="row looks">
           {LOOKS.map(({ view, label }) => (
             <button key={view} type="button" class="compact" onClick={() => onLook(view)}>

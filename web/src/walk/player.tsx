@@ -32,6 +32,12 @@ export function Player({
   const scene = useRef<WalkScene | null>(null)
   const driver = useRef<ReplayDriver | null>(null)
   const [failure, setFailure] = useState<string | null>(null)
+  /** Meshes that were loaded, and why there are none of a robot that should have some. */
+  const [meshes, setMeshes] = useState(0)
+  const [lost, setLost] = useState<string | null>(null)
+  /** Choices as they are when something is loaded later. */
+  const shown = useRef(choices)
+  shown.current = choices
   const theme = useTheme()
   const extent = useMemo(() => extentOf(replaysOf(walks)), [walks])
   const newtons = useMemo(
@@ -43,27 +49,37 @@ export function Player({
     const replayDriver = new ReplayDriver(playback, walks[0].replay, player.current!)
     driver.current = replayDriver
     const container = stage.current!
-    const leave = { now: false, observer: null as ResizeObserver | null }
+    const leave = new AbortController()
+    let observer: ResizeObserver | null = null
     setFailure(null)
+    setMeshes(0)
+    setLost(null)
     import('./scene/walk-scene').then(
       ({ WalkScene }) => {
-        if (leave.now) return
+        if (leave.signal.aborted) return
         try {
           const built = new WalkScene(replaysOf(walks), extent, newtons, choices, () =>
             replayDriver.request(),
           )
           scene.current = built
-          leave.observer = shownIn(container, built, () => replayDriver.request())
+          observer = shownIn(container, built, () => replayDriver.request())
           replayDriver.attach(built)
+          built
+            .loadMeshes(() => shown.current.meshes, leave.signal)
+            .then((count) => {
+              setMeshes(count)
+              replayDriver.request()
+            })
+            .catch((error: unknown) => !leave.signal.aborted && setLost(messageOf(error)))
         } catch (error) {
           setFailure(messageOf(error))
         }
       },
-      (error: unknown) => !leave.now && setFailure(messageOf(error)),
+      (error: unknown) => !leave.signal.aborted && setFailure(messageOf(error)),
     )
     return () => {
-      leave.now = true
-      leave.observer?.disconnect()
+      leave.abort()
+      observer?.disconnect()
       replayDriver.dispose()
       scene.current?.dispose()
       scene.current = null
@@ -99,14 +115,16 @@ export function Player({
     driver.current?.request()
   }
   return (
-    <section class="card player" ref={player} aria-label="Replay" data-player>
+    <section class="card player" ref={player} aria-label="Replay" data-player data-meshes={meshes}>
       <div class="player-stage" ref={stage}>
         {failure !== null && <NoScene reason={failure} />}
       </div>
       <SceneLegend walks={walks} cell={extent.cell} newtons={newtons} choices={choices} />
+      {lost !== null && <p class="muted small">Meshes cannot be loaded: {lost}</p>}
       <PlayerControls
         playback={playback}
         comparing={walks.length > 1}
+        meshed={meshes > 0}
         choices={choices}
         onChoose={onChoose}
         onLook={look}

@@ -18,10 +18,22 @@ export interface Shape {
   readonly role: Role
 }
 
+/** A mesh on a link, as its URDF has it. */
+export interface LinkMesh {
+  /** Of its file. */
+  readonly name: string
+  /** In the link's frame: x y z [m], quaternion x y z w. */
+  readonly origin: readonly number[]
+  readonly scale: readonly number[]
+  /** Red, green, blue, opacity, 0 to 1. */
+  readonly colour: readonly number[] | null
+}
+
 export interface Link {
   readonly name: string
   readonly parent: string | null
   readonly shapes: readonly Shape[]
+  readonly meshes: readonly LinkMesh[]
 }
 
 /** One quantity of a frame. */
@@ -48,6 +60,8 @@ export interface ReplayHeader {
   readonly scenario: Scenario
   readonly robot: {
     readonly name: string
+    /** SHA-256 of its URDF, by which its meshes are asked for; none of a robot that ships. */
+    readonly urdf: string | null
     readonly links: readonly Link[]
     readonly joints: readonly string[]
     readonly legs: readonly string[]
@@ -123,6 +137,11 @@ export class Replay {
     }
     return low
   }
+}
+
+/** Whether the robot's URDF names meshes, which the server may have. */
+export function hasMeshes({ robot }: ReplayHeader): boolean {
+  return robot.urdf !== null && robot.links.some(({ meshes }) => meshes.length > 0)
 }
 
 /** Numbers that a channel has in a frame. */

@@ -10,7 +10,7 @@ function walker(size: readonly number[], turn: readonly number[] = [0, 0, 0, 1])
   const load: Shape = { type: 'sphere', size: [9], origin: [0, 0, 0, 0, 0, 0, 1], role: 'load' }
   const robot = {
     ...header(2).robot,
-    links: [{ name: 'body', parent: null, shapes: [shape, load] }],
+    links: [{ name: 'body', parent: null, shapes: [shape, load], meshes: [] }],
   }
   return parseReplay(encoded(header(2, { robot }), frames(2)))
 }

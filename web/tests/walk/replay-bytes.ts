@@ -36,7 +36,8 @@ export function header(count: number, changes: Partial<ReplayHeader> = {}): Repl
     scenario: { name: 'normal-fast' } as ReplayHeader['scenario'],
     robot: {
       name: 'box',
-      links: [{ name: 'body', parent: null, shapes: [] }],
+      urdf: null,
+      links: [{ name: 'body', parent: null, shapes: [], meshes: [] }],
       joints: ['leg_coxa'],
       legs: ['leg'],
     },

@@ -9,6 +9,7 @@ import {
   Group,
   Mesh,
   MeshStandardMaterial,
+  type Object3D,
   SphereGeometry,
 } from 'three'
 import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js'
@@ -42,13 +43,24 @@ export class RobotFigure {
     load: new MeshStandardMaterial({ roughness: 0.8 }),
   }
   private readonly poses: Float32Array
+  /** By link: its simple solids, but for a load, and the meshes that can be seen in their place. */
+  private readonly solids: Object3D[][] = []
+  private readonly meshes: Object3D[][] = []
+  private ghost = false
 
   constructor(private readonly replay: Replay) {
     const { links } = replay.header.robot
     this.poses = new Float32Array(links.length * POSE)
     for (const { shapes } of links) {
       const group = new Group()
-      for (const shape of shapes) this.addShape(group, shape)
+      const solids: Object3D[] = []
+      for (const shape of shapes) {
+        const before = group.children.length
+        this.addShape(group, shape)
+        if (shape.role !== 'load') solids.push(...group.children.slice(before))
+      }
+      this.solids.push(solids)
+      this.meshes.push([])
       this.links.push(group)
       this.object.add(group)
     }
@@ -76,19 +88,38 @@ export class RobotFigure {
 
   /** Let what is behind shine through, or not. */
   setGhost(ghost: boolean): void {
-    for (const material of Object.values(this.materials)) {
-      material.transparent = ghost
-      material.opacity = ghost ? GHOST : 1
-      material.depthWrite = !ghost
-      // Where both robots are at the same place, the first one is seen.
-      material.polygonOffset = ghost
-      material.polygonOffsetFactor = 2
-      material.polygonOffsetUnits = 40
-      material.needsUpdate = true
+    this.ghost = ghost
+    for (const material of [...Object.values(this.materials), ...this.meshMaterials()]) {
+      makeGhost(material, ghost)
     }
     this.object.traverse((object) => {
       object.castShadow = !ghost
     })
+  }
+
+  /** Show a link by a mesh as well; the object is given away. */
+  addMesh(link: number, object: Object3D): void {
+    this.links[link].add(object)
+    this.meshes[link].push(object)
+    for (const material of this.meshMaterials()) makeGhost(material, this.ghost)
+  }
+
+  /** Links by their meshes, where they have any, or all by simple solids. */
+  showMeshes(shown: boolean): void {
+    this.meshes.forEach((meshes, link) => {
+      for (const mesh of meshes) mesh.visible = shown
+      for (const solid of this.solids[link]) solid.visible = !shown || meshes.length === 0
+    })
+  }
+
+  private meshMaterials(): MeshStandardMaterial[] {
+    const found: MeshStandardMaterial[] = []
+    for (const mesh of this.meshes.flat()) {
+      mesh.traverse((object) => {
+        if (object instanceof Mesh) found.push(object.material)
+      })
+    }
+    return found
   }
 
   private addShape(link: Group, shape: Shape): void {
@@ -117,6 +148,17 @@ export class RobotFigure {
     mesh.receiveShadow = true
     return mesh
   }
+}
+
+function makeGhost(material: MeshStandardMaterial, ghost: boolean): void {
+  material.transparent = ghost
+  material.opacity = ghost ? GHOST : 1
+  material.depthWrite = !ghost
+  // Where both robots are at the same place, the first one is seen.
+  material.polygonOffset = ghost
+  material.polygonOffsetFactor = 2
+  material.polygonOffsetUnits = 40
+  material.needsUpdate = true
 }
 
 /** three's capsules and cylinders lie along y, recorded ones along z. */

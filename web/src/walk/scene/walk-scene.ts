@@ -10,7 +10,7 @@ import {
   type WebGLRenderer,
 } from 'three'
 import type { Extent } from '../extent'
-import type { Replay } from '../replay'
+import { hasMeshes, type Replay } from '../replay'
 import { CameraRig, type ViewName } from './camera-rig'
 import { disposeTree } from './dispose'
 import { FootMarks } from './foot-marks'
@@ -28,6 +28,8 @@ export interface SceneOptions {
   readonly follow: boolean
   readonly forces: boolean
   readonly trail: boolean
+  /** Links by the URDF's meshes, where they were loaded, or by simple solids. */
+  readonly meshes: boolean
 }
 
 /** Distance between two robots side by side, in widths of one. */
@@ -156,6 +158,7 @@ export class WalkScene {
     this.lanes.forEach(({ group, figure, feet, trail }, k) => {
       group.position.y = beside ? (k - 0.5) * this.beside : 0
       figure.setGhost(k > 0 && !beside)
+      figure.showMeshes(options.meshes)
       feet.setForces(options.forces && (beside || k === 0))
       trail.object.visible = options.trail
     })
@@ -169,6 +172,21 @@ export class WalkScene {
     if (reach === this.rig.reach) return
     this.rig.reach = reach
     this.rig.look('three-quarter')
+  }
+
+  /** Load the meshes of the robots; how many there are now. Throws what a browser says. */
+  async loadMeshes(shown: () => boolean, signal: AbortSignal): Promise<number> {
+    let count = 0
+    for (const { replay, figure } of this.lanes) {
+      if (!hasMeshes(replay.header)) continue
+      const { meshesOf } = await import('./link-meshes')
+      const found = await meshesOf(replay.header.robot, signal)
+      signal.throwIfAborted()
+      for (const { link, object } of found) figure.addMesh(link, object)
+      figure.showMeshes(shown())
+      count += found.length
+    }
+    return count
   }
 
   /** Take over the page's colours. */

@@ -5,6 +5,7 @@ import { Empty } from './components/feedback'
 import { lazyPage } from './components/lazy-page'
 import icon from './icon.svg'
 import { JobsPage } from './jobs/page'
+import { forgetIgnored, IgnoredNotice } from './router/ignored'
 import { usePlace } from './router/navigation'
 import { type Route, routeOf } from './router/routes'
 import { useUnauthorized } from './session/session'
@@ -86,9 +87,11 @@ function Main({ route }: { route: Route }) {
     if (title !== null) setTitle(title)
     if (moved) main.current?.focus({ preventScroll: true })
     moved = true
+    return forgetIgnored
   }, [route.page])
   return (
     <main id="main" tabIndex={-1} ref={main} data-page={route.page}>
+      <IgnoredNotice />
       <Page route={route} />
     </main>
   )

@@ -3,8 +3,10 @@
 import { useEffect, useRef } from 'preact/hooks'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
+import { describeCanvas } from '../export/canvas-source'
 import { formatExact, formatNumber, withUnit } from '../format/number'
 import { themeColour, useTheme } from '../theme'
+import { drawLines, drawMarker } from './line-drawing'
 import { logRange, logTicks } from './log-axis'
 
 export interface Series {
@@ -57,6 +59,10 @@ export interface LineChartProps {
   readonly marker?: number | null
   /** Called with the x under the pointer when it is clicked. */
   readonly onPick?: (x: number) => void
+  /** Stretch of x that is shown at first; null for all. */
+  readonly zoom?: readonly [number, number] | null
+  /** Told when another stretch is shown by hand; null for all. */
+  readonly onZoom?: (range: readonly [number, number] | null) => void
   /** Charts of the same key move their pointers together. */
   readonly sync?: string
 }
@@ -84,12 +90,22 @@ export function LineChart(props: LineChartProps) {
       parent,
     )
     plot.current = drawn
+    const { zoom } = latest.current
+    if (zoom) drawn.setScale('x', { min: zoom[0], max: zoom[1] })
+    // What it shows first was chosen by nobody.
+    const settled = setTimeout(() => {
+      drawn.root.dataset.settled = 'true'
+    })
+    describeCanvas(drawn.ctx.canvas, {
+      draw: (context) => drawLines(context, drawn, latest.current),
+    })
     const observer = new ResizeObserver(() => {
       const now = Math.max(120, parent.clientWidth)
       if (now !== drawn.width) drawn.setSize({ width: now, height })
     })
     observer.observe(parent)
     return () => {
+      clearTimeout(settled)
       observer.disconnect()
       drawn.destroy()
       plot.current = null
@@ -128,17 +144,22 @@ function shapeOf({
 
 /** New data under the same zoom; all of it where nothing is zoomed. */
 function renew(plot: uPlot, data: uPlot.AlignedData) {
-  const { min, max } = plot.scales.x
-  const x = plot.data[0]
-  const zoomed = x.length > 0 && ((min ?? x[0]) > x[0] || (max ?? 0) < x[x.length - 1])
-  if (!zoomed) {
+  const zoom = zoomOf(plot)
+  if (!zoom) {
     plot.setData(data)
     return
   }
   plot.batch(() => {
     plot.setData(data, false)
-    plot.setScale('x', { min: min!, max: max! })
+    plot.setScale('x', { min: zoom[0], max: zoom[1] })
   })
+}
+
+/** The stretch of x that is shown; null where it is all. */
+function zoomOf({ scales, data: [x] }: uPlot): readonly [number, number] | null {
+  const { min, max } = scales.x
+  if (x.length === 0 || min === undefined || max === undefined) return null
+  return min > x[0] || max < x[x.length - 1] ? [min, max] : null
 }
 
 function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
@@ -225,12 +246,17 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
     hooks: {
       drawAxes: [(u) => props.current.paint?.(u)],
       setCursor: [(u) => showReadout(u, props.current, readout)],
-      draw: [(u) => drawMarker(u, props.current.marker)],
+      draw: [(u) => drawMarker(u.ctx, u, props.current.marker ?? null, devicePixelRatio)],
       // As tests and other tools read it.
       setScale: [
         (u, key) => {
           const { min, max } = u.scales.x
-          if (key === 'x') u.root.dataset.range = `${min} ${max}`
+          if (key !== 'x') return
+          u.root.dataset.range = `${min} ${max}`
+          const range = zoomOf(u)
+          const before = props.current.zoom ?? null
+          if (u.root.dataset.settled && range?.join() !== before?.join())
+            props.current.onZoom?.(range)
         },
       ],
       ready: [
@@ -267,22 +293,6 @@ function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {
   const parts = shown.map((s) => `${s.label} ${unit(formatNumber(s.values[idx]), props.yUnit)}`)
   const at = unit(formatExact(props.x[idx]), props.xUnit)
   element.textContent = [`${props.xLabel} ${at}`, ...parts].join('  ·  ')
-}
-
-function drawMarker(u: uPlot, marker: number | null | undefined) {
-  if (marker === null || marker === undefined) return
-  const x = u.valToPos(marker, 'x', true)
-  const { left, top, width, height } = u.bbox
-  if (x < left || x > left + width) return
-  u.ctx.save()
-  u.ctx.strokeStyle = themeColour('--text')
-  u.ctx.lineWidth = devicePixelRatio
-  u.ctx.setLineDash([])
-  u.ctx.beginPath()
-  u.ctx.moveTo(x, top)
-  u.ctx.lineTo(x, top + height)
-  u.ctx.stroke()
-  u.ctx.restore()
 }
 
 /** Room for the longest number of an axis [px]. */

@@ -1,6 +1,7 @@
 /** Rows over any two axes of parallel coordinates, as points or as cells by rank; a drag selects. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { describeCanvas } from '../export/canvas-source'
 import { themeColour, useTheme } from '../theme'
 import { CELLS, cellsOf, dragged, nearestRow, sampleOf } from './pair-model'
 import { themePalette } from './parallel-coordinates'
@@ -61,11 +62,14 @@ export function PairMap({
     const element = canvas.current!
     element.width = Math.round(width * devicePixelRatio)
     element.height = Math.round(HEIGHT_PX * devicePixelRatio)
-    const context = element.getContext('2d')!
-    if (asCells) paintCells(context, model, rows, x, y, palette)
-    else paintPoints(context, model, rows, x, y, palette)
-    if (chosen !== null)
-      paintChosen(context, model.axes[x].places[chosen], model.axes[y].places[chosen])
+    const draw = (on: CanvasRenderingContext2D) => {
+      if (asCells) paintCells(on, model, rows, x, y, palette)
+      else paintPoints(on, model, rows, x, y, palette)
+      if (chosen !== null)
+        paintChosen(on, model.axes[x].places[chosen], model.axes[y].places[chosen])
+    }
+    draw(element.getContext('2d')!)
+    describeCanvas(element, { draw })
   }, [model, rows, x, y, asCells, chosen, palette, width])
 
   const place = (event: PointerEvent): Place => {

@@ -1,6 +1,7 @@
 /** Points over two axes, some with a name; a click chooses the nearest that can be chosen. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { describeCanvas } from '../export/canvas-source'
 import { formatExact, formatNumber, withUnit } from '../format/number'
 import { themeColour, useTheme } from '../theme'
 import { withAlpha } from './line-chart'
@@ -91,11 +92,15 @@ export function Scatter(props: ScatterProps) {
     element.height = Math.round(height * devicePixelRatio)
     const context = element.getContext('2d')!
     context.scale(devicePixelRatio, devicePixelRatio)
-    const painter = new Painter(context, area, axes.x, axes.y, em)
-    painter.frame(withUnit(xLabel, xUnit), withUnit(yLabel, yUnit))
-    for (const cloud of clouds) painter.cloud(cloud)
-    painter.marks(marks)
-    if (chosen !== null && places[chosen]) painter.ring(places[chosen])
+    const draw = (on: CanvasRenderingContext2D) => {
+      const painter = new Painter(on, area, axes.x, axes.y, em)
+      painter.frame(withUnit(xLabel, xUnit), withUnit(yLabel, yUnit))
+      for (const cloud of clouds) painter.cloud(cloud)
+      painter.marks(marks)
+      if (chosen !== null && places[chosen]) painter.ring(places[chosen])
+    }
+    draw(context)
+    describeCanvas(element, { draw })
   }, [clouds, marks, axes, chosen, width, height, theme, xLabel, yLabel, xUnit, yUnit])
 
   const at = (event: MouseEvent) => {

@@ -1,12 +1,17 @@
 /** A chart with its title, and the same numbers as a table for those who read rather than look. */
 
 import type { ComponentChildren } from 'preact'
-import { useId, useState } from 'preact/hooks'
+import { useId, useRef, useState } from 'preact/hooks'
+import type { DataTable } from '../export/csv'
+import type { Kind } from '../export/save'
+import { ErrorNotice } from './feedback'
+import { Menu } from './menu'
 
 export function ChartFrame({
   title,
   note,
   table,
+  data,
   tools,
   legend,
   children,
@@ -16,6 +21,8 @@ export function ChartFrame({
   note?: string
   /** The chart's numbers; made only when asked for. */
   table: () => ComponentChildren
+  /** All of the chart's numbers, where the table holds some of them only. */
+  data?: () => DataTable
   /** Controls of the chart. */
   tools?: ComponentChildren
   legend?: ComponentChildren
@@ -23,16 +30,33 @@ export function ChartFrame({
   children: ComponentChildren
 }) {
   const [asTable, setAsTable] = useState(false)
+  const [error, setError] = useState<unknown>(null)
+  const card = useRef<HTMLElement>(null)
   const heading = useId()
+  const save = (kind: Kind) => {
+    setError(null)
+    import('../export/save')
+      .then(({ saveChart }) => saveChart(kind, { title, card: card.current!, table, data }))
+      .catch(setError)
+  }
+  const item = (label: string, kind: Kind) => ({ label, onChoose: () => save(kind) })
   return (
-    <section class="card chart-frame" aria-labelledby={heading}>
+    <section class="card chart-frame" aria-labelledby={heading} ref={card}>
       <header>
         <div>
           <h2 id={heading}>{title}</h2>
           {note && <p>{note}</p>}
         </div>
-        <div class="row">
+        <div class="row" data-not-drawn>
           {!asTable && tools}
+          <Menu
+            label="Save"
+            of={title}
+            items={[
+              item('Numbers (CSV)', 'csv'),
+              ...(asTable ? [] : [item('Picture (SVG)', 'svg'), item('Picture (PNG)', 'png')]),
+            ]}
+          />
           <button
             type="button"
             class="compact plain"
@@ -44,6 +68,7 @@ export function ChartFrame({
           </button>
         </div>
       </header>
+      {error !== null && <ErrorNotice what="The file could not be made." error={error} />}
       {asTable ? (
         table()
       ) : (

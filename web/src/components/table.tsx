@@ -1,9 +1,10 @@
 /** A table that sorts by its headers and is shown in pages. */
 
 import type { ComponentChildren } from 'preact'
-import { useState } from 'preact/hooks'
+import { useContext, useState } from 'preact/hooks'
 import { formatCount } from '../format/number'
 import { type Cell, paged, type SortOrder, sorted } from './rows'
+import { type CollectedTable, TableSink } from './table-sink'
 import { Unit } from './unit'
 
 export interface Column<R> {
@@ -14,6 +15,8 @@ export interface Column<R> {
   readonly numeric?: boolean
   /** What the column is sorted by; a column without it cannot be sorted. */
   readonly value?: (row: R) => Cell
+  /** What a file holds, in full; the value itself if missing, or else the text that is shown. */
+  readonly data?: (row: R) => Cell
   /** What is shown; the value itself if missing. */
   readonly cell?: (row: R) => ComponentChildren
   /** Left out on narrow screens. */
@@ -28,6 +31,7 @@ export function Table<R>({
   rows,
   rowKey,
   order: initial,
+  onOrder,
   pageSize = 50,
   tall = false,
   rowData,
@@ -38,6 +42,8 @@ export function Table<R>({
   rows: readonly R[]
   rowKey: (row: R) => string
   order?: SortOrder
+  /** Told of every other order. */
+  onOrder?: (order: SortOrder) => void
   pageSize?: number
   /** Scroll inside a box of limited height. */
   tall?: boolean
@@ -46,11 +52,17 @@ export function Table<R>({
 }) {
   const [order, setOrder] = useState<SortOrder | null>(initial ?? null)
   const [wanted, setWanted] = useState(0)
+  const sink = useContext(TableSink)
+  if (sink) {
+    sink({ caption, columns, rows } as unknown as CollectedTable)
+    return null
+  }
   const by = columns.find((column) => column.key === order?.column)?.value
   const inOrder = order && by ? sorted(rows, by, order.descending) : rows
   const page = paged(inOrder, wanted, pageSize)
   const reorder = (chosen: SortOrder) => {
     setOrder(chosen)
+    onOrder?.(chosen)
     // What comes first by the new order is what is looked for.
     setWanted(0)
   }

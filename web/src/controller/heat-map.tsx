@@ -7,7 +7,7 @@ import { formatNumber, quantity } from '../format/number'
 import { useTheme } from '../theme'
 import { gradient } from './colour-map'
 import { cellAt, paint, plotOf } from './heat-painter'
-import { type Cell, cells, extent, type Layer, moved } from './surface'
+import { type Cell, cells, extent, type Layer, layerData, moved } from './surface'
 
 const HEIGHT = 300
 
@@ -67,6 +67,7 @@ export function HeatMap({
       title={layer.title}
       note={layer.note}
       table={() => <LayerTable layer={layer} />}
+      data={() => layerData(layer)}
       legend={<ColourLegend layer={layer} />}
     >
       <div

@@ -119,6 +119,11 @@ export class SurfaceScene {
     this.request()
   }
 
+  /** Draw now. */
+  render(): void {
+    this.renderer.render(this.scene, this.camera)
+  }
+
   dispose(): void {
     cancelAnimationFrame(this.requested)
     this.controls.dispose()
@@ -131,7 +136,7 @@ export class SurfaceScene {
   private request(): void {
     this.requested ||= requestAnimationFrame(() => {
       this.requested = 0
-      this.renderer.render(this.scene, this.camera)
+      this.render()
     })
   }
 }

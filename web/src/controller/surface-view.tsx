@@ -3,10 +3,11 @@
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
 import { ChartFrame } from '../components/chart-frame'
+import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
 import { useTheme } from '../theme'
 import { Segmented } from '../walk/player-controls'
-import { type Cell, cells, extent, type Layer } from './surface'
+import { type Cell, cells, extent, type Layer, layerData } from './surface'
 import type { SurfaceScene } from './surface-scene'
 
 const TURN = Math.PI / 24
@@ -35,6 +36,7 @@ export function SurfaceView({
       title={withUnit(`Surface of ${name}`, layer.unit)}
       note="Output over error and current; the ball is the chosen point. Drag to turn."
       table={() => <Summary layers={layers} />}
+      data={() => layerData(layer)}
       tools={
         <Segmented
           label="What the surface shows"
@@ -67,6 +69,7 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
         const built = new SurfaceScene(latest.current.layer, latest.current.cell)
         scene.current = built
         box.append(built.canvas)
+        describeCanvas(built.canvas, { refresh: () => built.render() })
         const fill = () => box.clientWidth > 0 && built.resize(box.clientWidth, box.clientHeight)
         fill()
         built.resetView()

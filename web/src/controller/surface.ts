@@ -1,6 +1,8 @@
 /** A fuzzy controller's surface: numbers over error and current. Pure. */
 
 import type { components } from '../api/schema'
+import type { DataTable } from '../export/csv'
+import { withUnit } from '../format/number'
 
 type Schemas = components['schemas']
 
@@ -139,4 +141,17 @@ export function indexOf(input: Universe, surface: SurfaceView, cell: Cell): numb
 export function ruleText(rule: Rule, output: string): string {
   const conditions = Object.entries(rule.if).map(([name, set]) => `${name} is ${set}`)
   return `If ${conditions.join(' and ')}, then ${output} is ${rule.then}`
+}
+
+/** Every number of a layer, a row for each pair of error and current. */
+export function layerData({ title, unit, error, current, values }: Layer): DataTable {
+  return {
+    name: title,
+    header: [
+      withUnit('error', error.unit),
+      withUnit('current', current.unit),
+      withUnit(title, unit),
+    ],
+    rows: error.values.flatMap((e, i) => current.values.map((c, k) => [e, c, values[i][k]])),
+  }
 }

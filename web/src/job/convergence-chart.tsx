@@ -1,10 +1,11 @@
 /** Best, median and quantiles of fitness over the iterations. */
 
-import { useMemo, useState } from 'preact/hooks'
+import { useMemo } from 'preact/hooks'
 import type { Iteration, Job } from '../api/types'
 import { type Band, LineChart, type Series } from '../charts/line-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { formatNumber, withUnit } from '../format/number'
+import { flag, RANGE, useQueryValue } from '../router/query-value'
 import { ByIteration } from './by-iteration'
 import { fitnessUnit } from './fitness'
 import type { Distribution } from './use-distribution'
@@ -18,7 +19,8 @@ export function ConvergenceChart({
   iterations: readonly Iteration[]
   distribution: Distribution
 }) {
-  const [logarithmic, setLogarithmic] = useState(true)
+  const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
+  const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
   const drawn = useMemo(() => content(iterations, distribution), [iterations, distribution])
   const unit = fitnessUnit(job)
   const best = iterations.at(-1)?.best_so_far
@@ -60,6 +62,8 @@ export function ConvergenceChart({
         series={drawn.series}
         bands={drawn.bands}
         logarithmic={logarithmic}
+        zoom={zoom}
+        onZoom={setZoom}
         height={320}
       />
     </ChartFrame>

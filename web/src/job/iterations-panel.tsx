@@ -1,19 +1,28 @@
 /** Every committed iteration, to look through and to take away. */
 
-import { useState } from 'preact/hooks'
 import type { Iteration, Job } from '../api/types'
 import { Empty } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { formatMoment } from '../format/time'
+import { type Codec, flag, ORDER, useQueryValue } from '../router/query-value'
 import { jobPath } from '../router/routes'
 import { fitnessUnit } from './fitness'
 import type { LiveJob } from './use-job'
 
+const NEWEST = { column: 'index', descending: true }
+
+/** A number as it was written, or nothing. */
+const AT_MOST: Codec<string> = {
+  read: (text) => (text !== '' && Number.isFinite(Number(text)) ? text : undefined),
+  write: (text) => text || null,
+}
+
 export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
   const { iterations } = live.followed
-  const [least, setLeast] = useState('')
-  const [improved, setImproved] = useState(false)
+  const [least, setLeast] = useQueryValue('most', AT_MOST, '')
+  const [improved, setImproved] = useQueryValue('improved', flag(false), false)
+  const [order, setOrder] = useQueryValue('sort', ORDER, NEWEST)
   const below = least === '' ? Number.POSITIVE_INFINITY : Number(least)
   const shown = iterations.filter(
     (i) =>
@@ -66,7 +75,8 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
             caption="Iterations"
             rows={shown}
             rowKey={(i) => String(i.index)}
-            order={{ column: 'index', descending: true }}
+            order={order}
+            onOrder={setOrder}
             columns={columns(job)}
             rowData={(i) => ({ 'data-index': i.index })}
           />

@@ -3,6 +3,7 @@
 import { useEffect } from 'preact/hooks'
 import { isReadable } from '../api/readable'
 import type { Iteration, Job, StoredJob } from '../api/types'
+import { Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
@@ -90,6 +91,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       data-best={live.followed.iterations.at(-1)?.best_so_far ?? ''}
       data-stream={streamState(live)}
     >
+      <Breadcrumbs crumbs={crumbsOf(job, tab)} here={hereOf(job, tab)} />
       <JobHeader live={live} job={job} />
       {isReadable(job) && <Parts live={live} job={job} tab={tab} />}
     </div>
@@ -101,6 +103,21 @@ function titleOf(job: StoredJob, iterations: readonly Iteration[]): readonly str
   const { done, planned } = budgetSpent(job, iterations)
   const ended = ['succeeded', 'failed', 'cancelled'].includes(job.state)
   return [job.name || job.id, ended ? job.state : `${job.state} ${done}/${planned}`]
+}
+
+function crumbsOf(job: StoredJob, tab: string): readonly Crumb[] {
+  const above: Crumb[] = [['All jobs', '/jobs']]
+  if (tab !== '') above.push([job.name || job.id, jobPath(job.id)])
+  const [section, inside] = tab.split('/')
+  if (inside) above.push([capitalized(section), jobPath(job.id, section)])
+  return above
+}
+
+function hereOf(job: StoredJob, tab: string): string {
+  const [section, inside] = tab.split('/')
+  if (inside) return inside
+  const part = TABS.find((known) => known.tab === section)
+  return section === '' || !part ? job.name || job.id : part.label
 }
 
 function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {

@@ -140,6 +140,7 @@ function CellTable({
       unit: across.unit,
       header: true,
       value: ({ column }) => column,
+      data: ({ column }) => stretch(across, column),
       cell: ({ column }) => stretch(across, column),
     },
     {
@@ -147,6 +148,7 @@ function CellTable({
       label: inWords(up.name),
       unit: up.unit,
       value: ({ row }) => row,
+      data: ({ row }) => stretch(up, row),
       cell: ({ row }) => stretch(up, row),
     },
     { key: 'designs', label: 'Designs', numeric: true, value: ({ designs }) => designs },
@@ -155,6 +157,7 @@ function CellTable({
       label: 'Mean rank, in twelfths',
       numeric: true,
       value: ({ bucket }) => bucket,
+      data: ({ bucket }) => (bucket === null ? null : bucket + 1),
       cell: ({ bucket }) => formatNumber(bucket === null ? null : bucket + 1, 3),
     },
   ]

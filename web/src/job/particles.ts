@@ -1,5 +1,9 @@
 /** All designs of a job as columns of numbers, as /v1/jobs/{id}/particles sends them. */
 
+import type { DataTable } from '../export/csv'
+import { withUnit } from '../format/number'
+import { named } from '../format/value'
+
 export interface ParticleColumn {
   readonly name: string
   readonly unit: string
@@ -40,4 +44,26 @@ export function decodeParticles(buffer: ArrayBuffer): Particles {
 
 export function columnNamed(particles: Particles, name: string): ParticleColumn | null {
   return particles.columns.find((column) => column.name === name) ?? null
+}
+
+/** Some of the designs, with every column. rows: in the order wanted. */
+export function particlesTable({ columns }: Particles, rows: Iterable<number>): DataTable {
+  return {
+    name: 'Designs',
+    header: columns.map(({ name, unit }) => withUnit(name, unit)),
+    rows: Array.from(rows, (row) =>
+      columns.map(({ values, choices }) =>
+        Number.isNaN(values[row]) ? null : named(written(values[row]), choices),
+      ),
+    ),
+  }
+}
+
+/** The shortest number that is the same float32, so that 0.1 is not 0.10000000149011612. */
+function written(value: number): number {
+  for (let digits = 6; digits < 9; digits++) {
+    const short = Number(value.toPrecision(digits))
+    if (Math.fround(short) === value) return short
+  }
+  return value
 }

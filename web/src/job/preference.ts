@@ -19,8 +19,13 @@ export function weighed({ bias }: { readonly bias: readonly unknown[] }): readon
 
 /** The preference that a query asks for; undefined if it has none that can be read. */
 export function preferenceIn(query: URLSearchParams): Preference | undefined {
+  return preferenceOf(query.get('preference') ?? '')
+}
+
+/** A preference as JSON; undefined if it is none. */
+export function preferenceOf(text: string): Preference | undefined {
   try {
-    const { bias, exponent } = JSON.parse(query.get('preference') ?? '') as Partial<Preference>
+    const { bias, exponent } = JSON.parse(text) as Partial<Preference>
     const numbers = [bias, exponent].every((part) => part?.every(Number.isFinite))
     return numbers && bias?.length === exponent?.length
       ? ({ bias, exponent } as Preference)

@@ -6,15 +6,18 @@ import { LatestAnswer } from '../api/latest-answer'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec, Preference, Ranking } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
-import { usePlace } from '../router/navigation'
-import { preferenceIn } from './preference'
-import { PreferenceSliders } from './preference-sliders'
+import { useQueryValue } from '../router/query-value'
+import { preferenceOf, preferenceQuery } from './preference'
+import { PreferenceSliders, same } from './preference-sliders'
 import { RankingResult } from './ranking-result'
 
 export function PreferencesPanel({ job }: { job: Job }) {
   const own = (job.spec as JobSpec).preference as Preference
-  const { query } = usePlace()
-  const [preference, setPreference] = useState(() => preferenceIn(query) ?? own)
+  const codec = {
+    read: preferenceOf,
+    write: (wanted: Preference) => (same(wanted, own) ? null : preferenceQuery(wanted)),
+  }
+  const [preference, setPreference] = useQueryValue('preference', codec, own)
   const { ranking, error } = useRanking(job, preference)
   const presets = useResource('preferences', (signal) =>
     get('/v1/preferences', { signal }).then((answer) => answer.items),

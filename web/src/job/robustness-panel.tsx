@@ -139,6 +139,7 @@ function indexColumns(found: Robustness): readonly Column<IndexRow>[] {
       key: 'interval',
       label: 'Interval of 95 %',
       numeric: true,
+      data: (row) => (row.index ? `${row.index.low} – ${row.index.high}` : null),
       cell: (row) =>
         row.index ? `${formatNumber(row.index.low, 3)} – ${formatNumber(row.index.high, 3)}` : NONE,
     },

@@ -5,14 +5,23 @@ import { getBytes } from '../api/client'
 import { useResource, useSlowly } from '../api/resource'
 import type { Job } from '../api/types'
 import { type Brushes, ParallelCoordinates } from '../charts/parallel-coordinates'
-import { type AxisSource, bestRows, buildModel, selectRows } from '../charts/parallel-model'
+import {
+  type AxisSource,
+  bestRows,
+  buildModel,
+  type ParallelModel,
+  selectRows,
+} from '../charts/parallel-model'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount } from '../format/number'
+import { ignore } from '../router/ignored'
+import { type Codec, flag, useDelayedQuery, useQueryValue } from '../router/query-value'
 import { BrushFields } from './brush-fields'
+import { brushesOf, brushWords } from './brush-words'
 import { caseWords } from './fitness'
 import { PairCard } from './pair-card'
-import { columnNamed, decodeParticles, type Particles } from './particles'
+import { columnNamed, decodeParticles, type Particles, particlesTable } from './particles'
 import { SelectedDesigns } from './selected-designs'
 
 const NONE: Brushes = new Map()
@@ -57,10 +66,9 @@ export function VariablesPanel({ job }: { job: Job }) {
 
 function Designs({ job, particles }: { job: Job; particles: Particles }) {
   const words = caseWords(job.kind)
-  const [utilities, setUtilities] = useState(false)
-  const [objectives, setObjectives] = useState(false)
-  const [chosen, setChosen] = useState<Place | null>(null)
-  const [brushes, setBrushes] = useState(NONE)
+  const [utilities, setUtilities] = useQueryValue('utilities', flag(false), false)
+  const [objectives, setObjectives] = useQueryValue('objectives', flag(false), false)
+  const [chosen, setChosen] = useQueryValue('design', DESIGN, null)
   const sources = useMemo(
     () => axesOf(particles, { utility: utilities, objective: objectives }),
     [particles, utilities, objectives],
@@ -69,6 +77,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
     () => buildModel(sources, columnNamed(particles, 'fitness')!.values),
     [sources, particles],
   )
+  const [brushes, setBrushes] = useBrushes(model)
   const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
   const marked = useMemo(() => rowOf(particles, chosen), [particles, chosen])
   const best = useMemo(() => {
@@ -129,6 +138,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
           </>
         }
         table={() => <SelectedDesigns job={job} particles={particles} rows={best} />}
+        data={() => particlesTable(particles, selected)}
       >
         <ParallelCoordinates
           model={model}
@@ -160,6 +170,30 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
       </section>
     </div>
   )
+}
+
+/** The selection, which is part of the address; it holds for as long as its axes are there. */
+function useBrushes(model: ParallelModel): readonly [Brushes, (brushes: Brushes) => void] {
+  const write = useDelayedQuery('brush')
+  const [brushes, setBrushes] = useState<Brushes>(() => {
+    const text = new URLSearchParams(location.search).get('brush')
+    const read = brushesOf(model.axes, text)
+    if (read.unknown.length > 0) ignore('brush', read.unknown.join())
+    return read.brushes
+  })
+  const change = (next: Brushes) => {
+    setBrushes(next)
+    write(brushWords(model.axes, next))
+  }
+  return [brushes, change]
+}
+
+const DESIGN: Codec<Place | null> = {
+  read: (text) => {
+    const [, iteration, particle] = /^(\d+)\/(\d+)$/.exec(text) ?? []
+    return particle ? { iteration: Number(iteration), particle: Number(particle) } : undefined
+  },
+  write: (place) => place && `${place.iteration}/${place.particle}`,
 }
 
 /** Where a design is in its job: rows change when newer ones come. */

@@ -95,7 +95,12 @@ function GaitTable({ rows, comparing }: { rows: readonly Row[]; comparing: boole
           value: (row) => row.share,
           cell: (row) => percent(row.share),
         },
-        { key: 'spans', label: 'From, to', cell: (row) => text(row.spans) },
+        {
+          key: 'spans',
+          label: 'From, to',
+          data: (row) => row.spans.map((span) => span.join(' to ')).join('; '),
+          cell: (row) => text(row.spans),
+        },
       ]}
     />
   )

@@ -137,6 +137,7 @@ function IntervalTable({
         key: String(threshold),
         label: `within ${formatExact(threshold * 100)} %`,
         numeric: true,
+        data: ({ intervals }) => `${intervals[k].low} – ${intervals[k].high}`,
         cell: ({ intervals }) =>
           `${formatNumber(intervals[k].low, 3)} – ${formatNumber(intervals[k].high, 3)}`,
       }),

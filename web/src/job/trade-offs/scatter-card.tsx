@@ -1,6 +1,6 @@
 /** The front over any two objectives, with what is remarkable of it; as a table with all of them. */
 
-import { useMemo, useState } from 'preact/hooks'
+import { useMemo } from 'preact/hooks'
 import { useResource } from '../../api/resource'
 import { isPublished } from '../../api/robots'
 import type { Front, Job, JobSpec } from '../../api/types'
@@ -10,6 +10,7 @@ import { ErrorNotice } from '../../components/feedback'
 import { formatCount } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
+import { flag, useQueryValue } from '../../router/query-value'
 import type { Particles } from '../particles'
 import { publishedWalks } from '../reference'
 import {
@@ -39,7 +40,7 @@ export function ScatterCard({
   onChoose: (place: Place) => void
 }) {
   const { query } = usePlace()
-  const [logarithmic, setLogarithmic] = useState(true)
+  const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const [x, y] = axesOf(front, query.get('x'), query.get('y'))
   const clouds = useMemo(() => {
     const behind = all && allCloud(all, x, y)

@@ -1,0 +1,72 @@
+"""Files that the page makes: numbers and pictures of charts."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.examples.servers import ServerProcess
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def save(page: Page, chart: str, entry: str, folder: Path) -> Path:
+    """The file that an entry of a chart's menu makes, under the name that is proposed for it."""
+    button = page.get_by_role("button", name=re.compile(f"^Save .*: {chart}$"))
+    button.click()
+    expect(page.get_by_role("menuitem").first).to_be_focused()
+    with page.expect_download() as download:
+        page.get_by_role("menuitem", name=entry).click()
+    target = folder / download.value.suggested_filename
+    download.value.save_as(target)
+    return target
+
+
+def test_a_chart_gives_its_numbers_in_full_and_its_picture(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    numbers = save(page, "Convergence", "Numbers (CSV)", tmp_path)
+    assert numbers.name == "small-convergence.csv"
+    with numbers.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    told = server.client.get(f"/v1/jobs/{finished_job}/iterations").json()["items"]
+    assert [float(row["Best so far"]) for row in rows] == [one["best_so_far"] for one in told]
+
+    saved = save(page, "Convergence", "Picture (SVG)", tmp_path)
+    drawing = ET.parse(saved).getroot()  # noqa: S314 - this page's own
+    words = [text.text for text in drawing.iter(f"{SVG}text")]
+    assert {"Convergence", "best so far", "iteration"} <= set(words)
+    # Lines rather than pixels: the best so far has a place for every iteration.
+    lines = [path.get("d", "") for path in drawing.iter(f"{SVG}path")]
+    assert any(len(re.findall("[ML]", line)) == len(told) for line in lines)
+    assert not list(drawing.iter(f"{SVG}image"))
+
+    picture = save(page, "Convergence", "Picture (PNG)", tmp_path).read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert int.from_bytes(picture[16:20]) == 2 * int(drawing.get("width", "0"))
+
+
+def test_every_design_is_in_the_file_of_parallel_coordinates(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}/variables")
+    with save(page, "Designs by their variables", "Numbers (CSV)", tmp_path).open(
+        newline=""
+    ) as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 48
+    best = min(float(row["fitness"]) for row in rows if row["fitness"])
+    told = server.client.get(f"/v1/jobs/{finished_job}").json()["best"]["fitness"]
+    assert best == pytest.approx(told, rel=1e-6)
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("menu")).to_have_count(0)

@@ -1,0 +1,91 @@
+/** A button with a few commands below it (the menu button of the ARIA patterns). */
+
+import { useEffect, useId, useRef, useState } from 'preact/hooks'
+
+export interface MenuItem {
+  readonly label: string
+  readonly onChoose: () => void
+}
+
+export function Menu({
+  label,
+  of,
+  items,
+}: {
+  /** Of the button. */
+  label: string
+  /** What the commands are about; read, not shown. */
+  of: string
+  items: readonly MenuItem[]
+}) {
+  const [open, setOpen] = useState(false)
+  const box = useRef<HTMLDivElement>(null)
+  const button = useRef<HTMLButtonElement>(null)
+  const id = useId()
+  const entries = () => [...(box.current?.querySelectorAll<HTMLElement>('[role=menuitem]') ?? [])]
+  useEffect(() => {
+    if (open) entries()[0]?.focus()
+  }, [open])
+  const close = () => {
+    setOpen(false)
+    button.current?.focus()
+  }
+  const press = (event: KeyboardEvent) => {
+    if (!open) return
+    const all = entries()
+    const at = all.indexOf(document.activeElement as HTMLElement)
+    const to: Readonly<Record<string, number>> = {
+      ArrowDown: (at + 1) % all.length,
+      ArrowUp: (at - 1 + all.length) % all.length,
+      Home: 0,
+      End: all.length - 1,
+    }
+    if (event.key === 'Escape') close()
+    else if (event.key in to) all[to[event.key]]?.focus()
+    else return
+    event.preventDefault()
+    event.stopPropagation()
+  }
+  return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: keys of the button and commands inside
+    <div
+      class="menu"
+      ref={box}
+      onKeyDown={press}
+      onFocusOut={(event) => {
+        if (!box.current?.contains(event.relatedTarget as Node | null)) setOpen(false)
+      }}
+    >
+      <button
+        ref={button}
+        type="button"
+        class="compact plain"
+        aria-haspopup="menu"
+        aria-expanded={open}
+        aria-controls={open ? id : undefined}
+        onClick={() => setOpen(!open)}
+      >
+        {label} <span aria-hidden="true">▾</span>
+        <span class="visually-hidden">: {of}</span>
+      </button>
+      {open && (
+        <div role="menu" id={id} aria-label={`${label}: ${of}`}>
+          {items.map((item) => (
+            <button
+              key={item.label}
+              type="button"
+              role="menuitem"
+              tabIndex={-1}
+              onClick={() => {
+                close()
+                item.onChoose()
+              }}
+            >
+              {item.label}
+            </button>
+          ))}
+        </div>
+      )}
+    </div>
+  )
+}

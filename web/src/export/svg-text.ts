@@ -1,0 +1,41 @@
+/** Elements of an SVG picture as text. Pure. */
+
+export type Attributes = Readonly<Record<string, string | number | null | undefined>>
+
+/** `<name a="1">content</name>`; attributes without a value are left out. */
+export function element(name: string, attributes: Attributes, content = ''): string {
+  const written = Object.entries(attributes)
+    .filter(([, value]) => value !== null && value !== undefined)
+    .map(
+      ([key, value]) => ` ${key}="${escaped(typeof value === 'number' ? short(value) : value!)}"`,
+    )
+  return content === ''
+    ? `<${name}${written.join('')}/>`
+    : `<${name}${written.join('')}>${content}</${name}>`
+}
+
+export function escaped(text: string): string {
+  return text
+    .replaceAll('&', '&amp;')
+    .replaceAll('<', '&lt;')
+    .replaceAll('>', '&gt;')
+    .replaceAll('"', '&quot;')
+}
+
+/** A hundredth of a pixel is more than can be seen. */
+export function short(value: number): string {
+  return String(Math.round(value * 100) / 100)
+}
+
+/** `fill` or `stroke` with its opacity apart, as not every program reads `rgba()`. */
+export function paint(kind: 'fill' | 'stroke', colour: string, opacity = 1): Attributes {
+  const [red, green, blue, alpha = 1] = (colour.match(/[\d.]+/g) ?? []).map(Number)
+  if (!colour.startsWith('rgb')) {
+    return { [kind]: colour, [`${kind}-opacity`]: opacity < 1 ? opacity : null }
+  }
+  const share = alpha * opacity
+  return {
+    [kind]: `rgb(${red},${green},${blue})`,
+    [`${kind}-opacity`]: share < 1 ? share : null,
+  }
+}

@@ -1,0 +1,73 @@
+/** State that is part of the address, so that a link shows what is seen. */
+
+import { useEffect, useRef, useState } from 'preact/hooks'
+import { ignore } from './ignored'
+import { setQuery } from './navigation'
+
+/** How a value is written into the address. */
+export interface Codec<T> {
+  /** Undefined where the text means nothing. */
+  readonly read: (text: string) => T | undefined
+  /** Null for what need not be written. */
+  readonly write: (value: T) => string | null
+}
+
+/** After the last change, so that a slider does not write a hundred addresses [ms]. */
+const DELAY = 250
+
+/** A value of the query by its name; initial: where the address has none, or none that can be read. */
+export function useQueryValue<T>(
+  name: string,
+  codec: Codec<T>,
+  initial: T,
+): readonly [T, (value: T) => void] {
+  const [value, setValue] = useState(() => {
+    const text = new URLSearchParams(location.search).get(name)
+    if (text === null) return initial
+    const read = codec.read(text)
+    if (read === undefined) ignore(name, text)
+    return read ?? initial
+  })
+  const write = useDelayedQuery(name)
+  const change = (next: T) => {
+    setValue(() => next)
+    write(codec.write(next))
+  }
+  return [value, change]
+}
+
+/** Writes a value of the query some time after the last call, unless the page was left by then. */
+export function useDelayedQuery(name: string): (text: string | null) => void {
+  const timer = useRef(0)
+  useEffect(() => () => clearTimeout(timer.current), [])
+  return (text) => {
+    clearTimeout(timer.current)
+    timer.current = window.setTimeout(() => setQuery({ [name]: text }), DELAY)
+  }
+}
+
+/** Whether something is shown, written only where it is not as usual. */
+export function flag(usual: boolean): Codec<boolean> {
+  return {
+    read: (text) => (text === 'yes' ? true : text === 'no' ? false : undefined),
+    write: (value) => (value === usual ? null : value ? 'yes' : 'no'),
+  }
+}
+
+/** Two numbers in rising order, or none: `2:40`. */
+export const RANGE: Codec<readonly [number, number] | null> = {
+  read: (text) => {
+    const [low, high, ...rest] = text.split(':').map((part) => Number(part || Number.NaN))
+    return rest.length === 0 && Number.isFinite(high - low) && low < high ? [low, high] : undefined
+  },
+  write: (range) => range && range.map((end) => Number(end.toPrecision(5))).join(':'),
+}
+
+/** A column, with a minus before it for the greatest first. */
+export const ORDER: Codec<{ readonly column: string; readonly descending: boolean }> = {
+  read: (text) =>
+    /^-?\w[\w-]*$/.test(text)
+      ? { column: text.replace(/^-/, ''), descending: text.startsWith('-') }
+      : undefined,
+  write: ({ column, descending }) => (descending ? `-${column}` : column),
+}

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
 from gaitswarm.views import SimulationView
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.jobs.reference import on_the_jobs_terms, published_study
 from services.optimizer.jobs.spec import Spec
 from sim.controllers import CONTROLLERS
-from sim.gait_variables import GAIT_CATALOGUE
 
 
 def published_beside(spec: Spec) -> dict[str, SimulationView]:
@@ -19,13 +16,8 @@ def published_beside(spec: Spec) -> dict[str, SimulationView]:
     Evaluated in the job's scenarios under its preference. Where none was published for that
     preference, the controller's first; none for a job that tunes no drive.
     """
-    if not isinstance(spec, JobSpec):
-        return {}
-    published = CONTROLLERS[spec.controller].published
-    wanted = spec.resolved_preference()
-    names = [name for name, known in PREFERENCES.items() if known == wanted and name in published]
-    study = next(iter([*names, *published]), None)
-    if study is None:
+    study = published_study(spec) if isinstance(spec, JobSpec) else None
+    if study is None or not isinstance(spec, JobSpec):
         return {}
     return {f"published {study}": published_walk(spec, study)}
 
@@ -44,25 +36,3 @@ def published_walk(spec: JobSpec, study: str) -> SimulationView:
         preference=spec.preference,
     )
     return run_simulation(request)
-
-
-def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
-    """A published design for comparison with what a job finds.
-
-    published: a design with or without a gait of its own.
-
-    It walks in its own gait only as far as the job searches the gait; else in the gait that all of
-    the job's designs have. So with conventions that the job holds fixed.
-    """
-    space = spec.design_space()
-    searched = {variable.name for variable in space.variables}
-    conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
-    held = {
-        name: value for name, value in space.fixed if name in conventions or name in GAIT_CATALOGUE
-    }
-    own = {
-        name: value
-        for name, value in published.items()
-        if name not in GAIT_CATALOGUE or name in searched
-    }
-    return own | held

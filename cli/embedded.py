@@ -15,6 +15,7 @@ from gaitswarm.jobs.database.embedded import check_same, earlier_job, taken_up
 from gaitswarm.jobs.database.jobs import DatabaseJobs
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.settings import read_settings
+from services.optimizer.analysis.reference import note_reference
 from services.optimizer.jobs.job import JobState
 from services.optimizer.service import JobService
 from services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
@@ -100,7 +101,7 @@ class Embedded:
                 )
 
             try:
-                run_embedded(
+                ended = run_embedded(
                     store,
                     lambda: self._opened(progress, stop),
                     job.id if claim is None else claim,
@@ -118,6 +119,8 @@ class Embedded:
             except Exception as error:
                 error.add_note(_how_to_go_on(job.id, jobs.place))
                 raise
+            if not stop.is_set():
+                note_reference(store, ended)
         return stop.is_set()
 
     def close(self) -> None:

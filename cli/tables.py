@@ -55,11 +55,14 @@ SHORT: Final = {
 
 
 def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
-    """One row a job; their priorities only where one is not the usual."""
+    """One row a job; priorities and gains only where there is one."""
     rows = list(jobs)
     urgent = any(job.priority for job in rows)
-    last = ("iterations", "best fitness", "submitted (UTC)")
-    table = Table("id", "name", "state", *(["priority"] if urgent else []), *last, box=None)
+    compared = any(job.gain is not None for job in rows)
+    table = Table("id", "name", "state", *(["priority"] if urgent else []), box=None)
+    gains = ["gain"] if compared else []
+    for heading in ("iterations", "best fitness", *gains, "submitted (UTC)"):
+        table.add_column(heading)
     for job in rows:
         table.add_row(
             job.id,
@@ -68,6 +71,7 @@ def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
             *([str(job.priority)] if urgent else []),
             _spent(job),
             number(job.best_fitness),
+            *([MISSING if job.gain is None else f"{job.gain:.1%}"] if compared else []),
             f"{job.created_at:%Y-%m-%d %H:%M}",
         )
     return table

@@ -8,9 +8,11 @@ import threading
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from services.optimizer.analysis.reference import note_reference
 from services.optimizer.deletion import Housekeeping
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import QUARANTINE_AFTER
@@ -193,6 +195,7 @@ def open_runtime(
             lease_seconds=lease_seconds,
             cache=cache,
             quarantine_after=quarantine_after,
+            on_ended=partial(note_reference, runners_store),
         )
         stack.callback(runner.stop)
         runner.start()

@@ -209,9 +209,17 @@ def list_jobs(
         Query(
             description="`created`: newest first; `fitness`: best first, jobs without one last;"
             " `name`: by name, jobs without one last; `state`: those that wait or run first;"
-            " `evaluations`: most first."
+            " `evaluations`, `iterations`, `priority`, `rate`: most first; `gain` over the"
+            " published design: greatest first; `time_left`: those that end soonest first."
         ),
     ] = JobOrder.CREATED,
+    reverse: Annotated[
+        bool,
+        Query(
+            description="Whether the order is reversed; jobs without what they are sorted by stay"
+            " last."
+        ),
+    ] = False,
     robot: Annotated[
         str | None,
         Query(max_length=200, description="Only jobs of this robot; `own` for users' own."),
@@ -245,6 +253,7 @@ def list_jobs(
         search=search,
         where=where,
         order=order,
+        reverse=reverse,
         after=after,
         limit=limit,
     )

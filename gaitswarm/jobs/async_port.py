@@ -111,6 +111,7 @@ class AsyncJobs(ABC):
         search: str = "",
         where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
+        reverse: bool = False,
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]:
         """List jobs."""

@@ -143,6 +143,7 @@ class Jobs(Findings, Tournaments, Walks, ABC):
         search: str = "",
         where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
+        reverse: bool = False,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List jobs.
@@ -152,8 +153,10 @@ class Jobs(Findings, Tournaments, Walks, ABC):
             parent: Only jobs that were forked from the job of this id.
             search: Only jobs whose name, id, note or tags contain this, whatever its case.
             where: Only jobs that this admits, such as `JobFilter(controller="pi")`.
-            order: "created" (newest first), "fitness" (best first), "name", "state" or
-                "evaluations" (most first).
+            order: "created" (newest first), "fitness" (best first), "gain" over the published
+                design (greatest first), "name", "state", "iterations", "evaluations", "priority",
+                "rate" (most first) or "time_left" (least first).
+            reverse: Whether the order is reversed; jobs without what they are sorted by stay last.
             limit: Most jobs to list; None for all.
 
         Returns:

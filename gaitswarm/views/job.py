@@ -11,6 +11,7 @@ from gaitswarm.views.base import View, finite
 from gaitswarm.views.budget import Spent, budget_spent
 from gaitswarm.views.evaluation import BestView, ObjectiveView
 from gaitswarm.views.links import job_links
+from gaitswarm.views.reference import ReferenceView
 from services.optimizer.errors import Unreadable
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import Lineage
@@ -99,6 +100,18 @@ class JobSummaryView(View):
         description="Least fitness so far, in double precision [1]; null while every design has"
         " failed.",
         examples=[21.3],
+    )
+    reference: ReferenceView | None = Field(
+        default=None,
+        description="Published design of its controller and preference in the same walks; null"
+        " where there is none, and until the job has ended or `/v1/jobs/{job_id}/reference` was"
+        " asked for.",
+    )
+    gain: float | None = Field(
+        default=None,
+        description="Share by which `best_fitness` is less than that of `reference` [1]; null"
+        " where one of them is not known.",
+        examples=[0.39],
     )
     best_iteration: int | None = Field(
         description="Iteration that found it, from 0.", examples=[11]
@@ -319,6 +332,8 @@ def _summary(job: Job) -> dict[str, object]:
         "evaluations": progress.evaluations,
         "evaluations_saved": progress.evaluations_saved,
         "best_fitness": finite(progress.best_fitness),
+        "reference": ReferenceView.from_reference(job.reference),
+        "gain": finite(job.gain),
         "best_iteration": progress.best_iteration,
         "compute_seconds": progress.compute_seconds,
         "evaluations_per_second": rates.evaluations_per_second,

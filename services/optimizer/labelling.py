@@ -27,6 +27,7 @@ class Labelling:
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
         limit: int = 50,
+        reverse: bool = False,
     ) -> Page[Job]:
         """List jobs, page by page. Jobs submitted meanwhile do not shift later pages.
 
@@ -39,6 +40,7 @@ class Labelling:
             order: how they are sorted.
             after: `next` of the page before, of the same order.
             limit: most jobs on a page.
+            reverse: whether the order is reversed; jobs without what they are sorted by stay last.
 
         Returns:
             A page; `next` is None on the last one.
@@ -55,6 +57,7 @@ class Labelling:
             order=order,
             after=after,
             limit=limit,
+            reverse=reverse,
         )
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:

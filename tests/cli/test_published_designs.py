@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from cli.comparison import on_the_jobs_terms, published_beside
+from cli.comparison import published_beside
 from cli.design_file import read_design
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.reference import on_the_jobs_terms
 from services.optimizer.search.swarm.pso import PsoSettings
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.gait_variables import GAIT_CATALOGUE

@@ -96,9 +96,11 @@ def list_jobs(
     order: Annotated[
         str,
         typer.Option(
-            help="created (newest first), fitness (best first), name, state or evaluations."
+            help="created (newest first), fitness (best first), gain (greatest first), name,"
+            " state, iterations, evaluations, priority, rate (most first) or time_left."
         ),
     ] = "created",
+    reverse: Annotated[bool, typer.Option("--reverse", help="The other way round.")] = False,
     limit: Annotated[int, typer.Option(min=1, help="Most jobs to list.")] = 50,
     server: Server = None,
     db: Db = None,
@@ -120,6 +122,7 @@ def list_jobs(
             search=search,
             where=JobFilter(archived, robot, controller, preference, tag),
             order=sorted_by,
+            reverse=reverse,
             limit=limit,
         )
         if as_json:

@@ -187,6 +187,7 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         search: str = "",
         where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
+        reverse: bool = False,
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]:
         """List the database's jobs, read by pages."""
@@ -198,6 +199,7 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
             search=search,
             where=where,
             order=order,
+            reverse=reverse,
             limit=limit,
         )
         async for job in iterated(found):

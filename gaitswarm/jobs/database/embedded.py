@@ -12,6 +12,7 @@ from typing import Any, Final, get_args
 from gaitswarm.errors import Conflict, Interrupted, InvalidRequest, ProvenanceChanged
 from gaitswarm.settings import read_settings
 from gaitswarm.views import JobView
+from services.optimizer.analysis.reference import note_reference
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.jobs.spec import Spec
@@ -156,6 +157,7 @@ def run_here(
         raise _interrupted(service.job(job_id), url) from error
     if interrupted.is_set() and not ended.state.terminal:
         raise _interrupted(ended, url)
+    note_reference(service.store, ended)
     return ended
 
 

@@ -197,10 +197,12 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         search: str = "",
         where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
+        reverse: bool = False,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List the database's jobs, read by pages."""
-        found = self._all(arguments.state(state), parent, search, where, arguments.order(order))
+        in_order = (arguments.order(order), reverse)
+        found = self._all(arguments.state(state), parent, search, where, in_order)
         return map(JobSummaryView.from_job, islice(found, limit))
 
     def job(self, job_id: str) -> JobView:
@@ -301,9 +303,10 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         parent: str | None,
         search: str,
         where: JobFilter,
-        order: JobOrder,
+        in_order: tuple[JobOrder, bool],
     ) -> Iterator[Job]:
         after: str | None = None
+        order, reverse = in_order
         while True:
             page = self._service.jobs(
                 state=state,
@@ -311,6 +314,7 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
                 search=search,
                 where=where,
                 order=order,
+                reverse=reverse,
                 after=after,
                 limit=PAGE,
             )

@@ -140,13 +140,14 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         search: str = "",
         where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
+        reverse: bool = False,
         limit: int | None = None,
     ) -> AsyncIterator[JobSummaryView]:
         """List the server's jobs, page by page."""
         wanted, sorted_by = arguments.state(state), arguments.order(order)
         left = limit
         pages = self._items(
-            lambda after: calls.jobs(wanted, parent, search, where, sorted_by, after)
+            lambda after: calls.jobs(wanted, parent, search, where, (sorted_by, reverse), after)
         )
         async for job in pages:
             if left is not None:

@@ -50,7 +50,7 @@ def jobs(
     parent: str | None,
     search: str,
     where: JobFilter,
-    order: JobOrder,
+    in_order: tuple[JobOrder, bool],
     after: str | None,
 ) -> Call[PageView[JobSummaryView]]:
     """A page of the list of jobs.
@@ -60,10 +60,13 @@ def jobs(
         parent: Identifier of the job that they were forked from; None for any.
         search: Text that name, id, note or tags contain, whatever its case.
         where: Admits the jobs.
-        order: In which they are listed.
+        in_order: In which they are listed, and whether that is reversed.
         after: `next` of the page before; None for the first page.
     """
+    order, reverse = in_order
     chosen = {"search": search, "order": order.value}
+    if reverse:
+        chosen["reverse"] = "true"
     if state is not None:
         chosen["state"] = state.value
     if parent is not None:

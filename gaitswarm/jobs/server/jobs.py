@@ -150,12 +150,13 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
         search: str = "",
         where: JobFilter = ANY_JOB,
         order: JobOrder | str = JobOrder.CREATED,
+        reverse: bool = False,
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List the server's jobs, page by page."""
         wanted, sorted_by = arguments.state(state), arguments.order(order)
         found = self._items(
-            lambda after: calls.jobs(wanted, parent, search, where, sorted_by, after)
+            lambda after: calls.jobs(wanted, parent, search, where, (sorted_by, reverse), after)
         )
         return islice(found, limit)
 

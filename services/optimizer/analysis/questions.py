@@ -21,6 +21,7 @@ from services.optimizer.analysis.fits.identifiability import (
 from services.optimizer.analysis.history import PIECE, read_columns, read_history
 from services.optimizer.analysis.history_cache import HistoryCache
 from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
+from services.optimizer.analysis.reference import with_reference
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
 from services.optimizer.jobs.job import Job
@@ -87,6 +88,20 @@ class Questions:
             NotFound: no job of that id; at the first item.
         """
         return read_history(self.store, job_id, after=after)
+
+    def reference(self, job_id: str) -> tuple[Job, str | None]:
+        """Compare a job's best with the published design, which walks where that is not known.
+
+        Args:
+            job_id: id of the job.
+
+        Returns:
+            The job with its reference; and why it has no gain, None if it has one.
+
+        Raises:
+            NotFound: no job of that id.
+        """
+        return with_reference(self.store, self.store.job(job_id))
 
     def asked(self, job: Job, iterations: int | None = None) -> tuple[NDArray[np.float64], ...]:
         """Read what the search asked for.

@@ -14,6 +14,7 @@ from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.iteration import Answered, Ask
 from services.optimizer.jobs.labels import Labels
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, changes_since
+from services.optimizer.jobs.reference import Reference
 from sim.identification.recorded_walk import Recordings
 
 
@@ -63,6 +64,16 @@ class JobOrder(StrEnum):
     """Those that wait or run first, then those that have ended."""
     EVALUATIONS = "evaluations"
     """Most evaluations first."""
+    GAIN = "gain"
+    """Greatest gain over the published design first, jobs without one last."""
+    PRIORITY = "priority"
+    """Most urgent first."""
+    ITERATIONS = "iterations"
+    """Most committed iterations first."""
+    RATE = "rate"
+    """Most evaluations a second first, jobs without one last."""
+    TIME_LEFT = "time_left"
+    """Those that end soonest first, jobs of which that is not known last."""
 
 
 TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
@@ -211,6 +222,7 @@ class Job:
             `priority.py`.
         labels: what people have written on it.
         archived: whether it is out of the way in lists.
+        reference: what its best is measured against; None while nobody has found that out.
     """
 
     id: str
@@ -232,6 +244,14 @@ class Job:
     priority: int = 0
     labels: Labels = field(default_factory=Labels)
     archived: bool = False
+    reference: Reference | None = None
+
+    @property
+    def gain(self) -> float | None:
+        """By which share its best is better than the published design [1]; None if not known."""
+        if self.reference is None:
+            return None
+        return self.reference.gain(self.progress.best_fitness)
 
     @property
     def name(self) -> str:

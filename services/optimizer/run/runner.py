@@ -17,7 +17,7 @@ from contextlib import suppress
 from typing import Final
 
 from services.optimizer.errors import GaitswarmError, NotFound
-from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, JobState
+from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Job, JobState
 from services.optimizer.jobs.provenance import optimizer_digest
 from services.optimizer.log_context import log_context
 from services.optimizer.run.evaluator import Evaluator
@@ -59,6 +59,8 @@ class Runner:
         cache: Whether a design is walked only if no job has walked it before.
         quarantine_after: A job with which so many runner processes in a row went down fails.
         name: Of this runner, which no other one may have; a random one by default.
+        on_ended: Called in a job's thread when nothing more is done at the job here, unless the
+            runner is stopped.
         clock: Monotonic time [s]; replaced in tests.
 
     Raises:
@@ -76,6 +78,7 @@ class Runner:
         cache: bool = False,
         quarantine_after: int = QUARANTINE_AFTER,
         name: str | None = None,
+        on_ended: Callable[[Job], None] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         if concurrency < 1:
@@ -84,6 +87,7 @@ class Runner:
         self._poll_seconds = poll_seconds
         self._quarantine_after = quarantine_after
         self._name = name or runner_name()
+        self._on_ended = on_ended
         self._clock = clock
         self._drain = threading.Event()
         self._stop = threading.Event()
@@ -211,6 +215,8 @@ class Runner:
         try:
             job = run_claim(claim, self._around, self._stop, self._drain)
             _log.info("job %s: %s after %d iterations", job.id, job.state, job.progress.iterations)
+            if self._on_ended is not None and not self._stop.is_set():
+                self._on_ended(job)
         except NotFound as error:
             _log.info("job %s was deleted: %s", claim.job.id, error)
         except Exception as error:  # noqa: BLE001

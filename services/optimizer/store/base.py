@@ -19,6 +19,7 @@ from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.jobs.notification import Outbox
 from services.optimizer.jobs.provenance import JobProvenance
 from services.optimizer.jobs.quota import Quota
+from services.optimizer.jobs.reference import Reference
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.deletions import Deletions
 from services.optimizer.store.labelling import Labelling
@@ -131,6 +132,7 @@ class Store(CommittedHistory, Deletions, Labelling, Runs, Protocol):
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
         limit: int = 50,
+        reverse: bool = False,
     ) -> Page[Job]:
         """Read a page of jobs.
 
@@ -143,6 +145,7 @@ class Store(CommittedHistory, Deletions, Labelling, Runs, Protocol):
             order: By what they are sorted.
             after: `next` of the page before.
             limit: Most jobs on the page.
+            reverse: Whether the order is reversed; jobs without what they are sorted by stay last.
 
         Returns:
             The page; jobs that are submitted meanwhile do not shift later ones.
@@ -236,6 +239,14 @@ class Store(CommittedHistory, Deletions, Labelling, Runs, Protocol):
 
         Raises:
             Conflict: The job has ended.
+        """
+
+    def note_reference(self, job_id: str, reference: Reference) -> None:
+        """Note what a job's best is measured against, unless that is known; nothing depends on it.
+
+        Args:
+            job_id: Of the job; one that is gone is let be.
+            reference: The published design in the job's cases.
         """
 
     def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:

@@ -16,6 +16,7 @@ from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
 from services.optimizer.jobs.labels import Labels
 from services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
+from services.optimizer.jobs.reference import Reference
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows import Row
 from services.optimizer.store.tables import UnparsedText
@@ -112,6 +113,7 @@ def to_job(row: Row, documents: JobDocuments | None = None) -> Job:
         priority=row["priority"],
         labels=labels_of(row),
         archived=bool(row["archived"]),
+        reference=reference_of(row["reference"]),
     )
 
 
@@ -128,6 +130,24 @@ def labels_of(row: Row) -> Labels:
         return Labels() if row["labels"] is None else Labels.model_validate(row["labels"])
     except ValidationError:
         return Labels()
+
+
+def reference_of(document: Any) -> Reference | None:
+    """What a job's best is measured against.
+
+    Args:
+        document: As it is stored.
+
+    Returns:
+        The reference; None where none is stored, or it cannot be read, as nothing depends on it.
+    """
+    if not isinstance(document, dict):
+        return None
+    name, fitness = document.get("name"), document.get("fitness")
+    return Reference(
+        name if isinstance(name, str) else None,
+        float(fitness) if isinstance(fitness, int | float) else None,
+    )
 
 
 def submitted_spec(row: Row) -> AnySpec | UnreadableSpec:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, Final
 
+from sqlalchemy import update
 from sqlalchemy.exc import IntegrityError
 
 from services.optimizer.errors import InvalidRequest
@@ -24,6 +26,7 @@ from services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, Labe
 from services.optimizer.jobs.priority import check_can_be_prioritized
 from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.quota import Quota
+from services.optimizer.jobs.reference import Reference
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.audit import audit_page, note_change, note_submission
 from services.optimizer.store.changes import SqlChanges
@@ -43,14 +46,9 @@ from services.optimizer.store.engine import (
 from services.optimizer.store.file_system import check_file_system
 from services.optimizer.store.history import SqlHistory, checked_limit
 from services.optimizer.store.in_use import admit
-from services.optimizer.store.job_list import (
-    among_jobs,
-    cursor_of,
-    fittest_jobs,
-    job_rows,
-    newest_jobs,
-    sort_jobs,
-)
+from services.optimizer.store.job_cursors import cursor_of
+from services.optimizer.store.job_list import among_jobs, fittest_jobs, job_rows, newest_jobs
+from services.optimizer.store.job_orders import sort_jobs
 from services.optimizer.store.job_rows import request_digest, to_job
 from services.optimizer.store.job_views import shown_job
 from services.optimizer.store.labels import count_facets, label_job
@@ -73,6 +71,7 @@ from services.optimizer.store.records import (
 from services.optimizer.store.revisions import check_revision
 from services.optimizer.store.runs import SqlRuns
 from services.optimizer.store.submissions import Submission, check_quota, insert_job, repeated_job
+from services.optimizer.store.tables import jobs
 from services.optimizer.store.tokens import SqlTokens
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -204,12 +203,13 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
         order: JobOrder = JobOrder.CREATED,
         after: str | None = None,
         limit: int = 50,
+        reverse: bool = False,
     ) -> Page[Job]:
         """Read a page of jobs."""
         limit = checked_limit(limit)
         among = among_jobs(state, parent, where.archived)
         listed = _LISTED.get(order)
-        plain = not search and kind is None and not where.needs_specs
+        plain = not search and kind is None and not where.needs_specs and not reverse
         if plain and listed is not None:
             with self._database.transaction(write=False) as connection:
                 return listed(connection, among, after, limit)
@@ -222,10 +222,11 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
                 where=where,
                 order=order,
                 after=after,
+                reverse=reverse,
             )
             ids, more = found[:limit], len(found) > limit
             rows = job_rows(connection, ids)
-        following = cursor_of(rows[-1], order) if more else None
+        following = cursor_of(rows[-1], order, reverse=reverse) if more else None
         return Page(tuple(map(shown_job, rows)), following)
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
@@ -238,6 +239,13 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
         with self._database.transaction(write=True) as connection:
             now = self._clock(connection)
             return to_job(label_job(connection, job_id, change, now=now, actor=actor))
+
+    def note_reference(self, job_id: str, reference: Reference) -> None:
+        """Note what a job's best is measured against."""
+        with self._database.transaction(write=True) as connection:
+            unknown = jobs.c.reference.is_(None)
+            noted = update(jobs).where(jobs.c.id == job_id, unknown)
+            connection.execute(noted.values(reference=asdict(reference)))
 
     def queue(self) -> Queue:
         """Count the jobs."""

@@ -198,6 +198,8 @@ jobs: Final = Table(
     Column("simulated_seconds", Double),
     # The higher, the sooner it is claimed.
     Column("priority", Integer, nullable=False, server_default="0"),
+    # What its best is measured against, `Reference`; NULL while nobody has found that out.
+    Column("reference", Document(none_as_null=True)),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),

@@ -1,0 +1,130 @@
+"""Lets the published design walk as a job's own do, so that its gain over that is known."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.provenance import changes_since, job_provenance
+from services.optimizer.jobs.reference import Reference, published_for
+from services.optimizer.jobs.spec import Spec
+from services.optimizer.store.base import Store
+from sim.case import Walk, run_together
+from sim.errors import SimulationError
+from sim.outcome import Status
+from sim.worlds.perturbed_walk import PerturbedWalk
+
+NONE: Final = Reference(None, None)
+"""Of a job for which nothing was published."""
+
+_JUDGED_BY: Final = frozenset(
+    {"robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"}
+)
+"""Fields of a spec on which a reference depends."""
+
+_log = logging.getLogger(__name__)
+
+
+def walked_reference(spec: Spec) -> Reference:
+    """Let the published design of a job walk in the job's cases.
+
+    Args:
+        spec: Of the job.
+
+    Returns:
+        What it comes to, the same for the same spec to the bit.
+
+    Raises:
+        SimulationError: It cannot be simulated here.
+    """
+    if published_for(spec) is None:
+        return NONE
+    return _walked(spec.model_dump_json(include=set(_JUDGED_BY)))
+
+
+@lru_cache(maxsize=64)
+def _walked(judged_by: str) -> Reference:
+    spec = JobSpec.model_validate_json(judged_by)
+    found = published_for(spec)
+    if found is None:
+        return NONE
+    name, design = found
+    cases = [
+        replace(case, variables=tuple(design), precision="double")
+        for case in spec.cases({})
+        if isinstance(case, Walk | PerturbedWalk)
+    ]
+    row = np.array([list(design.values())])
+    outcomes = run_together(cases, [row] * len(cases))
+    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
+    fitness = float(spec.judge(objectives, failed).fitness[0])
+    return Reference(name, fitness if math.isfinite(fitness) else None)
+
+
+def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
+    """Find out what a job's best is measured against, unless that is known, and store it.
+
+    Nothing that determines results depends on it. A job whose numbers come of other code is left
+    as it is, as its gain would be over what that code has never computed.
+
+    Args:
+        store: Where the job is kept.
+        job: As it was read.
+
+    Returns:
+        The job with its reference, as far as that is known; and why it has no gain, for people,
+        None if it has one.
+
+    Raises:
+        StoreUnavailable: The reference cannot be stored.
+    """
+    if job.reference is None:
+        if not job.readable or not isinstance(job.spec, JobSpec):
+            return job, "it tunes no drive"
+        if job.progress.best_fitness is None:
+            return job, "it has found no design yet that walks in every scenario"
+        try:
+            if changes_since(job.provenance, job.progress.iterations, job_provenance(job.spec)):
+                return job, "its numbers come of other code, or of other libraries, than there are"
+            reference = walked_reference(job.spec)
+        except (SimulationError, OSError) as error:
+            return job, f"the published design cannot walk here: {error}"
+        store.note_reference(job.id, reference)
+        job = replace(job, reference=reference)
+    return job, None if job.gain is not None else _why_none(job)
+
+
+def _why_none(job: Job) -> str:
+    reference = job.reference or NONE
+    if reference.name is None:
+        return "no design was published for its controller and its robot"
+    if reference.fitness is None:
+        return f"the published design {reference.name} does not walk in all of its scenarios"
+    return "it has found no design yet that walks in every scenario"
+
+
+def note_reference(store: Store, job: Job) -> None:
+    """As `with_reference` of a job that has ended or paused; the log says what went wrong.
+
+    Args:
+        store: Where the job is kept.
+        job: As it was read.
+    """
+    if job.reference is not None:
+        return
+    try:
+        _, reason = with_reference(store, job)
+    except Exception:  # noqa: BLE001
+        # Whatever it is: the job's results are stored, and need it for nothing.
+        _log.exception("job %s: its best is compared with nothing", job.id)
+    else:
+        if reason is not None:
+            _log.debug("job %s: no gain over a published design: %s", job.id, reason)

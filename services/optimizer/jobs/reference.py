@@ -1,0 +1,107 @@
+"""What a job's best is measured against: a published design, judged as the job's own are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.labels import robot_name
+from services.optimizer.jobs.preference import PREFERENCES
+from services.optimizer.jobs.spec import Spec
+from sim.controllers import CONTROLLERS
+from sim.gait_variables import GAIT_CATALOGUE
+from sim.robot.shipped import SHIPPED
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A published design in the cases of a job.
+
+    Attributes:
+        name: Of the study or preference that it was published for; None where there is none for
+            the job.
+        fitness: What it comes to, judged as the job judges, in double precision; None where it
+            does not walk in every case.
+    """
+
+    name: str | None
+    fitness: float | None
+
+    def gain(self, fitness: float | None) -> float | None:
+        """How much better a design is.
+
+        Args:
+            fitness: Of the design, which is the better the less it is.
+
+        Returns:
+            The share by which its fitness is less than the reference's [1], negative where it is
+            greater; None where one of the two is not known.
+        """
+        if fitness is None or self.fitness is None or not self.fitness > 0.0:
+            return None
+        return 1.0 - fitness / self.fitness
+
+
+def published_for(spec: Spec) -> tuple[str, Mapping[str, float]] | None:
+    """The published design of a job's controller and preference.
+
+    Published designs are of the robots that ship with gaitswarm. A plug-in's case judges by
+    another measure.
+
+    Args:
+        spec: Of the job.
+
+    Returns:
+        Its name and its values, on the job's terms. Where none was published for that preference,
+        the controller's first; None where there is none for the controller or the robot, and for
+        a job that tunes no drive.
+    """
+    if not isinstance(spec, JobSpec) or spec.case is not None:
+        return None
+    study = published_study(spec)
+    if study is None or robot_name(spec.robot) not in SHIPPED:
+        return None
+    return study, on_the_jobs_terms(CONTROLLERS[spec.controller].published[study], spec)
+
+
+def published_study(spec: JobSpec) -> str | None:
+    """Name the published design of a job's controller that was tuned as the job tunes.
+
+    Args:
+        spec: Of the job.
+
+    Returns:
+        That of its preference, or else the controller's first; None for none.
+    """
+    published = CONTROLLERS[spec.controller].published
+    wanted = spec.resolved_preference()
+    names = [name for name, known in PREFERENCES.items() if known == wanted and name in published]
+    return next(iter([*names, *published]), None)
+
+
+def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
+    """A published design for comparison with what a job finds.
+
+    It walks in its own gait only as far as the job searches the gait; else in the gait that all of
+    the job's designs have. So with conventions that the job holds fixed.
+
+    Args:
+        published: A design with or without a gait of its own.
+        spec: Of the job.
+
+    Returns:
+        The design's values by name.
+    """
+    space = spec.design_space()
+    searched = {variable.name for variable in space.variables}
+    conventions = {variable.name for variable in CONTROLLERS[spec.controller].conventions}
+    held = {
+        name: value for name, value in space.fixed if name in conventions or name in GAIT_CATALOGUE
+    }
+    own = {
+        name: value
+        for name, value in published.items()
+        if name not in GAIT_CATALOGUE or name in searched
+    }
+    return own | held

@@ -1,0 +1,111 @@
+"""A job's best beside the published design: found once, listed and sorted by from then on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import httpx2
+import pytest
+
+from services.optimizer.analysis import reference as references
+from services.optimizer.analysis.reference import note_reference, walked_reference
+from services.optimizer.jobs.job import Job, JobOrder
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.provenance import job_provenance
+from services.optimizer.jobs.reference import Reference
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Commit
+
+BRIEF = {"name": "brief", "cycle_time": 0.5, "cycles": 1.0, "radius": 0.16, "hip_height": 0.15}
+"""A scenario of a single short cycle."""
+
+
+def tuning(**changes: object) -> JobSpec:
+    asked = {"scenarios": [BRIEF], "optimizer": {"particles": 4}, "iterations": 3}
+    return JobSpec.model_validate(asked | changes)
+
+
+def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
+    client: httpx2.Client, store: SqlStore, commit: Commit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = tuning(preference="B")
+    job, _ = store.create_job(spec, provenance=job_provenance(spec))
+    here = f"/v1/jobs/{job.id}/reference"
+    early = client.get(here).json()
+    assert early["reference"] is None and "no design yet" in early["reason"]
+    assert store.job(job.id).reference is None
+
+    commit(job, 1)
+    found = client.get(here).json()
+    published = {"controller": "fuzzy-pi", "scenarios": [BRIEF], "preference": "B"}
+    design = client.get("/v1/controllers").json()["items"][0]["published"]["B"]
+    walk = client.post("/v1/simulations", json={**published, "design": design}).json()
+    assert found["reference"] == {"name": "B", "fitness": walk["fitness"]}
+    assert found["gain"] == 1.0 - found["best_fitness"] / walk["fitness"]
+    assert found["reason"] is None
+
+    monkeypatch.setattr(references, "walked_reference", None)
+    assert client.get(here).json() == found
+    (listed,) = client.get("/v1/jobs").json()["items"]
+    assert (listed["reference"], listed["gain"]) == (found["reference"], found["gain"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "recorded", "reason"),
+    [
+        ({"controller": "pid"}, True, "no design was published"),
+        ({}, False, "other code"),
+    ],
+)
+def test_it_is_said_why_there_is_none(
+    client: httpx2.Client,
+    store: SqlStore,
+    commit: Commit,
+    changes: dict[str, object],
+    recorded: bool,
+    reason: str,
+) -> None:
+    spec = tuning(**changes)
+    job, _ = store.create_job(spec, provenance=job_provenance(spec) if recorded else None)
+    commit(job, 1)
+    found = client.get(f"/v1/jobs/{job.id}/reference").json()
+    assert (found["reference"], found["gain"]) == (None, None)
+    assert reason in found["reason"]
+
+
+def test_jobs_are_sorted_by_gain_in_pages_either_way(store: SqlStore, commit: Commit) -> None:
+    jobs: list[Job] = []
+    for fitness in (200.0, 50.0, None, 400.0):
+        job, _ = store.create_job(tuning())
+        commit(job, 1)
+        if fitness is not None:
+            store.note_reference(job.id, Reference("A", fitness))
+        jobs.append(job)
+    greatest = [jobs[3].id, jobs[0].id, jobs[1].id, jobs[2].id]
+    least = [jobs[1].id, jobs[0].id, jobs[3].id, jobs[2].id]
+    for reverse, wanted in ((False, greatest), (True, least)):
+        found, after = [], None
+        for _ in wanted:
+            page = store.jobs(order=JobOrder.GAIN, reverse=reverse, after=after, limit=1)
+            found += [job.id for job in page.items]
+            after = page.next
+        assert (found, after) == (wanted, None)
+
+
+def test_a_gain_that_cannot_be_told_breaks_nothing(
+    store: SqlStore, commit: Commit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = tuning()
+    job, _ = store.create_job(spec, provenance=job_provenance(spec))
+    commit(job, 1)
+    monkeypatch.setattr(references, "walked_reference", lambda _: 1 / 0)
+    note_reference(store, store.job(job.id))
+    assert store.job(job.id).reference is None
+
+
+def test_in_many_worlds_the_reference_walks_in_them_too() -> None:
+    many = walked_reference(tuning(worlds={"count": 2}))
+    nominal = walked_reference(tuning())
+    assert many.fitness is not None and nominal.fitness is not None
+    assert many.fitness != nominal.fitness
+    assert replace(many, fitness=0.0) == replace(nominal, fitness=0.0) == Reference("A", 0.0)

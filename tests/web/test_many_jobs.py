@@ -47,8 +47,35 @@ def test_filters_orders_and_search_are_the_servers_and_in_the_address(
     expect(page.locator("[data-job]")).to_have_count(2)
     page.get_by_label("Order").select_option("name")
     expect(page.locator("[data-job]").first).to_have_attribute("data-job", pi)
+    page.get_by_role("button", name="Name").click()
+    expect(page).to_have_url(re.compile("order=name&reverse"))
+    expect(page.locator("[data-job]").first).to_have_attribute("data-job", fuzzy)
+    expect(page.locator("th[aria-sort]")).to_have_attribute("aria-sort", "descending")
     page.get_by_label("Search by name, id, note or tag").fill(fuzzy)
     expect(page.locator("[data-job]")).to_have_count(1)
+
+
+def test_several_are_deleted_and_those_that_stay_are_named(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    named = {name: server.submit(SMALL_JOB | {"name": name}) for name in ("one", "two", "kept")}
+    queued = server.submit(SMALL_JOB | {"name": "queued"})
+    for job_id in named.values():
+        server.client.post(f"/v1/jobs/{job_id}/cancel").raise_for_status()
+    server.client.put(f"/v1/jobs/{named['kept']}/keep").raise_for_status()
+    page = visit(server.url).go("/jobs")
+    for job_id in (*named.values(), queued):
+        page.locator(f"[data-job='{job_id}']").get_by_role("checkbox").check()
+    page.get_by_role("button", name="Delete…").click()
+    asked = page.get_by_role("dialog")
+    expect(asked).to_contain_text("kept: it is kept; release it first")
+    expect(asked).to_contain_text("queued: it is queued; cancel or pause it first")
+    expect(asked).to_contain_text("0 iterations with 0 evaluated designs are lost for good")
+    asked.get_by_role("button", name="Delete 2 jobs").click()
+    expect(page.get_by_text("2 jobs deleted.")).to_be_visible()
+    expect(page.locator("[data-job]")).to_have_count(2)
+    assert rows(page) == [queued, named["kept"]]
 
 
 def test_every_job_is_reached_by_pages(

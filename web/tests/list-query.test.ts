@@ -1,11 +1,11 @@
 import { describe, expect, test } from 'vitest'
-import { isFiltered, listQuery } from '../src/jobs/list-query'
+import { descends, isFiltered, listQuery, reordered } from '../src/jobs/list-query'
 
 const read = (text: string) => listQuery(new URLSearchParams(text))
 
 describe('the list of jobs', () => {
   test('shows the newest that are not archived unless its address says otherwise', () => {
-    expect(read('')).toEqual({ archived: false, order: 'created' })
+    expect(read('')).toEqual({ archived: false, order: 'created', reverse: false })
     expect(isFiltered(read(''))).toBe(false)
     expect(isFiltered(read('archived&order=name'))).toBe(false)
   })
@@ -18,6 +18,18 @@ describe('the list of jobs', () => {
   })
 
   test('leaves out what cannot be', () => {
-    expect(read('state=lost&order=age&search=')).toEqual({ archived: false, order: 'created' })
+    expect(read('state=lost&order=age&search=')).toEqual({
+      archived: false,
+      order: 'created',
+      reverse: false,
+    })
+  })
+
+  test('turns round what is sorted by already, and begins with any other as it is', () => {
+    expect(reordered(read('order=gain'), 'gain')).toEqual({ order: 'gain', reverse: '' })
+    expect(reordered(read('order=gain&reverse'), 'gain')).toEqual({ order: 'gain', reverse: null })
+    expect(reordered(read('order=gain&reverse'), 'name')).toEqual({ order: 'name', reverse: null })
+    expect([descends('gain', false), descends('gain', true)]).toEqual([true, false])
+    expect([descends('created', false), descends('fitness', true)]).toEqual([false, true])
   })
 })

@@ -13,10 +13,12 @@ export interface Column<R> {
   /** Written into the header in brackets; `1` is not written. */
   readonly unit?: string
   readonly numeric?: boolean
-  /** What the column is sorted by; a column without it cannot be sorted. */
+  /** What the column is sorted by; a column without it cannot be sorted here. */
   readonly value?: (row: R) => Cell
   /** What a file holds, in full; the value itself if missing, or else the text that is shown. */
   readonly data?: (row: R) => Cell
+  /** Whether whoever gives the rows can sort them by it. */
+  readonly sortable?: boolean
   /** What is shown; the value itself if missing. */
   readonly cell?: (row: R) => ComponentChildren
   /** Left out on narrow screens. */
@@ -35,6 +37,7 @@ export function Table<R>({
   pageSize = 50,
   tall = false,
   rowData,
+  elsewhere,
 }: {
   /** What the table holds; read by screen readers, and shown unless it is all hidden by style. */
   caption: string
@@ -49,18 +52,22 @@ export function Table<R>({
   tall?: boolean
   /** data- attributes of a row. */
   rowData?: (row: R) => Record<`data-${string}`, string | number>
+  /** Of rows that come sorted: how they are, and what sorts them by another column. */
+  elsewhere?: { readonly order: SortOrder; readonly onOrder: (column: string) => void }
 }) {
-  const [order, setOrder] = useState<SortOrder | null>(initial ?? null)
+  const [own, setOrder] = useState<SortOrder | null>(initial ?? null)
+  const order = elsewhere?.order ?? own
   const [wanted, setWanted] = useState(0)
   const sink = useContext(TableSink)
   if (sink) {
     sink({ caption, columns, rows } as unknown as CollectedTable)
     return null
   }
-  const by = columns.find((column) => column.key === order?.column)?.value
+  const by = elsewhere ? undefined : columns.find(({ key }) => key === order?.column)?.value
   const inOrder = order && by ? sorted(rows, by, order.descending) : rows
   const page = paged(inOrder, wanted, pageSize)
   const reorder = (chosen: SortOrder) => {
+    if (elsewhere) return elsewhere.onOrder(chosen.column)
     setOrder(chosen)
     onOrder?.(chosen)
     // What comes first by the new order is what is looked for.
@@ -79,7 +86,13 @@ export function Table<R>({
           <thead>
             <tr>
               {columns.map((column) => (
-                <Header key={column.key} column={column} order={order} onOrder={reorder} />
+                <Header
+                  key={column.key}
+                  column={column}
+                  sortable={elsewhere ? column.sortable === true : column.value !== undefined}
+                  order={order}
+                  onOrder={reorder}
+                />
               ))}
             </tr>
           </thead>
@@ -124,10 +137,12 @@ function cell<R>(column: Column<R>, row: R) {
 
 function Header<R>({
   column,
+  sortable,
   order,
   onOrder,
 }: {
   column: Column<R>
+  sortable: boolean
   order: SortOrder | null
   onOrder: (order: SortOrder) => void
 }) {
@@ -145,7 +160,7 @@ function Header<R>({
       class={classes(column)}
       aria-sort={active ? (order.descending ? 'descending' : 'ascending') : undefined}
     >
-      {column.value ? (
+      {sortable ? (
         <button
           type="button"
           onClick={() => onOrder({ column: column.key, descending: active && !order.descending })}

@@ -4,7 +4,7 @@ import type { JobSummary } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
 import type { Column } from '../components/table'
-import { formatNumber, quantity } from '../format/number'
+import { formatNumber, percent, quantity } from '../format/number'
 import { formatAge, formatDuration, formatMoment } from '../format/time'
 import { budgetSpent, spentInWords } from '../job/budget'
 import { fitnessUnit } from '../job/fitness'
@@ -40,32 +40,43 @@ export function jobColumns(
     {
       key: 'name',
       label: 'Name',
+      sortable: true,
       header: true,
       cell: (job) => <NameCell job={job} />,
     },
     {
       key: 'state',
       label: 'State',
+      sortable: true,
       cell: (job) => <StateBadge state={job.state} />,
     },
     {
       key: 'priority',
       label: 'Priority',
+      sortable: true,
       numeric: true,
       minor: true,
-      value: (job) => job.priority,
       cell: (job) => String(job.priority),
     },
     {
-      key: 'progress',
+      key: 'iterations',
       label: 'Iterations',
+      sortable: true,
       cell: (job) => <ProgressCell job={job} />,
     },
     {
-      key: 'best',
+      key: 'fitness',
       label: 'Best fitness',
+      sortable: true,
       numeric: true,
       cell: (job) => quantity(job.best_fitness, fitnessUnit(job), 5),
+    },
+    {
+      key: 'gain',
+      label: 'Gain',
+      sortable: true,
+      numeric: true,
+      cell: (job) => <GainCell job={job} />,
     },
     {
       key: 'line',
@@ -76,21 +87,24 @@ export function jobColumns(
     {
       key: 'rate',
       label: 'Evaluations',
+      sortable: true,
       unit: '1/s',
       numeric: true,
       minor: true,
       cell: (job) => formatNumber(job.evaluations_per_second, 3),
     },
     {
-      key: 'eta',
+      key: 'time_left',
       label: 'Time left',
+      sortable: true,
       numeric: true,
       minor: true,
       cell: (job) => (job.state === 'succeeded' ? '–' : formatDuration(job.eta_seconds)),
     },
     {
-      key: 'age',
+      key: 'created',
       label: 'Age',
+      sortable: true,
       numeric: true,
       minor: true,
       cell: (job) => (
@@ -100,6 +114,13 @@ export function jobColumns(
       ),
     },
   ]
+}
+
+function GainCell({ job }: { job: JobSummary }) {
+  if (typeof job.gain !== 'number' || !job.reference) return '–'
+  return (
+    <span title={`over the published design ${job.reference.name}`}>{percent(job.gain, 3)}</span>
+  )
 }
 
 function NameCell({ job }: { job: JobSummary }) {

@@ -50,7 +50,7 @@ export function Filters({
       <select
         aria-label="Order"
         value={query.order}
-        onChange={(event) => setQuery({ order: event.currentTarget.value })}
+        onChange={(event) => setQuery({ order: event.currentTarget.value, reverse: null })}
       >
         {Object.entries(ORDERS).map(([order, words]) => (
           <option key={order} value={order}>

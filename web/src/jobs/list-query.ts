@@ -15,9 +15,14 @@ export const STATES: readonly JobState[] = [
 export const ORDERS = {
   created: 'newest first',
   fitness: 'best first',
+  gain: 'greatest gain first',
   name: 'by name',
   state: 'by state',
+  priority: 'most urgent first',
+  iterations: 'most iterations first',
   evaluations: 'most evaluations first',
+  rate: 'fastest first',
+  time_left: 'least time left first',
 } as const
 
 export type Order = keyof typeof ORDERS
@@ -39,6 +44,24 @@ export interface ListQuery {
   readonly tag?: string
   readonly archived: boolean
   readonly order: Order
+  /** Whether the order is turned round. */
+  readonly reverse: boolean
+}
+
+/** Orders that begin with what is greatest; all others begin with what is least. */
+const DESCENDING: readonly Order[] = ['gain', 'priority', 'iterations', 'evaluations', 'rate']
+
+/** Whether a list goes from what is great to what is little. */
+export function descends(order: Order, reverse: boolean): boolean {
+  return DESCENDING.includes(order) !== reverse
+}
+
+/** What the address is to say when a column is sorted by: turned round if it is already. */
+export function reordered(
+  { order, reverse }: ListQuery,
+  wanted: Order,
+): Readonly<Record<'order' | 'reverse', string | null>> {
+  return { order: wanted, reverse: order === wanted && !reverse ? '' : null }
 }
 
 /** What an address such as `?controller=pi&order=fitness` asks for. */
@@ -54,6 +77,7 @@ export function listQuery(query: URLSearchParams): ListQuery {
     tag: text('tag'),
     archived: query.has('archived'),
     order: order in ORDERS ? (order as Order) : 'created',
+    reverse: query.has('reverse'),
   }
 }
 

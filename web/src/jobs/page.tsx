@@ -1,7 +1,6 @@
 /** All jobs: how they stand and where to go on; the server finds, sorts and pages them. */
 
 import { useEffect, useState } from 'preact/hooks'
-import { patch } from '../api/client'
 import { useNow } from '../api/resource'
 import type { JobFacets } from '../api/types'
 import { CopyBlock } from '../components/copy-button'
@@ -9,16 +8,13 @@ import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { Table } from '../components/table'
 import { formatCount } from '../format/number'
 import { setQuery, usePlace } from '../router/navigation'
-import { comparePath } from '../router/routes'
+import { Chosen } from './chosen'
 import { jobColumns } from './columns'
 import { Filters, NO_FILTER } from './filters'
 import './jobs.css'
-import { isFiltered, listQuery, PAGE } from './list-query'
+import { descends, isFiltered, listQuery, type Order, PAGE, reordered } from './list-query'
 import { useSparklines } from './sparkline'
 import { useFacets, useList } from './use-list'
-
-/** Jobs that can be compared at once. */
-const MOST_COMPARED = 12
 
 export function JobsPage() {
   const place = usePlace()
@@ -63,7 +59,12 @@ export function JobsPage() {
             <Filters query={query} facets={facets}>
               {countWords(facets, isFiltered(query), jobs.length, page!.next, cursors.length)}
             </Filters>
-            <Chosen chosen={chosen} archived={query.archived} onDone={reload} onClear={setChosen} />
+            <Chosen
+              chosen={chosen}
+              archived={query.archived}
+              onDone={reload}
+              onChoose={setChosen}
+            />
             {none ? (
               <Empty title="No job fits the filter">
                 <button type="button" onClick={() => setQuery(NO_FILTER)}>
@@ -76,6 +77,10 @@ export function JobsPage() {
                 columns={jobColumns(now, { lines, chosen, onChoose: toggle })}
                 rows={jobs}
                 rowKey={(job) => job.id}
+                elsewhere={{
+                  order: { column: query.order, descending: descends(query.order, query.reverse) },
+                  onOrder: (column) => setQuery(reordered(query, column as Order)),
+                }}
                 rowData={(job) => ({ 'data-job': job.id, 'data-state': job.state })}
               />
             )}
@@ -104,53 +109,6 @@ function countWords(
     return count === 1 ? '1 job' : `${formatCount(count)} jobs`
   }
   return `more than ${formatCount((earlier + 1) * PAGE)} jobs`
-}
-
-/** What can be done with several jobs at once. */
-function Chosen({
-  chosen,
-  archived,
-  onDone,
-  onClear,
-}: {
-  chosen: readonly string[]
-  archived: boolean
-  onDone: () => void
-  onClear: (chosen: readonly string[]) => void
-}) {
-  const [error, setError] = useState<unknown>(null)
-  if (chosen.length === 0) return null
-  const archive = () => {
-    setError(null)
-    const body = { archived: !archived }
-    Promise.all(
-      chosen.map((id) => patch('/v1/jobs/{job_id}', { path: { job_id: id }, body })),
-    ).then(() => {
-      onClear([])
-      onDone()
-    }, setError)
-  }
-  return (
-    <>
-      <div class="row chosen" data-chosen={chosen.length}>
-        <strong aria-live="polite">{formatCount(chosen.length)} chosen</strong>
-        {chosen.length <= MOST_COMPARED ? (
-          <a class="button compact" href={comparePath(chosen)}>
-            Compare
-          </a>
-        ) : (
-          <span class="muted small">at most {MOST_COMPARED} can be compared</span>
-        )}
-        <button type="button" class="compact" onClick={archive}>
-          {archived ? 'Take back from the archive' : 'Archive'}
-        </button>
-        <button type="button" class="compact" onClick={() => onClear([])}>
-          Choose none
-        </button>
-      </div>
-      {error !== null && <ErrorNotice what="That was not done." error={error} />}
-    </>
-  )
 }
 
 function Pages({

@@ -180,6 +180,36 @@ def test_a_job_in_single_precision_shows_its_best_in_double_and_the_difference(
     expect(searched).to_contain_text("%")
 
 
+def test_a_jobs_headline_convergence_winner_and_walk(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    job = server.job(finished_job)
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    gain = page.locator(".job-header dl div", has_text="Gain over published A")
+    expect(gain).to_contain_text("%")
+    assert abs(float(re.split(r"\s", gain.inner_text().split("\n")[1].replace("\u2212", "-"))[0])
+        - 100.0 * job["gain"]) < 0.06  # fmt: skip
+    chart = page.get_by_role("img", name=re.compile("^Convergence over 6 iterations"))
+    expect(chart).to_have_attribute("aria-label", re.compile("published A"))
+    page.get_by_label("single designs").check()
+    walked = page.locator("[data-dots]")
+    expect(walked).to_contain_text("designs")
+    assert 0 < int(walked.get_attribute("data-dots") or 0) <= job["evaluations"]
+
+    winner = page.get_by_role("region", name="The winner")
+    expect(winner.get_by_role("img")).to_have_count(len(job["best"]["design"]))
+    winner.get_by_role("button", name=re.compile("^Show as table")).click()
+    rows = winner.get_by_role("table", name="The winner in its bounds").locator("tbody tr")
+    expect(rows).to_have_count(len(job["best"]["design"]))
+
+    # Little movement is asked for: nothing walks by itself, and nothing is loaded for it.
+    page.get_by_role("button", name="Show its walk").click()
+    expect(page.get_by_role("img", name="The best design walking")).to_be_visible()
+    expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "false")
+    page.get_by_role("button", name="Let it walk").click()
+    expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "true")
+
+
 def test_a_clone_asks_for_the_same(server: ServerProcess, visit: Callable[..., Visit]) -> None:
     window = {"name": "fir_window", "kind": "categorical", "choices": ["hamming", "moving_average"]}
     job_id = server.submit(

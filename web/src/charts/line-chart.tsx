@@ -51,8 +51,12 @@ export interface LineChartProps {
   readonly xMargin?: number
   /** Whether the y axis begins at zero. */
   readonly fromZero?: boolean
+  /** What the y axis shows; all values if missing. */
+  readonly yRange?: readonly [number, number] | null
   /** Draws behind the lines. */
   readonly paint?: (plot: uPlot) => void
+  /** Draws over the lines. */
+  readonly paintOver?: (plot: uPlot) => void
   /** Height [px] at the common size of type; larger type makes it larger. */
   readonly height?: number
   /** Position of a vertical line, such as the moment that a replay shows. */
@@ -114,8 +118,8 @@ export function LineChart(props: LineChartProps) {
 
   useEffect(() => {
     if (plot.current) renew(plot.current, dataOf(latest.current))
-  }, [props.x, props.series])
-  useEffect(() => plot.current?.redraw(false), [props.marker])
+  }, [props.x, props.series, props.yRange?.join()])
+  useEffect(() => plot.current?.redraw(false), [props.marker, props.paint, props.paintOver])
 
   return (
     <div class="line-chart">
@@ -136,9 +140,10 @@ function shapeOf({
   yLabel,
   xUnit,
   yUnit,
+  yRange,
 }: LineChartProps) {
   const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.dots, s.stepped, s.silent])
-  const axes = [logarithmic, xLogarithmic, fromZero, xLabel, yLabel, xUnit, yUnit]
+  const axes = [logarithmic, xLogarithmic, fromZero, Boolean(yRange), xLabel, yLabel, xUnit, yUnit]
   return JSON.stringify([lines, bands, axes])
 }
 
@@ -171,7 +176,7 @@ function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
 
 /** props: kept by reference, as callbacks outlive a rendering. */
 function options(props: { current: LineChartProps }, readout: HTMLElement) {
-  const { series, bands = [], logarithmic, fromZero, sync, counted, xMargin = 0 } = props.current
+  const { series, bands = [], logarithmic, sync, counted, xMargin = 0 } = props.current
   const { xLabel, xUnit = '1', xLogarithmic, yLabel, yUnit = '1' } = props.current
   const axis: uPlot.Axis = {
     stroke: themeColour('--text-muted'),
@@ -203,11 +208,7 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
             time: false,
             range: (_, low, high) => [low - xMargin, low === high ? high + 1 : high + xMargin],
           },
-      y: logarithmic
-        ? { distr: 3, range: (_, low, high) => logRange(low, high) }
-        : fromZero
-          ? { range: (_, __, high) => [0, high > 0 ? high * 1.05 : 1] }
-          : {},
+      y: scaleOfY(props),
     },
     axes: [
       {
@@ -246,7 +247,10 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
     hooks: {
       drawAxes: [(u) => props.current.paint?.(u)],
       setCursor: [(u) => showReadout(u, props.current, readout)],
-      draw: [(u) => drawMarker(u.ctx, u, props.current.marker ?? null, devicePixelRatio)],
+      draw: [
+        (u) => props.current.paintOver?.(u),
+        (u) => drawMarker(u.ctx, u, props.current.marker ?? null, devicePixelRatio),
+      ],
       // As tests and other tools read it.
       setScale: [
         (u, key) => {
@@ -270,6 +274,15 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
     },
   }
   return result
+}
+
+function scaleOfY(props: { current: LineChartProps }): uPlot.Scale {
+  const { logarithmic, fromZero, yRange } = props.current
+  const own = (low: number, high: number): [number, number] | null =>
+    props.current.yRange ? [...props.current.yRange] : logarithmic ? logRange(low, high) : null
+  if (logarithmic) return { distr: 3, range: (_, low, high) => own(low, high)! }
+  if (yRange) return { range: (_, low, high) => own(low, high) ?? [low, high] }
+  return fromZero ? { range: (_, __, high) => [0, high > 0 ? high * 1.05 : 1] } : {}
 }
 
 function pathsOf({ dots, stepped }: Series): uPlot.Series.PathBuilder | undefined {

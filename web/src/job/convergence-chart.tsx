@@ -1,42 +1,81 @@
 /** Best, median and quantiles of fitness over the iterations. */
 
-import { useMemo } from 'preact/hooks'
+import { useCallback, useMemo, useRef, useState } from 'preact/hooks'
+import type uPlot from 'uplot'
+import { getBytes } from '../api/client'
+import { useResource, useSlowly } from '../api/resource'
 import type { Iteration, Job } from '../api/types'
 import { type Band, LineChart, type Series } from '../charts/line-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
-import { formatNumber, withUnit } from '../format/number'
+import { formatCount, formatNumber, withUnit } from '../format/number'
 import { flag, RANGE, useQueryValue } from '../router/query-value'
 import { ByIteration } from './by-iteration'
+import {
+  type Dots,
+  dotsOf,
+  fittedRange,
+  iterationsAbove,
+  type Line,
+  MOST_DOTS,
+} from './convergence-model'
+import { type Painted, paintDots, paintOver } from './convergence-painter'
 import { fitnessUnit } from './fitness'
+import { decodeParticles } from './particles'
 import type { Distribution } from './use-distribution'
+
+/** How often the single designs of a running job are asked for again [ms]. */
+const RENEW_MS = 8000
 
 export function ConvergenceChart({
   job,
   iterations,
   distribution,
+  reference,
 }: {
   job: Job
   iterations: readonly Iteration[]
   distribution: Distribution
+  /** Published design that the best is measured against. */
+  reference: { readonly name: string; readonly fitness: number } | null
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
+  const [single, setSingle] = useState(false)
+  const dots = useDots(job, iterations.length, single)
   const drawn = useMemo(() => content(iterations, distribution), [iterations, distribution])
   const unit = fitnessUnit(job)
-  const best = iterations.at(-1)?.best_so_far
+  const best = iterations.at(-1)?.best_so_far ?? null
+  const { range, painted } = useMemo(() => {
+    const [bests, medians] = drawn.series.slice(-2).map(({ values }) => values)
+    const range = fittedRange([bests, medians], reference?.fitness ?? null, logarithmic)
+    const highest = drawn.bands.length > 0 ? drawn.series[0].values : null
+    return { range, painted: paintedOf({ drawn, best, dots, range, highest, reference }) }
+  }, [drawn, dots, reference, logarithmic, best])
+  const paint = useCallback((plot: uPlot) => paintDots(plot, painted), [painted])
+  const over = useCallback((plot: uPlot) => paintOver(plot, painted), [painted])
   return (
     <ChartFrame
       title="Convergence"
       note="Fitness over the iterations; less is better. Drag to zoom, double-click to see all."
       tools={
-        <label class="check small">
-          <input
-            type="checkbox"
-            checked={logarithmic}
-            onChange={(event) => setLogarithmic(event.currentTarget.checked)}
-          />
-          logarithmic
-        </label>
+        <>
+          <label class="check small">
+            <input
+              type="checkbox"
+              checked={single}
+              onChange={(event) => setSingle(event.currentTarget.checked)}
+            />
+            single designs
+          </label>
+          <label class="check small">
+            <input
+              type="checkbox"
+              checked={logarithmic}
+              onChange={(event) => setLogarithmic(event.currentTarget.checked)}
+            />
+            logarithmic
+          </label>
+        </>
       }
       legend={
         <>
@@ -48,12 +87,16 @@ export function ConvergenceChart({
               <LegendEntry colour="--fan-outer" label="5 % to 95 %" area />
             </>
           )}
+          {dots && <span data-dots={dots.fitness.length}>{dotsInWords(dots)}</span>}
+          {painted.above.size > 0 && (
+            <span data-above={painted.above.size}>▾ worse designs lie above what is shown</span>
+          )}
         </>
       }
       table={() => <IterationTable iterations={iterations} unit={unit} />}
     >
       <LineChart
-        label={`Convergence over ${iterations.length} iterations; best fitness ${formatNumber(best)}`}
+        label={describe(iterations.length, best, painted)}
         x={drawn.x}
         xLabel="iteration"
         counted
@@ -64,10 +107,71 @@ export function ConvergenceChart({
         logarithmic={logarithmic}
         zoom={zoom}
         onZoom={setZoom}
+        yRange={range}
+        paint={paint}
+        paintOver={over}
         height={320}
       />
     </ChartFrame>
   )
+}
+
+function describe(iterations: number, best: number | null, { reference }: Painted): string {
+  const beside = reference ? `, ${reference.label}` : ''
+  return `Convergence over ${iterations} iterations; best fitness ${formatNumber(best)}${beside}`
+}
+
+function dotsInWords({ fitness, total }: Dots): string {
+  const drawn = formatCount(fitness.length)
+  return fitness.length < total
+    ? `dots: ${drawn} of ${formatCount(total)} designs`
+    : `dots: ${drawn} designs`
+}
+
+/** Single designs, asked for when they are wanted, of a job under way now and then. */
+function useDots(job: Job, committed: number, wanted: boolean): Dots | null {
+  const renewed = useSlowly(committed, RENEW_MS)
+  const found = useResource(wanted ? `dots ${job.id} ${renewed}` : null, (signal) =>
+    getBytes('/v1/jobs/{job_id}/particles', {
+      path: { job_id: job.id },
+      query: { max_points: MOST_DOTS },
+      signal,
+    }).then((bytes) => dotsOf(decodeParticles(bytes))),
+  )
+  const shown = useRef<Dots | null>(null)
+  if (found.data) shown.current = found.data
+  return wanted ? shown.current : null
+}
+
+function paintedOf({
+  drawn,
+  best,
+  dots,
+  range,
+  highest,
+  reference,
+}: {
+  drawn: { readonly x: readonly number[] }
+  best: number | null
+  dots: Dots | null
+  range: readonly [number, number] | null
+  /** Of the spread that is drawn. */
+  highest: Line | null
+  reference: { readonly name: string; readonly fitness: number } | null
+}): Painted {
+  const last = drawn.x.at(-1)
+  return {
+    dots,
+    reference: reference && {
+      label: `published ${reference.name} ${formatNumber(reference.fitness)}`,
+      fitness: reference.fitness,
+    },
+    end:
+      best === null || last === undefined
+        ? null
+        : { x: last, y: best, label: `best ${formatNumber(best)}` },
+    above: iterationsAbove(range, drawn.x, highest, dots),
+  }
 }
 
 function content(iterations: readonly Iteration[], { quantiles, items }: Distribution) {

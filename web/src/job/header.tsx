@@ -10,13 +10,16 @@ import { formatAge, formatClock, formatDuration, formatMoment } from '../format/
 import { tournamentPath } from '../router/routes'
 import { JobActions } from './actions'
 import { budgetSpent } from './budget'
-import { fitnessUnit } from './fitness'
+import { EndNotice } from './end-notice'
+import { caseWords, fitnessUnit } from './fitness'
+import type { Gain } from './gain'
 import { LineageNote } from './lineage'
 import { startDesigns } from './start'
 import type { LiveJob } from './use-job'
+import { WalkPreview } from './walk-preview'
 import { WorldsNote } from './worlds-note'
 
-export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
+export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; gain: Gain }) {
   const { followed } = live
   const spent = budgetSpent(job, followed.iterations)
   const tone = STATE_TONES[job.state]
@@ -30,6 +33,7 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
               <StateBadge state={job.state} />
             </span>
             <StreamNote live={live} />
+            <EndNotice job={job} />
           </div>
           <p class="muted small">{subtitle(job)}</p>
           {((job.tags ?? []).length > 0 || job.note || job.archived) && (
@@ -72,12 +76,19 @@ export function JobHeader({ live, job }: { live: LiveJob; job: StoredJob }) {
         label={`${spent.done} of ${spent.planned} ${spent.unit}`}
         tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
       />
-      <Figures job={job} committed={Math.max(job.iterations, followed.iterations.length)} />
+      <div class="headline">
+        <Figures
+          job={job}
+          gain={gain}
+          committed={Math.max(job.iterations, followed.iterations.length)}
+        />
+        {isReadable(job) && job.kind === 'tuning' && job.best && <WalkPreview job={job} />}
+      </div>
     </section>
   )
 }
 
-function Figures({ job, committed }: { job: StoredJob; committed: number }) {
+function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committed: number }) {
   const now = useNow(1000)
   const unit = fitnessUnit(job)
   const merit = job.best?.figure_of_merit ?? null
@@ -86,17 +97,18 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
   return (
     <dl class="figures">
       <Figure
-        label="Iterations"
-        value={
-          budgetSpent(job).unit === 'iterations'
-            ? `${formatCount(committed)} of ${formatCount(job.iterations_planned)}`
-            : `${formatCount(committed)}, of ${formatCount(job.particles)} designs at most`
-        }
-      />
-      <Figure
         label={search ? 'Best fitness, in double' : 'Best fitness'}
         value={quantity(job.best_fitness, unit, search ? 7 : 5)}
       />
+      {gain.reference && (
+        <Figure
+          label={`Gain over published ${gain.reference.name}`}
+          value={`${percent(gain.share, 3)}, from ${quantity(gain.reference.fitness, unit, 5)}`}
+        />
+      )}
+      {gain.reference === null && gain.reason !== null && job.kind === 'tuning' && (
+        <Figure label="Gain over a published design" value={`none: ${gain.reason}`} />
+      )}
       {search && (
         <Figure
           label={`Its fitness in the search, in ${search.precision}`}
@@ -104,6 +116,14 @@ function Figures({ job, committed }: { job: StoredJob; committed: number }) {
         />
       )}
       {merit !== null && <Figure label="F of eq. 3.1, maximized" value={formatNumber(merit, 5)} />}
+      <Figure
+        label="Iterations"
+        value={
+          budgetSpent(job).unit === 'iterations'
+            ? `${formatCount(committed)} of ${formatCount(job.iterations_planned)}`
+            : `${formatCount(committed)}, of ${formatCount(job.particles)} designs at most`
+        }
+      />
       <Figure
         label="Found in iteration"
         value={job.best_iteration === null ? '–' : formatCount(job.best_iteration)}
@@ -163,9 +183,13 @@ function StreamNote({ live }: { live: LiveJob }) {
 }
 
 function subtitle(job: StoredJob): string {
+  const words = caseWords(job.kind ?? 'tuning')
   const asked = isReadable(job)
     ? [
         job.controller ?? job.kind,
+        ...(job.robot ? [job.robot === 'own' ? 'a robot of its own' : job.robot] : []),
+        `${formatCount(job.scenarios.length)} ${job.scenarios.length === 1 ? words.one : words.many}`,
+        ...(job.preference ? [`preference ${job.preference}`] : []),
         job.optimizer,
         `${formatCount(job.particles)} designs an iteration`,
         `seed ${job.spec.seed}`,

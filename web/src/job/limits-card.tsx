@@ -1,13 +1,9 @@
-/** What limits the winner now, in words and numbers; and the winner itself. */
+/** What limits the winner now, in words and numbers. */
 
 import type { Job, JobSpec, Preference } from '../api/types'
-import { BrokenName } from '../components/broken-name'
 import { Table } from '../components/table'
 import { formatNumber, percent, quantity } from '../format/number'
-import { exactValueQuantity } from '../format/value'
 import { inWords } from '../format/words'
-import { withQuery } from '../router/routes'
-import { variableUnits } from './design-variables'
 import { type Analysis, analyse, type Factor } from './preference'
 
 export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
@@ -100,41 +96,5 @@ function Share({ factor, most }: { factor: Factor | null; most: number }) {
       <i style={{ width: `${width}%` }} aria-hidden="true" />
       <span>{formatNumber(factor.contribution, 3)}</span>
     </span>
-  )
-}
-
-export function BestCard({ job }: { job: Job }) {
-  const best = job.best!
-  const units = variableUnits(job.spec)
-  const place = { job: job.id, iteration: best.iteration, particle: best.particle }
-  return (
-    <section class="card" aria-labelledby="winner">
-      <header class="row spread">
-        <h2 id="winner">The winner</h2>
-        {job.kind === 'tuning' && (
-          <span class="row">
-            <a class="button compact" href={withQuery('/walk', place)}>
-              See it walk
-            </a>
-            <a class="button compact" href={withQuery('/controller', place)}>
-              Its controller
-            </a>
-          </span>
-        )}
-      </header>
-      <p class="muted small">
-        Design {best.particle} of iteration {best.iteration}
-      </p>
-      <dl class="design">
-        {Object.entries(best.design).map(([name, value]) => (
-          <div key={name}>
-            <dt>
-              <BrokenName name={name} />
-            </dt>
-            <dd>{exactValueQuantity(value, units.get(name) ?? '1')}</dd>
-          </div>
-        ))}
-      </dl>
-    </section>
   )
 }

@@ -5,11 +5,21 @@ import { Empty, ErrorNotice } from '../components/feedback'
 import { ConvergenceChart } from './convergence-chart'
 import { DistributionChart } from './distribution-chart'
 import { DiversityChart } from './diversity-chart'
-import { BestCard, LimitsCard } from './limits-card'
+import type { Gain } from './gain'
+import { LimitsCard } from './limits-card'
 import { useDistribution } from './use-distribution'
 import type { LiveJob } from './use-job'
+import { WinnerCard } from './winner-card'
 
-export function OverviewPanel({ live, job }: { live: LiveJob; job: Job }) {
+export function OverviewPanel({
+  live,
+  job,
+  reference,
+}: {
+  live: LiveJob
+  job: Job
+  reference: Gain['reference']
+}) {
   const { iterations } = live.followed
   const distribution = useDistribution(job.id, iterations.length)
   if (iterations.length === 0) {
@@ -33,14 +43,19 @@ export function OverviewPanel({ live, job }: { live: LiveJob; job: Job }) {
           error={distribution.error}
         />
       )}
-      <ConvergenceChart job={job} iterations={iterations} distribution={distribution} />
+      <ConvergenceChart
+        job={job}
+        iterations={iterations}
+        distribution={distribution}
+        reference={reference}
+      />
       <div class="grid">
         <DistributionChart job={job} iterations={iterations} distribution={distribution} />
         <DiversityChart distribution={distribution} />
       </div>
       {job.best && job.kind !== 'certificate' && (
         <>
-          <BestCard job={job} />
+          <WinnerCard job={job} />
           {job.spec.kind === 'tuning' && !job.spec.worlds && (
             <LimitsCard job={job} spec={job.spec} />
           )}

@@ -13,6 +13,7 @@ import { budgetSpent } from './budget'
 import { CertificatePanel } from './certificate-panel'
 import { FirmwarePanel } from './firmware-panel'
 import { caseWords } from './fitness'
+import { type Gain, useGain } from './gain'
 import { JobHeader } from './header'
 import { IterationPanel } from './iteration-panel'
 import { IterationsPanel } from './iterations-panel'
@@ -70,6 +71,7 @@ export default function JobPage({ id, tab }: { id: string; tab: string }) {
 function OneJob({ id, tab }: { id: string; tab: string }) {
   const live = useJob(id)
   const { job } = live
+  const gain = useGain(job)
   const title = job ? titleOf(job, live.followed.iterations) : [`Job ${id}`]
   useEffect(() => setTitle(...title), [title.join()])
   if (job === null) {
@@ -92,8 +94,8 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       data-stream={streamState(live)}
     >
       <Breadcrumbs crumbs={crumbsOf(job, tab)} here={hereOf(job, tab)} />
-      <JobHeader live={live} job={job} />
-      {isReadable(job) && <Parts live={live} job={job} tab={tab} />}
+      <JobHeader live={live} job={job} gain={gain} />
+      {isReadable(job) && <Parts live={live} job={job} tab={tab} gain={gain} />}
     </div>
   )
 }
@@ -120,7 +122,14 @@ function hereOf(job: StoredJob, tab: string): string {
   return section === '' || !part ? job.name || job.id : part.label
 }
 
-function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
+interface PartProps {
+  readonly live: LiveJob
+  readonly job: Job
+  readonly tab: string
+  readonly gain: Gain
+}
+
+function Parts({ live, job, tab, gain }: PartProps) {
   const tabs = TABS.filter(({ tab }) => hasPart(job, tab))
   const [section] = tab.split('/')
   return (
@@ -136,17 +145,17 @@ function Parts({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
           </a>
         ))}
       </nav>
-      <Panel live={live} job={job} tab={tab} />
+      <Panel live={live} job={job} tab={tab} gain={gain} />
     </>
   )
 }
 
-function Panel({ live, job, tab }: { live: LiveJob; job: Job; tab: string }) {
+function Panel({ live, job, tab, gain }: PartProps) {
   const [section, detail] = tab.split('/')
   if (!hasPart(job, section)) return <NoSuchPart />
   switch (section) {
     case '':
-      return <OverviewPanel live={live} job={job} />
+      return <OverviewPanel live={live} job={job} reference={gain.reference} />
     case 'certificate':
       return <CertificatePanel job={job} />
     case 'targets':

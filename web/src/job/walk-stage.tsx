@@ -1,0 +1,141 @@
+/** A small replay that goes on from its beginning, drawn while it is in view. */
+
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { messageOf } from '../api/problem'
+import { useResource } from '../api/resource'
+import type { Job } from '../api/types'
+import { useTheme } from '../theme'
+import { extentOf } from '../walk/extent'
+import { Playback } from '../walk/playback'
+import { recordWalk } from '../walk/recorded'
+import type { Replay } from '../walk/replay'
+import { ReplayDriver } from '../walk/replay-driver'
+import { resolveDesign } from '../walk/resolve-design'
+import type { WalkScene } from '../walk/scene/walk-scene'
+import { usePlaybackState } from '../walk/use-playback'
+
+/** Recorded frames a second [Hz]. */
+const RATE = 50
+const OPTIONS = {
+  arrangement: 'ghost',
+  follow: true,
+  forces: false,
+  trail: false,
+  meshes: true,
+} as const
+
+export default function WalkStage({
+  job,
+  best,
+  visible,
+}: {
+  job: Job
+  /** Iteration of the best design that is to be seen. */
+  best: number
+  visible: boolean
+}) {
+  const walk = useResource(`walk ${job.id} ${best}`, async (signal) => {
+    const design = await resolveDesign({ kind: 'best', job: job.id }, signal)
+    return recordWalk(design, design.scenarios[0] ?? 'normal-fast', RATE, signal)
+  })
+  if (walk.error) {
+    return (
+      <div class="walk-preview-stage" role="alert">
+        <p class="small">The walk cannot be shown. {messageOf(walk.error)}</p>
+      </div>
+    )
+  }
+  if (!walk.data) {
+    return (
+      <div class="walk-preview-stage" role="status">
+        <p class="muted small">The robot walks it now…</p>
+      </div>
+    )
+  }
+  if (walk.data.replay.frames === 0) {
+    return (
+      <div class="walk-preview-stage">
+        <p class="muted small">There is nothing to show of its walk.</p>
+      </div>
+    )
+  }
+  return <Stage key={best} replay={walk.data.replay} visible={visible} />
+}
+
+function Stage({ replay, visible }: { replay: Replay; visible: boolean }) {
+  const box = useRef<HTMLDivElement>(null)
+  const [wanted, setWanted] = useState(
+    () => !matchMedia('(prefers-reduced-motion: reduce)').matches,
+  )
+  const [failure, setFailure] = useState<string | null>(null)
+  const playback = useMemo(() => new Playback(replay.end, RATE), [replay])
+  const { playing } = usePlaybackState(playback)
+  useScene(box, replay, playback, setFailure)
+  useEffect(() => {
+    // Out of view nothing is drawn; at the end it begins anew.
+    if (wanted && visible && !playing) playback.play()
+    if (!(wanted && visible) && playing) playback.pause()
+  }, [wanted, visible, playing, playback])
+  return (
+    <>
+      <div class="walk-preview-stage" ref={box} data-stage>
+        {failure !== null && (
+          <p class="small" role="alert">
+            The walk cannot be drawn in three dimensions here. {failure}
+          </p>
+        )}
+      </div>
+      {failure === null && (
+        <button type="button" class="compact" onClick={() => setWanted(!wanted)}>
+          {wanted ? 'Hold the walk' : 'Let it walk'}
+        </button>
+      )}
+    </>
+  )
+}
+
+/** Draw the walk into the box. */
+function useScene(
+  box: { readonly current: HTMLDivElement | null },
+  replay: Replay,
+  playback: Playback,
+  onFailure: (reason: string) => void,
+) {
+  const theme = useTheme()
+  const scene = useRef<WalkScene | null>(null)
+  const driver = useRef<ReplayDriver | null>(null)
+  useEffect(() => {
+    const stage = box.current!
+    const drive = new ReplayDriver(playback, replay, stage)
+    driver.current = drive
+    let left = false
+    const observer = new ResizeObserver(() => {
+      if (stage.clientWidth === 0 || stage.clientHeight === 0) return
+      scene.current?.resize(stage.clientWidth, stage.clientHeight)
+      drive.request()
+    })
+    import('../walk/scene/walk-scene')
+      .then(({ WalkScene }) => {
+        if (left) return
+        const built = new WalkScene([replay], extentOf([replay]), 1, OPTIONS, () => drive.request())
+        scene.current = built
+        built.canvas.setAttribute('role', 'img')
+        built.canvas.setAttribute('aria-label', 'The best design walking')
+        stage.append(built.canvas)
+        observer.observe(stage)
+        drive.attach(built)
+      })
+      .catch((error: unknown) => !left && onFailure(messageOf(error)))
+    return () => {
+      left = true
+      observer.disconnect()
+      drive.dispose()
+      scene.current?.dispose()
+      scene.current = null
+    }
+  }, [replay, playback])
+  useEffect(() => {
+    scene.current?.recolour()
+    driver.current?.request()
+  }, [theme])
+}

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 
 STRICT = ("-O1", "-Werror", "-Wshadow", "-Wconversion", "-Wundef", "-Wstrict-prototypes")
 # Without wrapping, so that an overflow of what is no vector is reported. Reports name lines, not
-# variables: those would double what a compilation takes, and more optimization would triple it.
+# variables, and little is optimized: both would cost more than twice the time to compile.
 SANITIZED = ("-Og", "-g1", "-fno-wrapv", "-fno-sanitize-recover=all")
 
 

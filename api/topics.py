@@ -5,16 +5,45 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from functools import cached_property
 
 import anyio
 from anyio.to_thread import run_sync
+from fastapi.sse import format_sse_event
 
+from gaitswarm.views import IterationView, StateView
 from services.optimizer.jobs.iteration import Iteration
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 
-News = tuple[Job, tuple[Iteration, ...]]
-"""A job, and what it has committed since."""
+
+@dataclass(frozen=True)
+class News:
+    """A job, and what it has committed since; the events that tell of it are encoded once.
+
+    Attributes:
+        job: As it was read.
+        iterations: In order.
+    """
+
+    job: Job
+    iterations: tuple[Iteration, ...]
+
+    @cached_property
+    def events(self) -> tuple[bytes, ...]:
+        """An event `iteration` for each iteration, as it is sent."""
+        views = map(IterationView.from_iteration, self.iterations)
+        return tuple(
+            format_sse_event(event="iteration", id=str(view.index), data_str=view.model_dump_json())
+            for view in views
+        )
+
+    @cached_property
+    def state(self) -> bytes:
+        """The event `state`, as it is sent."""
+        text = StateView.from_job(self.job).model_dump_json()
+        return format_sse_event(event="state", data_str=text)
 
 
 class Topic:
@@ -97,8 +126,9 @@ class Topic:
     def _read(self, after: int | None, limit: int) -> News:
         job = self._service.job(self._job_id)
         if job.progress.iterations <= (-1 if after is None else after) + 1:
-            return job, ()
-        return job, self._service.iterations(self._job_id, after=after, limit=limit).items
+            return News(job, ())
+        found = self._service.iterations(self._job_id, after=after, limit=limit)
+        return News(job, found.items)
 
     def _forget(self, key: tuple[int, int | None], task: asyncio.Task[News]) -> None:
         del self._reads[key]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterable
+import json
+from collections.abc import AsyncGenerator
 from typing import Annotated, Final
 
 import anyio
 from fastapi import APIRouter, Depends, Header, Query
-from fastapi.sse import EventSourceResponse, ServerSentEvent
+from fastapi.responses import StreamingResponse
+from fastapi.sse import format_sse_event
 
 from api.dependencies import (
     LARGEST_INDEX,
@@ -22,8 +24,10 @@ from api.dependencies import (
     counted_stream,
 )
 from api.documentation import problems
+from api.event_stream import EVENT_SCHEMA, EventStream
 from api.topics import Topic
-from gaitswarm.views import PREFIX, IterationView, StateView
+from gaitswarm.views import PREFIX
+from services.monitoring.metrics import OpenStream
 from services.optimizer.errors import NotFound, StoreUnavailable
 from services.optimizer.jobs.job import JobState
 
@@ -56,9 +60,13 @@ _LONGEST_WAIT: Final = 60.0
     dependencies=[Depends(counted_stream)],
     operation_id="stream_events",
     summary="Follow a job",
-    response_class=EventSourceResponse,
+    # Not EventStream, whose schema would be a string.
+    response_class=StreamingResponse,
     response_description="Server-sent events `iteration`, `state` and `deleted`.",
-    responses={200: {"content": {"text/event-stream": {"example": _STREAM}}}, **problems(404, 422)},
+    responses={
+        200: {"content": {"text/event-stream": {"example": _STREAM, "itemSchema": EVENT_SCHEMA}}},
+        **problems(404, 422),
+    },
 )
 async def stream_events(
     job: ExistingJob,
@@ -85,7 +93,7 @@ async def stream_events(
         int | None,
         Query(ge=1, le=LARGEST_INDEX, description="End the stream after this many iterations."),
     ] = None,
-) -> AsyncIterable[ServerSentEvent]:
+) -> EventStream:
     """Committed iterations as they come, as server-sent events.
 
     An event `iteration` is sent once for each committed iteration, in order; its id is the
@@ -98,70 +106,77 @@ async def stream_events(
     """
     start = after if last_event_id is None else last_event_id
     poll_seconds = settings.api_event_poll_seconds
-    with (
-        topics.follow(service, job.id, poll_seconds=poll_seconds) as topic,
-        metrics.open_stream() as stream,
-    ):
-        events = _events(
-            topic,
-            job.id,
-            after=start,
-            follow=follow,
-            limit=limit,
-            stopping=stopping,
-            pause_seconds=poll_seconds,
-        )
-        async for event in events:
-            if isinstance(event.data, IterationView):
-                stream.sent(event.data.committed_at)
-            yield event
+
+    async def events() -> AsyncGenerator[bytes, None]:
+        with (
+            topics.follow(service, job.id, poll_seconds=poll_seconds) as topic,
+            metrics.open_stream() as stream,
+        ):
+            found = _events(
+                topic,
+                job.id,
+                stream,
+                after=start,
+                follow=follow,
+                limit=limit,
+                stopping=stopping,
+                pause_seconds=poll_seconds,
+            )
+            async for text in found:
+                yield text
+
+    return EventStream(events())
 
 
 async def _events(
     topic: Topic,
     job_id: str,
+    stream: OpenStream,
     *,
     after: int | None,
     follow: bool,
     limit: int | None,
     stopping: asyncio.Event,
     pause_seconds: float,
-) -> AsyncGenerator[ServerSentEvent, None]:
+) -> AsyncGenerator[bytes, None]:
     """What is committed first, then the state if it is another, then wait for a change.
 
-    No transaction is held while it waits. Ends after a terminal state, after `limit` iterations,
-    with the server, with the job, or when caught up unless `follow`.
+    All that one look finds is one text. No transaction is held while it waits. Ends after a
+    terminal state, after `limit` iterations, with the server, with the job, or when caught up
+    unless `follow`.
     """
     told: tuple[JobState, str | None] | None = None
-    sent = 0
+    left = LARGEST_INDEX if limit is None else limit
     while not stopping.is_set():
         # Before the look: what changes after it makes another version, and is looked for again.
         version = topic.version
         try:
-            job, iterations = await topic.news(after, limit=_PAGE)
+            news = await topic.news(after, limit=_PAGE)
         except StoreUnavailable:
             # The database is away: what is committed will still be there when it is back.
             await _pause(stopping, pause_seconds)
             continue
         except NotFound:
-            yield ServerSentEvent(event="deleted", data={"id": job_id})
+            yield format_sse_event(event="deleted", data_str=json.dumps({"id": job_id}))
             return
-        for iteration in iterations:
+        sent = news.iterations[:left]
+        texts = list(news.events[:left])
+        left -= len(sent)
+        for iteration in sent:
             after = iteration.index
-            view = IterationView.from_iteration(iteration)
-            yield ServerSentEvent(event="iteration", id=str(after), data=view)
-            sent += 1
-            if sent == limit:
-                return
-        if len(iterations) == _PAGE:
-            continue
-        if (job.state, job.waiting) != told:
+            stream.sent(iteration.committed_at)
+        caught_up = left > 0 and len(news.iterations) < _PAGE
+        job = news.job
+        if caught_up and (job.state, job.waiting) != told:
             told = (job.state, job.waiting)
-            yield ServerSentEvent(event="state", data=StateView.from_job(job))
-        if job.state.terminal or not follow:
+            texts.append(news.state)
+        if texts:
+            yield b"".join(texts)
+        if left == 0 or (caught_up and (job.state.terminal or not follow)):
             return
-        await topic.changed(version, seconds=_LONGEST_WAIT)
-    yield ServerSentEvent(comment="the server is ending", retry=_RECONNECT)
+        if caught_up:
+            await topic.changed(version, seconds=_LONGEST_WAIT)
+    yield format_sse_event(comment="the server is ending", retry=_RECONNECT)
 
 
 async def _pause(stopping: asyncio.Event, seconds: float) -> None:

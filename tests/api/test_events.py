@@ -192,8 +192,7 @@ def test_a_last_event_id_that_is_none_of_ours_is_refused(client: httpx2.Client, 
 def test_an_idle_stream_is_kept_alive_by_comments(
     client: httpx2.Client, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # FastAPI's own, which has no public name: 15 s are too long to wait for.
-    monkeypatch.setattr("fastapi.routing._PING_INTERVAL", 0.05)
+    monkeypatch.setattr("api.event_stream.KEEP_ALIVE_SECONDS", 0.05)
 
     with client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
         assert any(line.startswith(":") for line in answer.iter_lines())

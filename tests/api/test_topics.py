@@ -84,7 +84,7 @@ def test_an_answer_of_before_a_change_is_not_given_to_who_asks_after_it(
         (after,) = await read_by(1, topic)
         counted.free.set()
         await before
-        assert (await after)[0].state == "paused"
+        assert (await after).job.state == "paused"
 
     run(counted, job, use)
 
@@ -94,7 +94,7 @@ def test_a_stream_that_leaves_takes_the_answer_from_nobody(counted: Counted, job
         leaves, stays = await read_by(2, topic)
         leaves.cancel()
         counted.free.set()
-        assert (await stays)[0].id == job.id
+        assert (await stays).job.id == job.id
 
     run(counted, job, use)
 
@@ -117,7 +117,7 @@ def test_a_read_that_failed_is_tried_anew(
     async def use(topic: Topic) -> None:
         with pytest.raises(StoreUnavailable):
             await topic.news(None, limit=LIMIT)
-        _, iterations = await topic.news(None, limit=LIMIT)
+        iterations = (await topic.news(None, limit=LIMIT)).iterations
         assert [iteration.index for iteration in iterations] == [0]
 
     run(service, job, use)

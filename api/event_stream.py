@@ -1,0 +1,71 @@
+"""Answers of server-sent events that are encoded already: once for all who follow a job."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncGenerator
+from typing import Final
+
+from fastapi.responses import StreamingResponse
+from fastapi.sse import KEEPALIVE_COMMENT
+from starlette.types import Receive, Scope, Send
+
+KEEP_ALIVE_SECONDS: Final = 15.0
+"""After so long a silence a comment is sent, for proxies that end idle connections [s]."""
+
+EVENT_SCHEMA: Final = {
+    "type": "object",
+    "properties": {
+        "data": {"type": "string"},
+        "event": {"type": "string"},
+        "id": {"type": "string"},
+        "retry": {"type": "integer", "minimum": 0},
+    },
+}
+"""Of one event, as OpenAPI 3.2 has it."""
+
+_HEADERS: Final = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+"""Nothing is to be kept, or held back until there is more of it."""
+
+
+class EventStream(StreamingResponse):
+    """An answer that ends with its events, or with its client."""
+
+    media_type = "text/event-stream"
+
+    def __init__(self, events: AsyncGenerator[bytes, None]) -> None:
+        """Take on the events.
+
+        Args:
+            events: whole ones, as they are to be written; closed in any case when the answer ends.
+        """
+        self._texts = _kept_alive(events)
+        super().__init__(self._texts, headers=_HEADERS)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One ASGI exchange."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            await self._texts.aclose()
+
+
+async def _kept_alive(events: AsyncGenerator[bytes, None]) -> AsyncGenerator[bytes, None]:
+    """The same, with comments where nothing else is to be sent for a while."""
+    following: asyncio.Task[bytes | None] | None = None
+    try:
+        while True:
+            following = following or asyncio.ensure_future(anext(events, None))
+            await asyncio.wait([following], timeout=KEEP_ALIVE_SECONDS)
+            if not following.done():
+                yield KEEPALIVE_COMMENT
+                continue
+            text, following = following.result(), None
+            if text is None:
+                return
+            yield text
+    finally:
+        if following is not None:
+            following.cancel()
+            await asyncio.wait([following])
+        await events.aclose()

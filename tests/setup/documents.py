@@ -6,13 +6,11 @@ import re
 import shlex
 from collections.abc import Iterator
 
+from tests.documents.reader import BLOCK, SHELL
 from tests.examples.paths import ROOT
 
-_README = ROOT / "README.md"
-DOCUMENTS = [_README, *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
-_BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-_SHELL = ("", "sh", "bash", "console", "shell")
 _ENDS = ("|", "||", "&&", ";", "&", ">", ">>", "2>", "<", "#")
 
 
@@ -22,24 +20,19 @@ def documentation() -> str:
 
 def blocks(kind: str) -> Iterator[str]:
     """Contents of the code blocks of one language."""
-    return (body for language, body in _BLOCK.findall(documentation()) if language == kind)
+    return (body for language, body in BLOCK.findall(documentation()) if language == kind)
 
 
 def shell_commands(program: str) -> list[list[str]]:
     """Arguments of every call of a program in a shell block or between backquotes."""
     text = documentation()
-    inline = re.findall(r"`([^`\n]+)`", _BLOCK.sub("", text))
+    inline = re.findall(r"`([^`\n]+)`", BLOCK.sub("", text))
     return [*calls(text, program), *(call for line in inline for call in _calls(line, program))]
-
-
-def section(title: str) -> str:
-    """Text of the README's section with that title."""
-    return _README.read_text(encoding="utf-8").split(f"## {title}\n")[1].split("\n## ")[0]
 
 
 def calls(text: str, program: str) -> list[list[str]]:
     """Arguments of every call of a program in the shell blocks of a text, in their order."""
-    shell = [body for language, body in _BLOCK.findall(text) if language in _SHELL]
+    shell = [body for language, body in BLOCK.findall(text) if language in SHELL]
     lines = "\n".join(shell).replace("\\\n", " ").splitlines()
     return [call for line in lines for call in _calls(line, program)]
 

@@ -46,8 +46,11 @@ def simulate(
         typer.Option(metavar="FILE", help="JSON object of gait parameters, beside the design."),
     ] = None,
     preference: Annotated[
-        str, typer.Option(help="A, B, C or chapter-3: how objectives are weighed.")
-    ] = "A",
+        str | None,
+        typer.Option(
+            help="A, B, C or chapter-3: how objectives are weighed [default: the job's, else A]."
+        ),
+    ] = None,
     world: Annotated[
         str | None,
         typer.Option(
@@ -83,7 +86,7 @@ def simulate(
         "controller": given.controller,
         "design": given.values,
         "scenarios": scenario_data(scenario or "all"),
-        "preference": preference,
+        "preference": preference or "A",
         "precision": precision or "double",
         "log": log is not None,
     }
@@ -91,6 +94,8 @@ def simulate(
         data["robot"] = given.spec.robot
     if given.spec is not None and scenario is None:
         data["scenarios"] = given.spec.resolved_scenarios()
+    if given.spec is not None and preference is None:
+        data["preference"] = given.spec.preference
     if world is not None:
         found = json_object(world, "world")
         data["world"] = found.get("values", found)

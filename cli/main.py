@@ -59,7 +59,10 @@ from cli.output import OutputClosed, Stdout, note, replace_closed_streams, warni
 
 
 class _HelpAtOnce(TyperGroup):
-    """Shows a command's help before anything is parsed: Typer imports Pydantic to read options."""
+    """Shows a command's help before anything is parsed: Typer imports Pydantic to read options.
+
+    And no sentence of it is cut.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse arguments, unless a command's help is among them."""
@@ -70,6 +73,14 @@ class _HelpAtOnce(TyperGroup):
                 typer.echo(command.get_help(context), color=ctx.color)
                 ctx.exit()
         return list(super().parse_args(ctx, args))
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """List commands with the whole of their first sentences, on as many lines as they take."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, c.get_short_help_str(1000)) for name, c in commands if c and not c.hidden]
+            )
 
     def _command_named(self, context: Any, words: list[str]) -> tuple[Any, Any]:
         """The innermost command that is named, with its context; None where one is unknown."""

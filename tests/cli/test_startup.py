@@ -44,6 +44,12 @@ def test_help_after_two_dashes_is_an_argument(gaitswarm: Gaitswarm) -> None:
     assert (result.code, result.out) == (ExitCode.NOT_FOUND, "")
 
 
+def test_help_cuts_no_commands_sentence(gaitswarm: Gaitswarm) -> None:
+    listed = gaitswarm("--help").out.split("Commands:")[1]
+    assert "..." not in listed
+    assert "search methods of other" in listed
+
+
 def test_help_documents_the_exit_codes(gaitswarm: Gaitswarm) -> None:
     words = " ".join(gaitswarm("--help").out.split())
     documented = {int(code) for code in re.findall(r"(\d+) ", words.partition("Exit codes: ")[2])}

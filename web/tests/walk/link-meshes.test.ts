@@ -24,9 +24,9 @@ test('an OBJ is read without its materials, and gets normals', () => {
   expect(mesh.geometry.hasAttribute('normal')).toBe(true)
 })
 
-test('an ASCII STL is read', () => {
+test('an STL is read, whose normals may be missing', () => {
   const stl = `solid s
-facet normal 0 0 1
+facet normal 0 0 0
 outer loop
 vertex 0 0 0
 vertex 3 0 0
@@ -39,6 +39,8 @@ endsolid s`
   expect((object.children[0] as Mesh).material as MeshStandardMaterial).toHaveProperty(
     'isMeshStandardMaterial',
   )
+  const normals = (object.children[0] as Mesh).geometry.getAttribute('normal')
+  expect([normals.getX(0), normals.getY(0), normals.getZ(0)]).toEqual([0, 0, 1])
   expect(boxOf(object).max.x).toBe(3)
 })
 

@@ -68,7 +68,8 @@ export function parsed(bytes: ArrayBuffer, format: Format): Object3D {
   read.traverse((object) => {
     if (!(object instanceof Mesh)) return
     const geometry: BufferGeometry = object.geometry.clone().applyMatrix4(object.matrixWorld)
-    if (!geometry.hasAttribute('normal')) geometry.computeVertexNormals()
+    // Many an STL has normals of no length.
+    if (format === 'stl' || !geometry.hasAttribute('normal')) geometry.computeVertexNormals()
     const [own] = [object.material].flat() as { color?: Color }[]
     const material = new MeshStandardMaterial({ roughness: 0.55, metalness: 0.15, color: PLAIN })
     if (format === 'dae' && own?.color) material.color.copy(own.color)

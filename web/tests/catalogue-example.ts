@@ -92,6 +92,20 @@ export const CATALOGUE = {
       published: { A: { P: 0.45, FOMF: 2 } },
     },
   ],
+  cases: [
+    {
+      name: 'damped',
+      description: 'a walk in mud',
+      needs: null,
+      settings_schema: {
+        type: 'object',
+        properties: {
+          name: { const: 'damped', default: 'damped', type: 'string' },
+          share: { type: 'number', default: 0.1, minimum: 0 },
+        },
+      },
+    },
+  ],
   robots: [
     { name: 'hexapod', description: 'a hexapod' },
     { name: 'hexapod-identified', description: 'the same, identified' },

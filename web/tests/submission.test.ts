@@ -2,6 +2,7 @@ import { describe, expect, test } from 'vitest'
 import type { JobSpec } from '../src/api/types'
 import { around } from '../src/submission/around-design'
 import { errorsByField, specOf, withKinds } from '../src/submission/build-spec'
+import { caseDraft, caseFields } from '../src/submission/case'
 import { ofLegGroups } from '../src/submission/catalogue'
 import { type Draft, draftOf, emptyDraft, scenarioDraft } from '../src/submission/draft'
 import { optimizerDraft, settingsOf, withPreset } from '../src/submission/optimizer'
@@ -427,4 +428,15 @@ describe("a robot's own folder", () => {
   ])('is refused where it is %s', (text, message) => {
     expect(() => withRobotJob(files, CATALOGUE, text)).toThrow(message)
   })
+})
+
+test("a plug-in's case is chosen with its settings, and known again in a spec", () => {
+  const [damped] = CATALOGUE.cases
+  expect(caseFields(damped).map(({ name }) => name)).toEqual(['share'])
+  const spec = specOf({ ...empty, case: { ...caseDraft(damped), share: '0.3' } })
+  expect(spec.case).toEqual({ name: 'damped', share: 0.3 })
+  expect(specOf(draftOf(spec, CATALOGUE)).case).toEqual({ name: 'damped', share: 0.3 })
+  const named = draftOf({ case: 'damped' } as unknown as JobSpec, CATALOGUE)
+  expect(specOf(named).case).toEqual({ name: 'damped', share: 0.1 })
+  expect(specOf(empty)).not.toHaveProperty('case')
 })

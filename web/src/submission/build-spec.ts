@@ -34,6 +34,7 @@ export function specOf(draft: Draft): JobSpec {
     variables,
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
+    ...(draft.case !== null && { case: optimizerSettings(draft.case) }),
     ...(worlds !== undefined && { worlds }),
     optimizer: optimizerSettings(draft.optimizer),
     iterations: number(draft.iterations),

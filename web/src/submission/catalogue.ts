@@ -4,6 +4,7 @@ import { get } from '../api/client'
 import type {
   Controller,
   OptimizerPreset,
+  PluginCase,
   PreferencePreset,
   RobotPreset,
   ScenarioPreset,
@@ -17,6 +18,8 @@ export interface Catalogue {
   readonly scenarios: readonly ScenarioPreset[]
   readonly preferences: readonly PreferencePreset[]
   readonly optimizers: readonly OptimizerPreset[]
+  /** Of plug-ins. */
+  readonly cases: readonly PluginCase[]
   readonly fields: {
     readonly job: ReadonlyMap<string, SchemaField>
     readonly scenario: ReadonlyMap<string, SchemaField>
@@ -41,20 +44,25 @@ export function ofLegGroups(known: readonly Variable[], names: Iterable<string>)
 }
 
 export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
-  const [controllers, robots, scenarios, preferences, optimizers, document] = await Promise.all([
-    get('/v1/controllers', { signal }),
-    get('/v1/robots', { signal }),
-    get('/v1/scenarios', { signal }),
-    get('/v1/preferences', { signal }),
-    get('/v1/optimizers', { signal }),
-    fetch('/openapi.json', { signal }).then((answer) => answer.json() as Promise<OpenApiDocument>),
-  ])
+  const [controllers, robots, scenarios, preferences, optimizers, cases, document] =
+    await Promise.all([
+      get('/v1/controllers', { signal }),
+      get('/v1/robots', { signal }),
+      get('/v1/scenarios', { signal }),
+      get('/v1/preferences', { signal }),
+      get('/v1/optimizers', { signal }),
+      get('/v1/cases', { signal }),
+      fetch('/openapi.json', { signal }).then(
+        (answer) => answer.json() as Promise<OpenApiDocument>,
+      ),
+    ])
   return {
     controllers: controllers.items,
     robots: robots.items,
     scenarios: scenarios.items,
     preferences: preferences.items,
     optimizers: optimizers.items,
+    cases: cases.items,
     fields: {
       job: fieldsOf(document, 'JobSpec'),
       scenario: fieldsOf(document, 'Scenario'),

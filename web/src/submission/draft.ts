@@ -1,6 +1,7 @@
 /** A job as it stands in the form: numbers are still text, choices not yet a spec. */
 
 import type { JobSpec, Scenario, Variable } from '../api/types'
+import { type CaseDraft, caseOf } from './case'
 import { type Catalogue, ofLegGroups, variablesOf } from './catalogue'
 import { type OptimizerDraft, optimizerDraft } from './optimizer'
 import type { SchemaField } from './schema-fields'
@@ -50,6 +51,7 @@ export interface Draft {
   readonly own: readonly Readonly<Record<string, string>>[]
   readonly variables: Readonly<Record<string, VariableDraft>>
   readonly preference: PreferenceDraft
+  readonly case: CaseDraft
   readonly worlds: WorldsDraft
   /** Settings of the method that is its `name`. */
   readonly optimizer: OptimizerDraft
@@ -80,6 +82,7 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     own: [],
     variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, preset),
+    case: null,
     worlds: worldsDraft(catalogue.fields.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, undefined, usualMethod(catalogue)),
     start: NO_START,
@@ -137,6 +140,7 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
+    case: caseOf(spec.case, catalogue.cases),
     worlds: worldsDraft(catalogue.fields.worlds, spec.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, usualMethod(catalogue)),
     start: startDraft(spec.start),

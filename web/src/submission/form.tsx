@@ -4,6 +4,7 @@ import { useEffect, useMemo, useState } from 'preact/hooks'
 import { ApiProblem } from '../api/problem'
 import type { JobSpec } from '../api/types'
 import { errorsByField, specOf, withKinds } from './build-spec'
+import { CaseSection } from './case-section'
 import { type Catalogue, variablesOf } from './catalogue'
 import type { Draft } from './draft'
 import { JobSection } from './job-section'
@@ -54,6 +55,7 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
         <VariablesSection {...parts} />
         <ScenariosSection {...parts} />
         <PreferenceSection {...parts} />
+        <CaseSection {...parts} />
         <WorldsSection {...parts} />
         <OptimizerSection {...parts} />
         <StartSection {...parts} />

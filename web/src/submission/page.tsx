@@ -8,6 +8,7 @@ import { ErrorNotice, Loading } from '../components/feedback'
 import { preferenceIn } from '../job/preference'
 import { usePlace } from '../router/navigation'
 import { around } from './around-design'
+import { caseOf } from './case'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
 import { type Draft, draftOf, emptyDraft, preferenceOf, withScenarios } from './draft'
 import { JobForm } from './form'
@@ -47,7 +48,7 @@ export default function NewJobPage() {
       )}
       {start.loading && <Loading what="the catalogue" />}
       {start.data &&
-        (from && isDocument(from) ? (
+        (from && isDocument(from, start.data.catalogue) ? (
           <JsonForm key={String(query)} spec={from.spec} />
         ) : (
           <JobForm
@@ -71,7 +72,7 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
     id === null ? null : readableJob(id, signal),
   ])
   const from = cloned && withSeed(cloned, query.get('seed'))
-  if (!from || isDocument(from)) {
+  if (!from || isDocument(from, catalogue)) {
     return { catalogue, draft: startingFrom(emptyDraft(catalogue), query), from }
   }
   let draft = startingFrom(draftOf(from.spec as JobSpec, catalogue), query)
@@ -91,9 +92,10 @@ function startingFrom(draft: Draft, query: URLSearchParams): Draft {
   return jobs === null ? draft : { ...draft, start: { ...draft.start, jobs } }
 }
 
-/** Whether the form would lose something of a job: what it is, or a plug-in's case. */
-function isDocument({ spec }: Job): boolean {
-  return spec.kind !== 'tuning' || (spec.case ?? null) !== null
+/** Whether the form would lose something of a job: what it is, or the case of a plug-in that is not here. */
+function isDocument({ spec }: Job, { cases }: Catalogue): boolean {
+  if (spec.kind !== 'tuning') return true
+  return (spec.case ?? null) !== null && caseOf(spec.case, cases) === null
 }
 
 function withSeed(job: Job, seed: string | null): Job {

@@ -39,3 +39,34 @@ def test_a_link_shows_what_was_seen(
     )
     page.get_by_role("button", name="Failed").click()
     expect(page).to_have_url(re.compile("sort=failed$"))
+
+
+def test_keys_find_jobs_and_commands_and_can_be_switched_off(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    expect(page.get_by_role("heading", name="Convergence")).to_be_visible()
+    page.keyboard.press("Control+k")
+    field = page.get_by_role("combobox", name="Find pages")
+    expect(field).to_be_focused()
+    # What the job allows now is there; a job that has ended cannot be paused.
+    expect(page.get_by_role("option", name="Extend")).to_be_visible()
+    expect(page.get_by_role("option", name="Pause")).to_have_count(0)
+    field.fill(finished_job)
+    job = page.get_by_role("option", name=f"job {finished_job}")
+    expect(job).to_have_attribute("aria-selected", "true")
+    field.fill("new job")
+    page.keyboard.press("Enter")
+    expect(page).to_have_url(re.compile("/jobs/new$"))
+    # Letters are a field's own.
+    page.get_by_label("Name", exact=True).first.press("w")
+    expect(page).to_have_url(re.compile("/jobs/new$"))
+    page.get_by_role("main").focus()
+    page.keyboard.press("?")
+    page.get_by_label("single keys work").uncheck()
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog")).to_have_count(0)
+    page.keyboard.press("w")
+    page.keyboard.press("Control+k")
+    expect(field).to_be_visible()
+    expect(page).to_have_url(re.compile("/jobs/new$"))

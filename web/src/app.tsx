@@ -5,6 +5,7 @@ import { Empty } from './components/feedback'
 import { lazyPage } from './components/lazy-page'
 import icon from './icon.svg'
 import { JobsPage } from './jobs/page'
+import { Keys } from './palette/keys'
 import { forgetIgnored, IgnoredNotice } from './router/ignored'
 import { usePlace } from './router/navigation'
 import { type Route, routeOf } from './router/routes'
@@ -66,6 +67,7 @@ export function App() {
           ))}
           <a href="/docs">API</a>
         </nav>
+        <Keys />
         <ThemeToggle />
       </header>
       {unauthorized ? (

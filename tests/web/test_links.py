@@ -70,3 +70,15 @@ def test_keys_find_jobs_and_commands_and_can_be_switched_off(
     page.keyboard.press("Control+k")
     expect(field).to_be_visible()
     expect(page).to_have_url(re.compile("/jobs/new$"))
+
+
+def test_a_link_shows_a_walk_at_its_moment(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/walk?t=1.25&view=no-trail")
+    player = page.locator("[data-player]")
+    expect(player).to_have_attribute("data-time", "1.2500")
+    expect(page.get_by_label("Trail")).not_to_be_checked()
+    page.get_by_role("button", name="One frame ahead").click()
+    page.get_by_label("Forces").uncheck()
+    expect(page).to_have_url(re.compile(r"t=1\.26&view=no-forces%2Cno-trail$"))

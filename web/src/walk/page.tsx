@@ -1,32 +1,25 @@
 /** One walk, or two compared: replay, worth and charts over time. */
 
-import { useMemo, useState } from 'preact/hooks'
+import { useEffect, useMemo, useState } from 'preact/hooks'
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
 import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Scenario } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { setQuery } from '../router/navigation'
+import { useDelayedQuery, useQueryValue } from '../router/query-value'
 import { DesignLinks, DesignPage } from './design-page'
 import { DesignPicker } from './design-picker'
 import { type DesignSource, queryOf, sourceOf, sourceOfWord, wordOf } from './design-source'
 import { Playback } from './playback'
 import { Player } from './player'
-import type { ViewChoices } from './player-controls'
 import { DEFAULT_RATE, RATES, type Recorded, recordWalk } from './recorded'
 import { type ResolvedDesign, resolveDesign } from './resolve-design'
 import { ScenarioPicker } from './scenario-picker'
+import { MOMENT, USUAL_VIEW, VIEW } from './view-words'
 import './walk.css'
 import { WalkPlots } from './walk-plots'
 import { FailureNotices } from './walk-result'
-
-const CHOICES: ViewChoices = {
-  arrangement: 'ghost',
-  follow: true,
-  forces: true,
-  trail: true,
-  meshes: true,
-}
 
 interface Address {
   readonly source: DesignSource
@@ -108,8 +101,16 @@ function useWalk(design: ResolvedDesign | null, scenario: string | Scenario, rat
 function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
   const walks = useMemo(() => (other ? [one, other] : [one]), [one, other])
   const shown = useMemo(() => walks.filter(({ replay }) => replay.frames > 0), [walks])
-  const [choices, setChoices] = useState(CHOICES)
-  const playback = useMemo(() => playbackOf(shown), [shown])
+  const [choices, setChoices] = useQueryValue('view', VIEW, USUAL_VIEW)
+  const [asked] = useQueryValue('t', MOMENT, null)
+  const tell = useDelayedQuery('t')
+  // A moment of another walk means nothing.
+  const [first] = useState(() => shown)
+  const playback = useMemo(() => playbackOf(shown, shown === first ? asked : null), [shown])
+  useEffect(
+    () => playback.subscribe(() => !playback.playing && tell(MOMENT.write(playback.time))),
+    [playback],
+  )
   return (
     <>
       <FailureNotices walks={walks} />
@@ -123,12 +124,13 @@ function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
   )
 }
 
-/** Plays at once, unless the system asks for little movement. */
-function playbackOf(walks: readonly Recorded[]): Playback {
+/** Stands at a moment that is asked for [s]; else plays at once, unless little movement is asked for. */
+function playbackOf(walks: readonly Recorded[], moment: number | null): Playback {
   const replays = walks.map(({ replay }) => replay)
   const end = Math.max(0, ...replays.map((replay) => replay.end))
   const playback = new Playback(end, replays[0]?.header.rate ?? DEFAULT_RATE)
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) playback.play()
+  if (moment !== null) playback.seek(moment)
+  else if (!matchMedia('(prefers-reduced-motion: reduce)').matches) playback.play()
   return playback
 }
 

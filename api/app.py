@@ -28,6 +28,9 @@ from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
 from api.rates import RequestRate
 from api.routes import (
+    activity as activities,
+)
+from api.routes import (
     analysis,
     audit,
     calibration,
@@ -50,6 +53,7 @@ from api.routes import (
     tournaments,
 )
 from gaitswarm.settings import Settings
+from services.monitoring.activity import Activity
 from services.monitoring.collectors import QueueCollector
 from services.monitoring.exposition import MetricsAccess
 from services.monitoring.metrics import Metrics
@@ -73,6 +77,7 @@ def create_app(
     manual_folder: Path = MANUAL,
     metrics: Metrics | None = None,
     components: Sequence[Component] = (),
+    activity: Activity | None = None,
 ) -> FastAPI:
     """The application around a service: routes, problems, limits, documentation, page.
 
@@ -86,6 +91,7 @@ def create_app(
         metrics: of the process, which the application adds its own and the database's to; None:
             there are no others.
         components: parts of the process, beside the database, that /v1/readyz tells of.
+        activity: what happens to the jobs that the process runs; None where it runs none.
 
     Returns:
         The application, for `ApiServer` or any other ASGI server with lifespans.
@@ -103,11 +109,12 @@ def create_app(
         description=DESCRIPTION,
         openapi_tags=TAGS,
         separate_input_output_schemas=False,
-        lifespan=lifespan(service, settings, components, metrics),
+        lifespan=lifespan(service, settings, components, metrics, activity),
     )
     for module in (
         jobs,
         commands,
+        activities,
         labels,
         notifications,
         history,

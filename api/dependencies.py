@@ -16,6 +16,7 @@ from pydantic import Field
 from api.rates import OpenStreams
 from api.topics import Topics
 from gaitswarm.settings import Settings
+from services.monitoring.activity import Activity
 from services.monitoring.metrics import Metrics
 from services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
 from services.optimizer.jobs.job import Job
@@ -102,7 +103,7 @@ class State(TypedDict):
     bodies. draining: set by the server on the first signal to end; it still answers then. stopping:
     set when it begins to stop; event streams end then. topics: jobs that these streams follow.
     streams: that are open, by asker. components: parts of the process beside the database.
-    metrics: of this process.
+    metrics: of this process. activity: what happens to the jobs that it runs, if it runs any.
     """
 
     service: JobService
@@ -116,6 +117,7 @@ class State(TypedDict):
     topics: Topics
     components: Sequence[Component]
     metrics: Metrics
+    activity: Activity | None
 
 
 def lifespan(
@@ -123,6 +125,7 @@ def lifespan(
     settings: Settings,
     components: Sequence[Component],
     metrics: Metrics,
+    activity: Activity | None = None,
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
     """The lifespan of an application around a service.
 
@@ -131,6 +134,7 @@ def lifespan(
         settings: of the application.
         components: parts of the process beside the database.
         metrics: of this process.
+        activity: what happens to the jobs that this process runs; None where it runs none.
 
     Returns:
         The context manager that FastAPI enters in the server's event loop.
@@ -154,6 +158,7 @@ def lifespan(
             components=components,
             streams=OpenStreams(settings.api_max_streams),
             metrics=metrics,
+            activity=activity,
         )
         waking.cancel()
 
@@ -185,6 +190,15 @@ async def slots(request: Request) -> ComputingSlots:
         request: under way.
     """
     return cast(ComputingSlots, request.state.slots)
+
+
+async def activity(request: Request) -> Activity | None:
+    """What happens to the jobs that this process runs, if it runs any.
+
+    Args:
+        request: under way.
+    """
+    return cast("Activity | None", request.state.activity)
 
 
 async def counted_stream(request: Request) -> AsyncIterator[None]:
@@ -243,6 +257,7 @@ async def metrics(request: Request) -> Metrics:
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, Depends(settings)]
 Slots = Annotated[ComputingSlots, Depends(slots)]
+JobActivities = Annotated[Activity | None, Depends(activity)]
 Stopping = Annotated[asyncio.Event, Depends(stopping)]
 FollowedJobs = Annotated[Topics, Depends(topics)]
 ServerMetrics = Annotated[Metrics, Depends(metrics)]

@@ -28,6 +28,7 @@ from services.worker.in_process import InProcessEvaluator
 from services.worker.ray_evaluator import RayEvaluator
 
 if TYPE_CHECKING:
+    from services.monitoring.activity import Activity
     from services.monitoring.metrics import Metrics
     from services.monitoring.tracing import Tracing
 
@@ -124,6 +125,7 @@ def open_runtime(
     tracing: Tracing | None = None,
     webhook_hosts: Collection[str] = (),
     webhook_secret: str | None = None,
+    activity: Activity | None = None,
 ) -> Iterator[Runtime]:
     """Open a database and run its queued jobs until the block is left; then close all.
 
@@ -146,6 +148,7 @@ def open_runtime(
         tracing: Is told of the jobs that are run, and closed; None: nobody follows them.
         webhook_hosts: Hosts that may be told that jobs have ended; none: nobody is.
         webhook_secret: Signs what they are told.
+        activity: Takes note of what happens to the jobs that are run; None: nobody looks at it.
 
     Yields:
         What was opened.
@@ -188,9 +191,13 @@ def open_runtime(
             from services.monitoring.collectors import WorkersCollector  # noqa: PLC0415
 
             metrics.registry.register(WorkersCollector(lambda: workers.loads))
+        seen: Evaluator = workers
+        if activity is not None:
+            stack.enter_context(activity.log_kept())
+            seen = activity.watched_evaluator(seen)
         runner = Runner(
             runners_store,
-            workers if tracing is None else tracing.traced_evaluator(workers),
+            seen if tracing is None else tracing.traced_evaluator(seen),
             concurrency=concurrent_jobs,
             lease_seconds=lease_seconds,
             cache=cache,

@@ -21,6 +21,7 @@ from api.app import create_app
 from api.connections import ConnectionLimits
 from api.server import ApiServer
 from gaitswarm.settings import Settings
+from services.monitoring.activity import Activity
 from services.monitoring.metrics import Metrics
 from services.optimizer.service import JobService
 from tests.examples.forked import ForkedCommand
@@ -70,6 +71,7 @@ class Server(Served):
         metrics: Metrics | None = None,
         components: Sequence[dependencies.Component] = (),
         drain: Callable[[threading.Event], None] = lambda _: None,
+        activity: Activity | None = None,
         **settings: Any,
     ) -> None:
         assert set(settings) <= set(Settings.model_fields)
@@ -81,6 +83,7 @@ class Server(Served):
             manual_folder=manual_folder,
             metrics=metrics,
             components=components,
+            activity=activity,
         )
         self._server = ApiServer(
             self.app,

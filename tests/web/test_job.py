@@ -202,6 +202,12 @@ def test_a_jobs_headline_convergence_winner_and_walk(
     rows = winner.get_by_role("table", name="The winner in its bounds").locator("tbody tr")
     expect(rows).to_have_count(len(job["best"]["design"]))
 
+    page.get_by_role("link", name="Activity").click()
+    expect(page.get_by_role("img", name=re.compile("^Timeline of"))).to_be_visible()
+    machines = page.get_by_role("table", name="Workers of the job").locator("tbody tr")
+    expect(machines).to_have_count(1)
+    page.go_back()
+
     # Little movement is asked for: nothing walks by itself, and nothing is loaded for it.
     page.get_by_role("button", name="Show its walk").click()
     expect(page.get_by_role("img", name="The best design walking")).to_be_visible()

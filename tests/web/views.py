@@ -28,6 +28,7 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
         "what-if": "/jobs/{job}/preferences",
         "trade-offs": "/jobs/{job}/trade-offs",
         "firmware": "/jobs/{job}/firmware",
+        "activity": "/jobs/{job}/activity",
         "spec": "/jobs/{job}/reproduce",
     },
     "walks and controllers": {

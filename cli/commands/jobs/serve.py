@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from api.dependencies import Component
     from gaitswarm.settings import Settings
+    from services.monitoring.activity import Activity
     from services.monitoring.metrics import Metrics
     from services.monitoring.tracing import Tracing
     from services.optimizer.access import Tokens
@@ -68,6 +69,7 @@ def serve(
         from cli.logs import log_to_stderr
         from cli.output import note
         from gaitswarm.settings import read_settings
+        from services.monitoring.activity import Activity
         from services.monitoring.metrics import Metrics
         from services.optimizer.errors import EvaluatorUnavailable
 
@@ -75,11 +77,19 @@ def serve(
         log_to_stderr(settings.log_level, settings.log_format)
         tell = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
         metrics = Metrics()
-        with _runtime(settings, metrics, runs_jobs=not no_runner, keeps_house=True) as opened:
+        activity = None if no_runner else Activity()
+        runs_jobs = not no_runner
+        with _runtime(
+            settings, metrics, runs_jobs=runs_jobs, keeps_house=True, activity=activity
+        ) as opened:
             beside = opened.runner
             components = _components(opened, beside)
             app = create_app(
-                opened.service, settings=settings, components=components, metrics=metrics
+                opened.service,
+                settings=settings,
+                components=components,
+                metrics=metrics,
+                activity=activity,
             )
             try:
                 server = ApiServer(
@@ -204,6 +214,7 @@ def _runtime(
     runs_jobs: bool = True,
     keeps_house: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
+    activity: Activity | None = None,
 ) -> AbstractContextManager[Runtime]:
     from gaitswarm.jobs.open import database_to_write
     from services.runtime import open_runtime
@@ -226,6 +237,7 @@ def _runtime(
         tracing=_tracing() if runs_jobs else None,
         webhook_hosts=settings.webhook_hosts,
         webhook_secret=settings.webhook_secret,
+        activity=activity,
     )
 
 

@@ -8,6 +8,7 @@ import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
 import { setTitle } from '../title'
+import { ActivityPanel } from './activity/panel'
 import { AnalysisPanel } from './analysis/panel'
 import { budgetSpent } from './budget'
 import { CertificatePanel } from './certificate-panel'
@@ -42,6 +43,7 @@ const TABS = [
   { tab: 'trade-offs', label: 'Trade-offs' },
   { tab: 'preferences', label: 'What if' },
   { tab: 'firmware', label: 'Firmware' },
+  { tab: 'activity', label: 'Activity' },
   { tab: 'reproduce', label: 'Spec' },
 ] as const
 
@@ -179,6 +181,8 @@ function Panel({ live, job, tab, gain }: PartProps) {
       return <PreferencesPanel job={job} />
     case 'firmware':
       return <FirmwarePanel job={job} />
+    case 'activity':
+      return <ActivityPanel job={job} />
     case 'reproduce':
       return <ReproducePanel job={job} />
     default:

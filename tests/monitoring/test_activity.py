@@ -1,0 +1,138 @@
+"""What is kept of the jobs that a process runs: bounded, by job, and told over HTTP."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from services.monitoring import activity as kept
+from services.monitoring.activity import Activity
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.provenance import job_provenance
+from services.optimizer.log_context import log_context
+from services.optimizer.run.evaluator import EvaluationRequest, TaskReport
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import SqlStore
+from sim.outcome import Outcome
+from tests.examples.servers import Server
+
+
+class Worker:
+    """An evaluator that reports the tasks it is told to, and fails if it is told to."""
+
+    slots = 1
+
+    def __init__(self, *reports: TaskReport, error: Exception | None = None) -> None:
+        self.reports, self.error = reports, error
+
+    def evaluate(
+        self, request: EvaluationRequest, _should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        for report in self.reports:
+            assert request.on_task is not None
+            request.on_task(report)
+        if self.error is not None:
+            raise self.error
+        return ()
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture(scope="module")
+def request_() -> EvaluationRequest:
+    provenance = job_provenance(JobSpec()).simulation
+    return EvaluationRequest("job", (), np.zeros((3, 2)), provenance, iteration=4)
+
+
+def test_iterations_tasks_and_workers_are_taken_note_of(request_: EvaluationRequest) -> None:
+    activity = Activity(clock=lambda: 1000.0)
+    told: list[TaskReport] = []
+    good = TaskReport(24, 2.0, 1.5, "node-1")
+    bad = TaskReport(24, 3.0, error="it died")
+    watched = activity.watched_evaluator(Worker(good, bad, good))
+    watched.evaluate(replace(request_, on_task=told.append), lambda: False)
+
+    assert told == [good, bad, good]
+    found = activity.of("job")
+    assert found is not None
+    (iteration,) = found.iterations
+    assert (iteration.iteration, iteration.designs, iteration.seconds) == (4, 3, 0.0)
+    assert [(t.worker, t.begun, t.error) for t in found.tasks] == [
+        ("node-1", 998.0, None),
+        ("", 997.0, "it died"),
+        ("node-1", 998.0, None),
+    ]
+    nobody, node = found.workers
+    assert (node.name, node.tasks, node.walks, node.failures) == ("node-1", 2, 48, 0)
+    assert (nobody.name, nobody.tasks, nobody.walks, nobody.failures) == ("", 1, 0, 1)
+    assert nobody.error == "it died"
+    assert activity.of("other") is None
+
+
+def test_an_iteration_that_fails_says_why(request_: EvaluationRequest) -> None:
+    activity = Activity()
+    watched = activity.watched_evaluator(Worker(error=ValueError("no such robot")))
+    with pytest.raises(ValueError, match="no such robot"):
+        watched.evaluate(request_, lambda: False)
+    found = activity.of("job")
+    assert found is not None
+    assert found.iterations[0].error == "ValueError: no such robot"
+
+
+def test_what_is_kept_is_bounded(
+    request_: EvaluationRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "_JOBS", 2)
+    activity = Activity()
+    report = TaskReport(1, 0.1, 0.1, "node")
+    for number in range(3):
+        of_job = replace(request_, job_id=f"job {number}")
+        for _ in range(2500):
+            activity.task(of_job, report)
+    assert activity.of("job 0") is None
+    found = activity.of("job 2")
+    assert found is not None
+    assert (len(found.tasks), found.workers[0].tasks) == (2000, 2500)
+
+
+def test_messages_of_a_job_are_kept_and_no_others() -> None:
+    activity, log = Activity(), logging.getLogger("tests.activity")
+    with activity.log_kept():
+        log.warning("of nobody")
+        with log_context(job="job", iteration=7):
+            log.warning("node %s is slow", "x" * 5000)
+    with log_context(job="job"):
+        log.warning("later")
+    found = activity.of("job")
+    assert found is not None
+    (message,) = found.messages
+    assert (message.level, message.iteration) == ("WARNING", 7)
+    assert message.text.startswith("node xxx") and len(message.text) == 2000
+
+
+def test_a_server_tells_what_it_knows_and_why_it_knows_nothing(
+    store: SqlStore, request_: EvaluationRequest
+) -> None:
+    job, _ = store.create_job(JobSpec(iterations=2))
+    activity = Activity()
+    server = Server(JobService(store), activity=activity)
+    try:
+        client = server.client
+        here = f"/v1/jobs/{job.id}/activity"
+        assert "has not run the job" in client.get(here).json()["reason"]
+        assert client.get("/v1/jobs/nowhere/activity").status_code == 404
+        activity.task(replace(request_, job_id=job.id), TaskReport(5, 0.2, 0.1, "node"))
+        with activity.log_kept(), log_context(job=job.id):
+            logging.getLogger("tests.activity").warning("slow")
+            logging.getLogger("tests.activity").error("lost")
+        found = client.get(here, params={"level": "ERROR"}).json()
+        assert found["reason"] is None
+        assert [task["worker"] for task in found["tasks"]] == ["node"]
+        assert [message["text"] for message in found["messages"]] == ["lost"]
+        assert client.get(here, params={"level": "LOUD"}).status_code == 422
+    finally:
+        server.close()

@@ -1,0 +1,163 @@
+/** What workers do for a job: a timeline, their health, and the log of the job. */
+
+import { useState } from 'preact/hooks'
+import { get } from '../../api/client'
+import { usePolling, useResource } from '../../api/resource'
+import type { Activity, Job } from '../../api/types'
+import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { type Column, Table } from '../../components/table'
+import { formatCount, formatNumber } from '../../format/number'
+import { formatMoment } from '../../format/time'
+import { sentence } from '../../format/words'
+import './activity.css'
+import { TimelineCard } from './timeline-card'
+
+const POLL_MS = 2000
+const LEVELS = ['DEBUG', 'INFO', 'WARNING', 'ERROR'] as const
+type Level = (typeof LEVELS)[number]
+
+export function ActivityPanel({ job }: { job: Job }) {
+  const [level, setLevel] = useState<Level>('INFO')
+  const found = useResource(`activity ${job.id} ${level} ${job.state}`, (signal) =>
+    get('/v1/jobs/{job_id}/activity', { path: { job_id: job.id }, query: { level }, signal }),
+  )
+  usePolling(found.reload, POLL_MS, ['queued', 'running', 'pausing'].includes(job.state))
+  if (found.error && !found.data) {
+    return (
+      <ErrorNotice
+        what="What workers do cannot be shown."
+        error={found.error}
+        retry={found.reload}
+      />
+    )
+  }
+  if (!found.data) return <Loading what="what workers do" />
+  if (found.data.reason !== null) {
+    return (
+      <section class="card">
+        <Empty title="Nothing is known of its run">
+          <p>{sentence(found.data.reason)}</p>
+        </Empty>
+      </section>
+    )
+  }
+  return (
+    <div class="stack">
+      <TimelineCard activity={found.data} />
+      <div class="grid">
+        <WorkersCard workers={found.data.workers} />
+        <LogCard messages={found.data.messages} level={level} onLevel={setLevel} />
+      </div>
+    </div>
+  )
+}
+
+type Worker = Activity['workers'][number]
+
+function counted(key: 'tasks' | 'walks' | 'failures', label: string): Column<Worker> {
+  return {
+    key,
+    label,
+    numeric: true,
+    value: (worker) => worker[key],
+    cell: (worker) => formatCount(worker[key]),
+  }
+}
+
+const WORKER_COLUMNS: readonly Column<Worker>[] = [
+  {
+    key: 'name',
+    label: 'Machine',
+    header: true,
+    value: ({ name }) => name,
+    cell: ({ name, error }) => (
+      <>
+        {name || 'no answer'}
+        {error && <span class="wrong block small">{error}</span>}
+      </>
+    ),
+  },
+  {
+    key: 'seen',
+    label: 'Last seen',
+    value: ({ last_seen_at }) => last_seen_at,
+    cell: ({ last_seen_at }) => formatMoment(last_seen_at),
+  },
+  counted('tasks', 'Tasks'),
+  counted('walks', 'Walks'),
+  counted('failures', 'Failures'),
+  {
+    key: 'computed',
+    label: 'Computed',
+    unit: 's',
+    numeric: true,
+    value: ({ compute_seconds }) => compute_seconds,
+    cell: ({ compute_seconds }) => formatNumber(compute_seconds, 3),
+  },
+]
+
+function WorkersCard({ workers }: { workers: readonly Worker[] }) {
+  return (
+    <section class="card" aria-labelledby="workers">
+      <h2 id="workers">Workers</h2>
+      {workers.length === 0 ? (
+        <Empty title="No worker has answered yet" />
+      ) : (
+        <Table
+          caption="Workers of the job"
+          rows={workers}
+          rowKey={({ name }) => name}
+          columns={WORKER_COLUMNS}
+        />
+      )}
+    </section>
+  )
+}
+
+function LogCard({
+  messages,
+  level,
+  onLevel,
+}: {
+  messages: Activity['messages']
+  level: Level
+  onLevel: (level: Level) => void
+}) {
+  return (
+    <section class="card" aria-labelledby="log">
+      <header class="row spread">
+        <h2 id="log">Log</h2>
+        <select
+          aria-label="Least grave messages"
+          value={level}
+          onChange={(event) => onLevel(event.currentTarget.value as Level)}
+        >
+          {LEVELS.map((name) => (
+            <option key={name} value={name}>
+              from {name.toLowerCase()} on
+            </option>
+          ))}
+        </select>
+      </header>
+      {messages.length === 0 ? (
+        <Empty title="Nothing was written">
+          <p>
+            The server keeps the last lines that belong to a job, as grave as its own log level.
+          </p>
+        </Empty>
+      ) : (
+        // A box that scrolls must take the keyboard.
+        <section class="log-lines" tabIndex={0} aria-label="Lines of the log, the newest first">
+          <ol>
+            {[...messages].reverse().map((message, k) => (
+              <li key={`${message.at} ${k}`} data-level={message.level}>
+                <time dateTime={message.at}>{formatMoment(message.at)}</time>{' '}
+                <strong>{message.level.toLowerCase()}</strong> {message.text}
+              </li>
+            ))}
+          </ol>
+        </section>
+      )}
+    </section>
+  )
+}

@@ -1,0 +1,139 @@
+/** A timeline of iterations and walks by worker. */
+
+import { useMemo } from 'preact/hooks'
+import type { Activity } from '../../api/types'
+import { ChartFrame } from '../../components/chart-frame'
+import { Empty } from '../../components/feedback'
+import { type Column, Table } from '../../components/table'
+import { formatCount, formatNumber } from '../../format/number'
+import { formatMoment } from '../../format/time'
+import { type Bar, type Lane, type Timeline, timelineOf } from './timeline'
+
+/** Tasks that are drawn; more of them are a blur. */
+const MOST = 300
+/** Of a lane's own coordinates, which are stretched to its box. */
+const WIDTH = 1000
+
+export function TimelineCard({ activity }: { activity: Activity }) {
+  const timeline = useMemo(() => timelineOf(activity, MOST), [activity])
+  const drawn = Math.min(MOST, activity.tasks.length)
+  return (
+    <ChartFrame
+      title="Timeline"
+      note={`The last ${formatCount(drawn)} tasks over ${formatNumber(timeline.seconds, 3)} s, by the machine that walked them; lines show where iterations begin.`}
+      legend={
+        <>
+          <LegendEntry of="task-computed" label="computing" />
+          <LegendEntry of="task-waiting" label="on its way or waiting" />
+          <LegendEntry of="task-failed" label="without a result" />
+        </>
+      }
+      table={() => <TaskTable tasks={activity.tasks} />}
+    >
+      {drawn === 0 ? (
+        <Empty title="No task has ended yet" />
+      ) : (
+        <div class="timeline" role="img" aria-label={inWords(timeline)}>
+          {timeline.workers.map(({ worker, lanes }) => (
+            <div class="timeline-worker" key={worker} data-worker={worker}>
+              <span class="small">{worker || 'no answer'}</span>
+              <div>
+                {lanes.map((lane, k) => (
+                  <LaneRow key={k} lane={lane} timeline={timeline} />
+                ))}
+              </div>
+            </div>
+          ))}
+        </div>
+      )}
+    </ChartFrame>
+  )
+}
+
+function LegendEntry({ of, label }: { of: string; label: string }) {
+  return (
+    <span>
+      <i class={`swatch ${of}`} aria-hidden="true" />
+      {label}
+    </span>
+  )
+}
+
+function LaneRow({ lane, timeline }: { lane: Lane; timeline: Timeline }) {
+  const x = (seconds: number) => (seconds / timeline.seconds) * WIDTH
+  return (
+    <svg viewBox={`0 0 ${WIDTH} 10`} preserveAspectRatio="none" aria-hidden="true">
+      {lane.map((bar, k) => (
+        <TaskBar key={k} bar={bar} x={x} />
+      ))}
+      {timeline.iterations.map(({ iteration, begun }) => (
+        <line key={iteration} x1={x(begun)} x2={x(begun)} y1={0} y2={10} />
+      ))}
+    </svg>
+  )
+}
+
+function TaskBar({ bar, x }: { bar: Bar; x: (seconds: number) => number }) {
+  const [left, width] = [x(bar.begun), Math.max(1, x(bar.ended - bar.begun))]
+  const box = { y: 1, height: 8 }
+  if (bar.task.error !== null) return <rect class="task-failed" x={left} width={width} {...box} />
+  const computed = width * bar.computed
+  return (
+    <>
+      <rect class="task-waiting" x={left} width={width} {...box} />
+      <rect class="task-computed" x={left + width - computed} width={computed} {...box} />
+    </>
+  )
+}
+
+function inWords({ workers, seconds }: Timeline): string {
+  const each = workers.map(({ worker, lanes }) => {
+    const tasks = lanes.reduce((sum, lane) => sum + lane.length, 0)
+    return `${worker || 'no answer'}: ${tasks} tasks, at most ${lanes.length} at once`
+  })
+  return `Timeline of ${formatNumber(seconds, 3)} s. ${each.join('; ')}`
+}
+
+type Row = { readonly task: Activity['tasks'][number]; readonly number: number }
+
+const COLUMNS: readonly Column<Row>[] = [
+  {
+    key: 'begun',
+    label: 'Begun',
+    header: true,
+    value: ({ task }) => task.begun_at,
+    cell: ({ task }) => formatMoment(task.begun_at),
+  },
+  { key: 'iteration', label: 'Iteration', numeric: true, value: ({ task }) => task.iteration },
+  { key: 'worker', label: 'Machine', value: ({ task }) => task.worker || 'no answer' },
+  { key: 'walks', label: 'Walks', numeric: true, value: ({ task }) => task.walks },
+  {
+    key: 'seconds',
+    label: 'Time',
+    unit: 's',
+    numeric: true,
+    value: ({ task }) => task.seconds,
+    cell: ({ task }) => formatNumber(task.seconds, 3),
+  },
+  {
+    key: 'computed',
+    label: 'Computed',
+    unit: 's',
+    numeric: true,
+    value: ({ task }) => task.compute_seconds,
+    cell: ({ task }) => formatNumber(task.compute_seconds, 3),
+  },
+  { key: 'error', label: 'Why without a result', value: ({ task }) => task.error ?? '' },
+]
+
+function TaskTable({ tasks }: { tasks: Activity['tasks'] }) {
+  const rows = [...tasks].reverse().map((task, number) => ({ task, number }))
+  return (
+    <Table
+      caption="Tasks, the last first"
+      rows={rows}
+      rowKey={({ number }) => String(number)}
+      columns={COLUMNS}
+    />
+  )
+}

@@ -36,7 +36,7 @@ from sim.assembly import PHYSICS_RATE, control_steps, plan_walk
 from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.native import load_kernel
+from sim.kernel.compiled.native import load_kernel
 from sim.kernel.observation import WalkLog
 from sim.kernel.walk import Precision
 from sim.mujoco.mjcf import Surroundings

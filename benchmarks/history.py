@@ -22,7 +22,7 @@ from services.optimizer.analysis.ranking import rank
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job, JobOrder
 from services.optimizer.jobs.preference import PREFERENCES, judge
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.store.sql_store import open_store
 
 ROW_BY_ROW = 100

@@ -27,7 +27,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.jobs.spec import judge_outcomes
 from services.optimizer.jobs.walk_keys import walk_keys
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.store.sql_store import open_store
 
 T = TypeVar("T")

@@ -21,7 +21,7 @@ from services.optimizer.jobs.job import Claim, Command, Job
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.spec import create_optimizer, judge_outcomes
 from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.store.sql_store import open_store
 from sim.outcome import Outcome, Status
 

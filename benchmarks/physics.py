@@ -20,8 +20,8 @@ import pinocchio as pin
 from sim.assembly import PHYSICS_RATE, plan_walk
 from sim.benchmark import measure
 from sim.controllers import CONTROLLERS
-from sim.kernel.physics_step import physics_model
-from sim.kernel.reference import Stepper
+from sim.kernel.dynamics.physics_step import physics_model
+from sim.kernel.readable.reference import Stepper
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS
 

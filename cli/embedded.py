@@ -21,7 +21,7 @@ from services.optimizer.service import JobService
 from services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
 
 if TYPE_CHECKING:
-    from cli.options import WorkerOptions
+    from cli.inputs.options import WorkerOptions
     from cli.progress import Progress
     from gaitswarm.settings import Settings
     from gaitswarm.views import JobView
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from services.optimizer.jobs.job import Claim, Job
     from services.optimizer.jobs.spec import Spec
     from services.optimizer.run.evaluator import Evaluator
-    from services.optimizer.store.base import Store
+    from services.optimizer.store.port.base import Store
 
 
 def resumed_job(
@@ -275,7 +275,7 @@ def _how_to_go_on(job_id: str, place: str) -> str:
 
 def _report(job: JobView, place: str, *, compare: bool, beside: Mapping[str, JobView]) -> None:
     from cli.comparison import published_beside
-    from cli.tables import design_table, results_table, search_line, worth
+    from cli.tables.views import design_table, results_table, search_line, worth
 
     console = stdout_console()
     if job.best is None:

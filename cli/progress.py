@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from cli.exit_codes import JobEnded
 from cli.output import note, stderr_console
-from cli.tables import duration, number
+from cli.tables.views import duration, number
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from cli.atomic_file import replacing
-from cli.validation_table import alignment, confidence, percent, remarks
+from cli.tables.validation import alignment, confidence, percent, remarks
 from services.optimizer.errors import InvalidRequest
 from sim.measurement.measured_log import Quantity
 from sim.validation.measures import Tolerance
@@ -26,8 +26,8 @@ def write_report(
 
     facts: what was compared, by heading. Raises InvalidRequest if the folder cannot be written.
     """
-    from cli.plots import save
-    from cli.validation_plots import draw_errors, draw_leg, draw_spectra
+    from cli.pictures.plots import save
+    from cli.pictures.validation import draw_errors, draw_leg, draw_spectra
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

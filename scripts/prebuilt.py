@@ -18,7 +18,7 @@ from sim.compiler.compilation import PREBUILT, build_library
 from sim.compiler.target import ARM, ARM_TARGET, X86_TARGETS, Target
 from sim.compiler.toolchain import find_compiler
 from sim.controllers.native_inference import inference_source
-from sim.kernel.source import kernel_identity, kernel_source
+from sim.kernel.emitted.source import kernel_identity, kernel_source
 from sim.kernel.walk import Precision
 from sim.robot.shipped import SHIPPED, shipped_robot
 

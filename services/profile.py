@@ -14,7 +14,7 @@ from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.store.sql_store import open_store
 from services.worker import EvaluatorKind
 from services.worker.in_process import InProcessEvaluator

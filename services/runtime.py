@@ -20,7 +20,7 @@ from services.optimizer.run.embedded import run_embedded
 from services.optimizer.run.evaluator import Evaluator, Watched
 from services.optimizer.run.runner import Runner
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.store.sql_store import open_store
 from services.worker import EvaluatorKind
 from services.worker.hybrid import HybridEvaluator

@@ -17,7 +17,7 @@ from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import SimulationInputError
 from sim.gait.feed_forward import carrying_torques
 from sim.gait.trajectory import Trajectory, desired_angles
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
 from sim.kernel.parameters import (
     GRAVITY,
     SHOVE_DURATION,
@@ -90,7 +90,7 @@ def kernel_of(
             stacklevel=3,
         )
     # The native kernel does without CasADi and Pinocchio, which are slow to import.
-    from sim.kernel.reference import reference_kernel  # noqa: PLC0415
+    from sim.kernel.readable.reference import reference_kernel  # noqa: PLC0415
 
     return reference_kernel(robot)
 

@@ -11,7 +11,7 @@ import numpy as np
 from sim.assembly import PHYSICS_RATE, Backend, kernel_of
 from sim.controllers import CONTROLLERS
 from sim.kernel.batch import KernelTime, walk_together
-from sim.kernel.native import NativeKernel
+from sim.kernel.compiled.native import NativeKernel
 from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT, load_robot
 from sim.scenario import SCENARIOS, Scenario

@@ -24,7 +24,7 @@ from typing import Any
 
 from benchmarks.load.filled import fill_with
 from benchmarks.load.trial import Found, Load, run
-from services.optimizer.store.backup import backup, restore
+from services.optimizer.store.schema.backup import backup, restore
 from services.runtime import open_store
 from tests.store.postgres_server import postgres_server, server_binaries
 

@@ -9,7 +9,7 @@ from benchmarks.large_store import PARTICLES, fill
 from services.optimizer.jobs.fork import ForkRequest
 from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 LONG: Final = 100_000
 """Evaluations of the longest job."""

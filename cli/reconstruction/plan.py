@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from cli.spec_file import parse_spec
-from cli.target_file import read_targets
+from cli.inputs.spec_file import parse_spec
+from cli.inputs.target_file import read_targets
 from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from sim.robot.shipped import DEFAULT_ROBOT
 

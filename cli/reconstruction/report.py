@@ -37,7 +37,7 @@ def write_report(folder: Path, found: Evidence) -> Path:
     Raises:
         InvalidRequest: A file cannot be written.
     """
-    from cli.plots import save
+    from cli.pictures.plots import save
     from cli.reconstruction.pictures import draw_choices, draw_exclusion, draw_targets
 
     save(draw_targets(found), folder / "targets.svg")

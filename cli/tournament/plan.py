@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from cli.spec_file import parse_spec
+from cli.inputs.spec_file import parse_spec
 from services.optimizer.analysis.tournaments.entrants import NAME_PREFIX
 from services.optimizer.analysis.tournaments.standings import looked_at
 from services.optimizer.errors import InvalidRequest

@@ -31,10 +31,10 @@ from services.optimizer.service import JobService
 from services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
 
 if TYPE_CHECKING:
-    from cli.options import WorkerOptions
+    from cli.inputs.options import WorkerOptions
     from gaitswarm.settings import Settings
     from services.optimizer.run.evaluator import Evaluator
-    from services.optimizer.store.base import Store
+    from services.optimizer.store.port.base import Store
 
 RUNS_FILE: Final = "runs.parquet"
 

@@ -27,7 +27,7 @@ from services.optimizer.jobs.iteration import Reevaluation, best_particle
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.provenance import RECORDS, job_provenance
 from services.optimizer.search.registry import METHODS
-from sim.kernel.source import kernel_identity
+from sim.kernel.emitted.source import kernel_identity
 from sim.robot import load_robot
 
 Floats = NDArray[np.float64]

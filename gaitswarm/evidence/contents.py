@@ -33,7 +33,7 @@ from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.service import JobService
-from sim.kernel.source import kernel_identity
+from sim.kernel.emitted.source import kernel_identity
 from sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
 
 JOB: Final = "job.json"

@@ -12,7 +12,7 @@ from services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.store.reading import Page
+from services.optimizer.store.port.reading import Page
 
 _PAGE: Final = 200
 

@@ -11,7 +11,7 @@ from prometheus_client.registry import Collector
 
 from services.monitoring.metrics import FAILURE_CAUSES, failure_cause
 from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 
 class QueueCollector(Collector):

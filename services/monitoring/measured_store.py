@@ -15,7 +15,7 @@ from services.optimizer.errors import LeaseLost, StoreUnavailable
 from services.optimizer.jobs.estimate import duration
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.outcome import Status
 
 _LOSSES_KEPT: Final = 256

@@ -20,7 +20,7 @@ from services.optimizer.errors import LeaseLost
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, JobState, Renewal
 from services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.outcome import Outcome
 
 

@@ -20,7 +20,7 @@ import httpx2
 
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.notification import Notification, refused_url
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 _TIMEOUT: Final = 10.0
 """Longest silence of a receiver [s]."""

@@ -6,7 +6,7 @@ from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.job import Command, Job
 from services.optimizer.jobs.priority import check_priority
 from services.optimizer.jobs.quota import Quota
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 
 class Commands:

@@ -10,7 +10,7 @@ from typing import Final
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.job import Job
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 _SECONDS_PER_ROUND: Final = 10.0
 _ROUNDS_PER_RETENTION: Final = 360

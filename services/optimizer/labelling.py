@@ -5,8 +5,8 @@ from __future__ import annotations
 from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.job import Job, JobOrder, JobState
 from services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
-from services.optimizer.store.base import Store
-from services.optimizer.store.reading import Page
+from services.optimizer.store.port.base import Store
+from services.optimizer.store.port.reading import Page
 
 
 class Labelling:

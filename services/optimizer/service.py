@@ -27,7 +27,7 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.labelling import Labelling
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from services.optimizer.run.runner import runner_name
-from services.optimizer.store.reading import Page
+from services.optimizer.store.port.reading import Page
 from sim.identification.recorded_walk import RecordedWalk
 
 _EARLIER: Final = 50

@@ -30,7 +30,7 @@ from sim.firmware.memory import Memory
 from sim.firmware.readme import readme
 from sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
 from sim.gait_variables import GAIT_CATALOGUE
-from sim.kernel.source import control_tick
+from sim.kernel.emitted.source import control_tick
 from sim.outcome import OBJECTIVE_NAMES
 from sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
 from sim.robot.description import JOINTS_PER_LEG

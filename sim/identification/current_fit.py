@@ -14,7 +14,7 @@ from sim.errors import SimulationInputError
 from sim.gait.trajectory import desired_angles
 from sim.gait_variables import with_gait
 from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.electrical import supply_voltage
+from sim.kernel.dynamics.electrical import supply_voltage
 from sim.kernel.observation import sensed_currents, split_states
 from sim.kernel.walk import Precision
 from sim.outcome import Objective, Outcome, Status

@@ -131,7 +131,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         The log; rows after an early end stay NaN.
     """
     # Logs are rare: they alone need CasADi in a process that has a compiled kernel.
-    from sim.kernel.physics_step import physics_model  # noqa: PLC0415
+    from sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
 
     observe = physics_model(robot).observe
     feet, ticks = len(robot.legs), len(states)

@@ -58,7 +58,7 @@ CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
         "dead_zone": ContactData((*_NORMAL, "slip_velocity", "stick_velocity")),
     }
 )
-"""By name; their formulas are in `sim.kernel.contact`."""
+"""By name; their formulas are in `sim.kernel.dynamics.contact`."""
 
 
 def internal_state_size(robot: Robot) -> int:

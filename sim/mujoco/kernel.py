@@ -17,10 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.control_tick import Past, coded, control, low_pass, padded_states, status_of
 from sim.kernel.gains import check_gains
-from sim.kernel.joint_pd import InnerLoop
 from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
+from sim.kernel.readable.control_tick import (
+    Past,
+    coded,
+    control,
+    low_pass,
+    padded_states,
+    status_of,
+)
+from sim.kernel.readable.joint_pd import InnerLoop
 from sim.kernel.sensors import Sensors
 from sim.kernel.walk import (
     INTEGRANDS,

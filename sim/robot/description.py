@@ -93,7 +93,7 @@ class Sensors(Data):
 
 
 ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
-"""How a sole rubs on the ground; see `sim.kernel.contact`."""
+"""How a sole rubs on the ground; see `sim.kernel.dynamics.contact`."""
 
 
 PlannedSoles = Literal["nominal", "own"]

@@ -16,7 +16,7 @@ from sim.controllers.base import ControlLaw
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.quantisation import Axis
 from sim.errors import SimulationInputError
-from sim.kernel.reference import reference_kernel
+from sim.kernel.readable.reference import reference_kernel
 from sim.noise import LinkNoise
 from sim.outcome import Status
 from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot

@@ -19,7 +19,7 @@ from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.runtime import open_evaluator, run_embedded
 from sim.outcome import Status
 from tests.certificate.examples import DOCUMENT, columns, small

@@ -15,7 +15,7 @@ from services.optimizer.jobs.job import JobState
 from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.runtime import open_evaluator, run_embedded
 from sim.simulate import simulate
 from sim.worlds import WorldWalk

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.target_file import read_targets
+from cli.inputs.target_file import read_targets
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from tests.cli.conftest import Gaitswarm

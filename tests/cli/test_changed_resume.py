@@ -49,7 +49,7 @@ def changed_simulator(folder: Path, file: str, old: str, new: str) -> str:
 def other_kernel_code(folder: Path) -> dict[str, str]:
     return {
         "PYTHONPATH": changed_simulator(
-            folder, "kernel/tick.c", "CODE_LIMIT 65535", "CODE_LIMIT 255"
+            folder, "kernel/emitted/tick.c", "CODE_LIMIT 65535", "CODE_LIMIT 255"
         )
     }
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from cli.controllers_study import Budget, comparisons, study_document, study_table
+from cli.studies.controllers import Budget, comparisons, study_document, study_table
 from gaitswarm.jobs.database.embedded import earlier_job
 from services.optimizer.jobs.job import Command, Job
 from services.optimizer.search.registry import OPTIMIZERS

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cli.exit_codes import ExitCode
 from services.optimizer.jobs.job import Command
-from services.optimizer.store.revisions import head
+from services.optimizer.store.schema.revisions import head
 from services.optimizer.store.sql_store import open_store
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.store.examples import spec

@@ -7,7 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
-from cli.fitted_table import Table
+from cli.tables.fitted import Table
 
 ROWS = [
     ("wnb852gbnr7w", "first try on slopes", "succeeded", "18.1539"),

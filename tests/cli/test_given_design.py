@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.design_file import GivenDesign, given_design
+from cli.inputs.design_file import GivenDesign, given_design
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.store.sql_store import SqlStore
 from tests.calibration.conftest import spec as calibration

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.job_ids import full_id
+from cli.inputs.job_ids import full_id
 from gaitswarm.jobs.open import open_jobs
 from services.optimizer.errors import InvalidRequest
 from tests.cli.conftest import Finished, Gaitswarm

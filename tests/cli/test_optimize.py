@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cli.spec_file import LARGEST_FILE
+from cli.inputs.spec_file import LARGEST_FILE
 from services.runtime import open_store
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.jobs import SMALL_SPEC

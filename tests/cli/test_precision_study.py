@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cli.precision_study import (
+from cli.studies.precision import (
     LAWS,
     Variant,
     agreement,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cli.comparison import published_beside
-from cli.design_file import read_design
+from cli.inputs.design_file import read_design
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.reference import on_the_jobs_terms

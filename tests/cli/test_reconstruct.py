@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cli.inputs.target_file import read_targets
 from cli.reconstruction.alternatives import alternatives, default_choice, simulated_targets
 from cli.reconstruction.bound import greatest_product
 from cli.reconstruction.optimality import OPTIMA, optimality, random_designs
 from cli.reconstruction.plan import TARGETS, Size, calibrations
-from cli.target_file import read_targets
 from services.optimizer.jobs.preference import PREFERENCES, judge
 from sim.controllers import CONTROLLERS
 from sim.gait.driving_2011 import driven_as_in_2011

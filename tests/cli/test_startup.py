@@ -10,7 +10,7 @@ import pytest
 from cli.exit_codes import ExitCode
 from services.profile import profile_job
 from sim.assembly import PHYSICS_RATE
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
 from sim.kernel.walk import Precision
 from sim.robot import DEFAULT_ROBOT, load_robot
 from sim.simulate import lanes, prepare

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cli.worlds_study import (
+from cli.studies.worlds import (
     Contestant,
     HeldOut,
     Run,

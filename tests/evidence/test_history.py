@@ -96,10 +96,10 @@ def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
     copy: Path, proved: Proved
 ) -> None:
     """Whoever can write to the database can chain it anew; walks cannot be made up."""
-    from services.optimizer.store.chain import chain_taken
-    from services.optimizer.store.engine import connect, parse_url
-    from services.optimizer.store.job_rows import chain_documents
-    from services.optimizer.store.records import job_row
+    from services.optimizer.store.connections.engine import connect, parse_url
+    from services.optimizer.store.rows.job_rows import chain_documents
+    from services.optimizer.store.statements.chain import chain_taken
+    from services.optimizer.store.statements.records import job_row
 
     with closing(sqlite3.connect(copy)) as connection:
         (text,) = connection.execute(

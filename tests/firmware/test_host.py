@@ -9,7 +9,7 @@ import pytest
 
 from gaitswarm.firmware import write_firmware
 from sim.controllers import ControllerName
-from sim.kernel.source import kernel_source
+from sim.kernel.emitted.source import kernel_source
 from sim.robot import RobotVariant, load_robot
 from sim.scenario import SCENARIOS
 from tests.examples.paths import QUADRUPED, ROOT

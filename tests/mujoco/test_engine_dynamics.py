@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sim.kernel.dynamics.physics_step import physics_model
 from sim.kernel.parameters import pack_parameters
-from sim.kernel.physics_step import physics_model
 from sim.mujoco.gears import Gears, LooseGears
 from sim.mujoco.ground import Ground, Stick
 from sim.mujoco.model import model

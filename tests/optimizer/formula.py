@@ -15,7 +15,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import JobProvenance, with_record
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.case import Walk
 from sim.outcome import Outcome, Status
 from sim.provenance import Provenance

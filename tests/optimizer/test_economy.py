@@ -18,7 +18,7 @@ from services.optimizer.jobs.walk_keys import walk_keys
 from services.optimizer.run.economy import evaluate_unknown
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import Outcome
 from tests.examples.jobs import history

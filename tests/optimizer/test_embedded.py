@@ -18,7 +18,7 @@ from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.store.sql_store import open_store
 from sim.outcome import Outcome
 from tests.optimizer.formula import SPEC, FormulaEvaluator

@@ -12,7 +12,7 @@ from services.optimizer.jobs.job import LARGEST_BUDGET, Claim, Command, Job, Job
 from services.optimizer.run.coordinator import Coordination, handle
 from services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
 from services.optimizer.run.execution import OnCommit, Surroundings, run_claim
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from tests.examples.jobs import Bits, history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
 

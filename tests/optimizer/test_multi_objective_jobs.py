@@ -22,7 +22,7 @@ from services.optimizer.jobs.preference import PREFERENCES, judge
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.tournament.methods import method_names
 from tests.calibration.conftest import spec as calibration
 from tests.examples.jobs import history

@@ -27,7 +27,7 @@ from services.optimizer.run.events import (
     Wait,
     Waited,
 )
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.outcome import Outcome, Status
 from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator, job, queue, walk
 from tests.optimizer.formula import run as run_job

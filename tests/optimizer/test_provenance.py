@@ -35,7 +35,7 @@ from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Rele
 from services.optimizer.run.execution import OnCommit, Surroundings, run_claim
 from services.optimizer.search.registry import create_search
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.optimizer.tournament.race import race
 from sim.errors import RobotFileError
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job

@@ -24,7 +24,7 @@ from services.optimizer.run.evaluator import EvaluationRequest
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.run.outage import Backoff
 from services.optimizer.run.runner import Runner
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.errors import KernelBuildError, SimulationInputError
 from sim.outcome import Outcome
 from tests.examples.jobs import history

@@ -12,7 +12,7 @@ import pytest
 
 from services.optimizer.jobs.job import JobState
 from services.optimizer.run.runner import STUCK_SECONDS, Runner
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from tests.examples.jobs import history
 from tests.examples.processes import eventually
 from tests.optimizer.formula import SPEC, FormulaEvaluator, queue, run

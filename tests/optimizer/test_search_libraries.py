@@ -13,7 +13,7 @@ from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from services.optimizer.search.registry import METHODS, OPTIMIZERS
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from tests.optimizer.formula import HERE, SPEC
 
 OPTIONAL = ("pymoo", "PyNomad", "scipy.stats", "sklearn")

@@ -16,7 +16,7 @@ from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.embedded import run_embedded
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
 

@@ -19,7 +19,7 @@ from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.preference import PREFERENCES, log_utilities
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.runtime import open_evaluator, run_embedded
 from sim.worlds import PERTURBATIONS, WorldWalk, sample_worlds
 from tests.examples.jobs import history

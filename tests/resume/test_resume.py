@@ -18,7 +18,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
 from services.optimizer.search.evolution.hype import HypeSettings
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.runtime import open_evaluator, open_store, run_embedded
 from tests.examples.forked import PROCESSES
 from tests.examples.jobs import history

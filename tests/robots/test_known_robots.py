@@ -15,8 +15,8 @@ from cli.main import run
 from gaitswarm.robots import init_robot, standing_drive, standing_scenario
 from sim.errors import RobotFileError
 from sim.gait.trajectory import require_reachable
+from sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
 from sim.kernel.parameters import pack_parameters
-from sim.kernel.physics_step import PhysicsModel, physics_model
 from sim.outcome import Status
 from sim.proposal.document import propose_robot
 from sim.robot import Robot, parse_robot

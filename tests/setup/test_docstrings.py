@@ -16,6 +16,7 @@ FILES = (
     "services/optimizer/analysis/**/*.py",
     "services/optimizer/tournament/*.py",
     "services/optimizer/store/*.py",
+    "services/optimizer/store/*/*.py",
     "services/optimizer/run/*.py",
     "services/optimizer/service.py",
     "services/worker/*.py",
@@ -33,7 +34,7 @@ TREES = {
     for path in ROOT.glob(pattern)
 }
 
-ALGEBRA = "sim/kernel/spatial.py"
+ALGEBRA = "sim/kernel/dynamics/spatial.py"
 """Here a formula of its arguments says what a function does."""
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

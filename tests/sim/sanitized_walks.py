@@ -19,7 +19,7 @@ from sim.controllers.base import JointPd
 from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
 from sim.controllers.mamdani import Shape
 from sim.controllers.native_inference import compiled_table
-from sim.kernel.native import NativeKernel
+from sim.kernel.compiled.native import NativeKernel
 from sim.kernel.walk import Precision
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot

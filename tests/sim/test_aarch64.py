@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from sim.compiler.target import target
-from sim.kernel.native import NativeKernel, native_kernel
-from sim.kernel.source import kernel_source
+from sim.kernel.compiled.native import NativeKernel, native_kernel
+from sim.kernel.emitted.source import kernel_source
 from sim.kernel.walk import Precision
 from sim.scenario import SCENARIOS
 from tests.sim.emulated import EmulatedLibrary, tools_for_arm

@@ -9,13 +9,23 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.kernel.articulated_body import LinkState
-from sim.kernel.body import body_of, body_state
-from sim.kernel.limb import links_at
+from sim.kernel.dynamics.articulated_body import LinkState
+from sim.kernel.dynamics.body import body_of, body_state
+from sim.kernel.dynamics.limb import links_at
+from sim.kernel.dynamics.physics_step import physics_model
+from sim.kernel.dynamics.rotation import Rotation
+from sim.kernel.dynamics.spatial import (
+    Matrix,
+    add,
+    apply,
+    cross,
+    dot,
+    inverse,
+    matrix,
+    scale,
+    vector,
+)
 from sim.kernel.parameters import Floats, gravity_on, pack_parameters
-from sim.kernel.physics_step import physics_model
-from sim.kernel.rotation import Rotation
-from sim.kernel.spatial import Matrix, add, apply, cross, dot, inverse, matrix, scale, vector
 from sim.robot import Robot
 from sim.robot.limbs import limbs_of
 from tests.examples.walks import STEEP, random_state

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim.calibration.walk import CalibrationWalk
 from sim.case import Case, MeasuredWalk, Walk, run_together
 from sim.kernel.batch import Walking, walk_together
-from sim.kernel.native import NativeKernel
+from sim.kernel.compiled.native import NativeKernel
 from sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
 from sim.outcome import Objective, Outcome
 from sim.robot import RobotSource

@@ -13,8 +13,8 @@ from sim.compiler.target import Target, target
 from sim.compiler.toolchain import find_compiler
 from sim.controllers.native_inference import inference_source
 from sim.errors import KernelBuildError
-from sim.kernel.native import load_kernel, native_kernel
-from sim.kernel.source import kernel_identity, kernel_source
+from sim.kernel.compiled.native import load_kernel, native_kernel
+from sim.kernel.emitted.source import kernel_identity, kernel_source
 from sim.kernel.walk import Precision
 from sim.robot import RobotFiles, RobotVariant, load_robot
 from tests.examples.walks import torque_quadruped_files

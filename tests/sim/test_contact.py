@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.kernel.articulated_body import LinkState
-from sim.kernel.contact import FRICTION, foot_on_ground
-from sim.kernel.inertia import Motion
+from sim.kernel.dynamics.articulated_body import LinkState
+from sim.kernel.dynamics.contact import FRICTION, foot_on_ground
+from sim.kernel.dynamics.inertia import Motion
 from sim.kernel.parameters import CONTACT_LAWS
 from sim.robot.description import ContactLaw
 

@@ -11,9 +11,9 @@ import pytest
 from sim.assembly import control_steps, plan_walk
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw, LookupTable
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
 from sim.kernel.observation import sensed_currents, walk_log
-from sim.kernel.reference import reference_kernel
+from sim.kernel.readable.reference import reference_kernel
 from sim.kernel.walk import Coding, current_smoothing
 from sim.robot import Robot, load_robot
 from tests.examples.robots import changed

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
 from sim.kernel.parameters import gravity_on, pack_parameters
-from sim.kernel.physics_step import PhysicsModel, physics_model
 from sim.robot import Robot, parse_robot
 from sim.scenario import SCENARIOS
 from tests.examples.walks import random_state, short_walk

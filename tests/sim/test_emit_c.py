@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sim.compiler.compilation import load_library, vector_header
 from sim.compiler.target import Target, target
 from sim.errors import SimulationError
-from sim.kernel.emit_c import emit_c
+from sim.kernel.emitted.emit_c import emit_c
 
 Floats = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from sim.compiler.target import X86, Target, host_architecture, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw, LookupTable
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.native import NativeKernel, load_kernel, native_kernel
+from sim.kernel.compiled.native import NativeKernel, load_kernel, native_kernel
 from sim.kernel.observation import walk_log
-from sim.kernel.reference import ReferenceKernel, reference_kernel
+from sim.kernel.readable.reference import ReferenceKernel, reference_kernel
 from sim.kernel.walk import Coding, Kernel, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot

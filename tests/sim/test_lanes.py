@@ -15,9 +15,9 @@ import pytest
 
 from sim.assembly import control_steps, plan_walk
 from sim.controllers import CONTROLLERS
-from sim.kernel.native import NativeKernel, native_kernel
-from sim.kernel.reference import reference_kernel
-from sim.kernel.sharing import LaneCounts, Pool
+from sim.kernel.compiled.native import NativeKernel, native_kernel
+from sim.kernel.compiled.sharing import LaneCounts, Pool
+from sim.kernel.readable.reference import reference_kernel
 from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import RobotVariant, load_robot

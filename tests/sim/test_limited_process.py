@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from sim.errors import KernelBuildError, ProcessEnded, RobotFileError, SimulationInputError
-from sim.kernel import derivation
-from sim.kernel.source import kernel_source
+from sim.kernel.compiled import derivation
+from sim.kernel.emitted.source import kernel_source
 from sim.limited_process import LimitedProcesses
 from sim.robot import check, load_robot
 from sim.robot.check import check_files

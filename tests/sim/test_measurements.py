@@ -10,7 +10,7 @@ import pytest
 
 from sim.assembly import Backend, control_steps, measure, plan_walk
 from sim.controllers import CONTROLLERS
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
 from sim.kernel.observation import walk_log
 from sim.kernel.walk import Coding
 from sim.outcome import MEASUREMENT_NAMES, Measurements, Status

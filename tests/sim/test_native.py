@@ -15,10 +15,10 @@ import pytest
 from sim.compiler.compilation import build_library, load_library, vector_header
 from sim.compiler.toolchain import COMPILER_MEMORY
 from sim.errors import KernelBuildError, SimulationInputError
-from sim.kernel.kinds import robot_constants
-from sim.kernel.native import NativeKernel, native_kernel, text_size
+from sim.kernel.compiled.native import NativeKernel, native_kernel, text_size
+from sim.kernel.emitted.kinds import robot_constants
 from sim.kernel.parameters import Layout
-from sim.robot import Robot, RobotFiles, load_robot
+from sim.robot import DEFAULT_ROBOT, Robot, RobotFiles, load_robot
 from sim.simulate import prepare
 from tests.sim.processes import ROOT, run_python
 
@@ -68,7 +68,7 @@ def test_processes_that_start_together_share_one_compilation(tmp_path: Path) -> 
 
 
 def test_a_process_with_a_warm_cache_needs_neither_casadi_nor_pinocchio() -> None:
-    assert native_kernel(load_robot("szabadka2")) is not None
+    assert native_kernel(load_robot(DEFAULT_ROBOT)) is not None
     done = run_python(
         "import sys\n"
         "from sim.benchmark import measure\n"
@@ -184,8 +184,8 @@ def test_a_compiler_has_limits_of_memory_and_of_a_processors_time(tmp_path: Path
 LOAD_QUADRUPED = """
 import os
 from pathlib import Path
-from sim.kernel.kinds import robot_constants
-from sim.kernel.native import native_kernel
+from sim.kernel.emitted.kinds import robot_constants
+from sim.kernel.compiled.native import native_kernel
 from sim.robot import RobotFiles, load_robot
 files = Path(os.environ["FILES"])
 toml, urdf = ((files / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
@@ -195,8 +195,8 @@ COMPILE_ANOTHER = """
 import os, threading
 from pathlib import Path
 from sim.errors import KernelBuildError, SimulationInputError
-from sim.kernel.kinds import robot_constants
-from sim.kernel.native import native_kernel
+from sim.kernel.emitted.kinds import robot_constants
+from sim.kernel.compiled.native import native_kernel
 from sim.robot import load_robot
 def compile_another():
     try:
@@ -245,21 +245,16 @@ def test_integers_wrap_rather_than_let_the_compiler_assume_that_they_never_do() 
 def test_a_source_is_derived_without_the_files_that_its_identity_leaves_out() -> None:
     done = run_python(
         "import sys\n"
-        "from sim.kernel.source import kernel_source\n"
+        "from sim.kernel.emitted.source import kernel_source\n"
         "from sim.robot import load_robot\n"
         "kernel_source(load_robot('szabadka2'))\n"
         "print(*sorted(name for name in sys.modules if name.startswith('sim.kernel.')))"
     )
     derived_by = {name.removeprefix("sim.kernel.") for name in done.stdout.split()}
-    assert {"articulated_body", "emit_c", "source"} <= derived_by, done.stderr
-    assert not derived_by & {
-        "native",
-        "observation",
-        "physics_step",
-        "reference",
-        "sensors",
-        "walk",
-    }
+    assert {"dynamics.articulated_body", "emitted.emit_c", "emitted.source"} <= derived_by, (
+        done.stderr
+    )
+    assert {name.split(".")[0] for name in derived_by} == {"dynamics", "emitted", "parameters"}
 
 
 def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_path: Path) -> None:
@@ -267,7 +262,7 @@ def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_p
 
     def identity() -> str:
         done = run_python(
-            "from sim.kernel.source import kernel_identity\n"
+            "from sim.kernel.emitted.source import kernel_identity\n"
             "from sim.robot import load_robot\n"
             "print(kernel_identity(load_robot('szabadka2')).hex())",
             PYTHONPATH=str(tmp_path),
@@ -277,12 +272,12 @@ def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_p
 
     kernel = tmp_path / "sim" / "kernel"
     found = [identity()]
-    for changed in (kernel / "tick.c", kernel / "spatial.py", kernel / "a_new_law.py"):
-        with changed.open("a") as file:
+    for changed in ("emitted/tick.c", "dynamics/spatial.py", "emitted/a_new_law.py"):
+        with (kernel / changed).open("a") as file:
             file.write("\n")
         found.append(identity())
     assert len(set(found)) == len(found)
-    with (kernel / "reference.py").open("a") as file:
+    with (kernel / "readable/reference.py").open("a") as file:
         file.write("\n")
     assert identity() == found[-1]
 
@@ -298,7 +293,7 @@ IDENTITIES = """
 import os, sys
 from pathlib import Path
 import sim.kernel
-from sim.kernel.source import kernel_identity
+from sim.kernel.emitted.source import kernel_identity
 from sim.robot import load_robot
 robot, folder = load_robot("szabadka2"), Path(sim.kernel.__file__).parent
 for name in ["unchanged", *sys.argv[1:]]:
@@ -315,14 +310,19 @@ for name in ["unchanged", *sys.argv[1:]]:
 
 def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_path: Path) -> None:
     used = run_python(
-        "import sys, sim.kernel.emit_c, sim.kernel.pieces, sim.kernel.source\n"
-        "print(*(name for name in sys.modules if name.startswith('sim.kernel.')))"
+        "import sys\n"
+        "from sim.kernel.emitted import emit_c, pieces, source\n"
+        "print(*(module.__file__ for name, module in sys.modules.items()"
+        " if name.startswith('sim.kernel.')), sep='\\n')"
     )
+    kernel = ROOT / "sim/kernel"
     files = [
-        *(path.name for path in (ROOT / "sim/kernel").glob("*.[ch]")),
-        *(f"{name.split('.')[-1]}.py" for name in used.stdout.split()),
+        *(str(path.relative_to(kernel)) for path in kernel.rglob("*.[ch]")),
+        *(str(Path(line).relative_to(kernel)) for line in used.stdout.splitlines()),
     ]
-    assert {"tick.c", "pool.c", "pieces.py", "limb.py", "contact.py"} < set(files)
+    assert {
+        "emitted/tick.c", "emitted/pool.c", "emitted/pieces.py", "dynamics/limb.py", "parameters.py"
+    } < set(files)  # fmt: skip
     shutil.copytree(ROOT / "sim", tmp_path / "sim", ignore=shutil.ignore_patterns("__pycache__"))
     done = subprocess.run(
         [sys.executable, "-B", "-c", IDENTITIES, *files],

@@ -8,8 +8,8 @@ from pydantic import ValidationError
 
 from sim.assembly import plan_walk
 from sim.errors import SimulationInputError
+from sim.kernel.dynamics.physics_step import physics_model
 from sim.kernel.parameters import pack_parameters
-from sim.kernel.physics_step import physics_model
 from sim.noise import LinkNoise
 from sim.robot import Robot, load_robot
 from sim.robot.robot import with_shafts

@@ -26,7 +26,7 @@ from sim.simulate import prepare
 short = Scenario(name="short", cycle_time=0.6, radius=0.16, hip_height=0.15, cycles=1)
 Walk("szabadka2", "pi", short, ("P", "I")).run(np.array([[0.3, 0.1]]))
 prepare(backend="reference")
-from sim.kernel import emit_c
+from sim.kernel.emitted import emit_c
 files = [m.__file__ for name, m in sys.modules.items() if name.startswith("sim.")]
 print(json.dumps([provenance_of("szabadka2").model_dump(), files]))
 """
@@ -47,7 +47,7 @@ def test_all_modules_that_a_case_runs_through_are_in_the_digest_which_any_proces
     assert Provenance(**found) == provenance_of("szabadka2")
     covered = set(simulator_files())
     assert {Path(file) for file in loaded} - covered == {ROOT / "sim" / "provenance.py"}
-    for source in ("kernel/driver.c", "controllers/estimate.c", "compiler/vec.h"):
+    for source in ("kernel/emitted/driver.c", "controllers/estimate.c", "compiler/vec.h"):
         assert ROOT / "sim" / source in covered
 
 

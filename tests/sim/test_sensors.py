@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from sim.assembly import control_steps, plan_walk
 from sim.controllers import control_law
 from sim.errors import SimulationInputError
-from sim.kernel.native import NativeKernel, native_kernel
-from sim.kernel.reference import reference_kernel
+from sim.kernel.compiled.native import NativeKernel, native_kernel
+from sim.kernel.readable.reference import reference_kernel
 from sim.kernel.sensors import LARGEST_DELAY, SensorErrors, Sensors, philox
 from sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
 from sim.robot import Robot, RobotVariant, load_robot

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.assembly import control_steps, plan_walk
 from sim.controllers import control_law
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
 from sim.kernel.walk import WalkResult
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot

@@ -15,7 +15,7 @@ from sim.compiler.target import Target, target
 from sim.controllers import CONTROLLERS
 from sim.controllers.base import ControlLaw
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.native import NativeKernel, load_kernel, native_kernel
+from sim.kernel.compiled.native import NativeKernel, load_kernel, native_kernel
 from sim.kernel.walk import Floats, Precision, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot, RobotVariant, load_robot

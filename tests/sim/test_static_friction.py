@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
+from sim.kernel.dynamics.physics_step import physics_model
 from sim.kernel.parameters import STATIC_FRICTION_RATE, pack_parameters
-from sim.kernel.physics_step import physics_model
 from sim.robot import Robot, load_robot
 from sim.scenario import SCENARIOS
 from tests.examples.robots import changed

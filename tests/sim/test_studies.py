@@ -7,7 +7,7 @@ import pytest
 from sim.assembly import PHYSICS_RATE, plan_walk
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.errors import SimulationInputError
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
 from sim.kernel.walk import Coding
 from sim.outcome import Status
 from sim.robot import DEFAULT_ROBOT, RobotName, load_robot

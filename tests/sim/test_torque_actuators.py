@@ -16,10 +16,10 @@ from sim.compiler.target import X86, Target, host_architecture, target
 from sim.controllers import control_law
 from sim.controllers.base import ControlLaw, JointPd
 from sim.errors import SimulationInputError
-from sim.kernel.native import load_kernel, native_kernel
+from sim.kernel.compiled.native import load_kernel, native_kernel
+from sim.kernel.dynamics.physics_step import physics_model
 from sim.kernel.observation import split_states
 from sim.kernel.parameters import pack_parameters
-from sim.kernel.physics_step import physics_model
 from sim.kernel.walk import WalkResult, WalkSetup
 from sim.outcome import Status
 from sim.robot import Robot, load_robot

@@ -11,10 +11,10 @@ from pydantic import ValidationError
 
 from sim.assembly import plan_walk
 from sim.controllers import CONTROLLERS
-from sim.kernel.native import native_kernel
+from sim.kernel.compiled.native import native_kernel
+from sim.kernel.dynamics.physics_step import physics_model
 from sim.kernel.observation import walk_log
 from sim.kernel.parameters import internal_state_size, pack_parameters
-from sim.kernel.physics_step import physics_model
 from sim.kernel.walk import Coding
 from sim.noise import LinkNoise
 from sim.outcome import Status

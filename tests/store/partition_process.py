@@ -16,8 +16,8 @@ from threading import Thread
 from sqlalchemy import text
 
 from services.optimizer.errors import LeaseLost, StoreUnavailable
-from services.optimizer.store import postgresql
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections import postgresql
+from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.sql_store import open_store
 from tests.store.examples import ask, completed, spec
 from tests.store.postgres_server import postgres_binaries, postgres_server

@@ -11,11 +11,11 @@ import pytest
 from sqlalchemy import select
 
 from services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
-from services.optimizer.store.backup import backup, restore
-from services.optimizer.store.engine import connect, parse_url
-from services.optimizer.store.maintenance import check
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.tables import metadata
+from services.optimizer.store.schema.backup import backup, restore
+from services.optimizer.store.schema.maintenance import check
 from services.optimizer.store.sql_store import SqlStore, open_store
-from services.optimizer.store.tables import metadata
 from tests.store.examples import ask, begun, completed, spec
 from tests.store.test_upgrades import JOB, store_older
 

@@ -23,7 +23,7 @@ from services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from services.optimizer.jobs.iteration import Reevaluation
 from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, ask, begun, completed, spec
 

@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import text
 
 from services.optimizer.jobs.job import Command
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.processes import eventually
 from tests.store.examples import LEASE, ask, begun, completed, spec
@@ -158,7 +158,9 @@ def test_what_is_committed_while_the_listener_is_lost_is_told_as_well(
 def test_where_nobody_can_listen_changes_are_polled_for(
     store: SqlStore, waiting: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("services.optimizer.store.changes._CHANNEL", "no name of a channel")
+    monkeypatch.setattr(
+        "services.optimizer.store.connections.changes._CHANNEL", "no name of a channel"
+    )
     claim = begun(store)
     woken = threading.Event()
     with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.02):
@@ -204,7 +206,9 @@ def test_a_thread_that_has_ended_is_told_of_while_somebody_waits(
 ) -> None:
     with closing(open_store(database_url)) as store:
         assert store.changes.trouble() is None
-        monkeypatch.setattr("services.optimizer.store.changes.select", lambda *_: sys.exit())
+        monkeypatch.setattr(
+            "services.optimizer.store.connections.changes.select", lambda *_: sys.exit()
+        )
         with store.changes.watch("nosuchjob123", lambda: None, poll_seconds=0.01):
             eventually(lambda: store.changes.trouble() is not None)
             assert "restart this process" in str(store.changes.trouble())

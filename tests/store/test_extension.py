@@ -12,7 +12,7 @@ from services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, N
 from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.search.registry import OPTIMIZERS
-from services.optimizer.store.migrate import upgrade
+from services.optimizer.store.schema.migrate import upgrade
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.certificate.examples import small
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec

@@ -7,8 +7,8 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store import file_system
-from services.optimizer.store.file_system import mount_of
+from services.optimizer.store.connections import file_system
+from services.optimizer.store.connections.file_system import mount_of
 from services.optimizer.store.sql_store import open_store
 
 MOUNTS = r"""22 27 0:21 / /proc rw,relatime - proc proc rw

@@ -8,9 +8,9 @@ from typing import Any
 from sqlalchemy import Table, select, update
 
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.tables import jobs, recordings
 from services.optimizer.store.sql_store import SqlStore, open_store
-from services.optimizer.store.tables import jobs, recordings
 from tests.examples.walks import SHORT_WALK
 from tests.store.test_recordings import recording
 

@@ -12,9 +12,9 @@ from sqlalchemy import select
 from services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
 from services.optimizer.jobs.job import Claim, Command, JobState
 from services.optimizer.service import JobService
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.tables import iterations
 from services.optimizer.store.sql_store import SqlStore
-from services.optimizer.store.tables import iterations
 from sim.outcome import Status
 from tests.store.examples import Clock, ask, begun, completed
 

@@ -10,9 +10,9 @@ import pytest
 from sqlalchemy import Engine, event, text
 
 from services.optimizer.jobs.job import JobOrder, JobState
-from services.optimizer.store.engine import connect, parse_url
-from services.optimizer.store.job_rows import JobDocuments
-from services.optimizer.store.job_views import DocumentMemory
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.job_rows import JobDocuments
+from services.optimizer.store.rows.job_views import DocumentMemory
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import completed, spec
 from tests.store.test_job_list import with_fitness

@@ -12,7 +12,7 @@ import pytest
 
 from services.optimizer.errors import NotFound, StoreUnavailable
 from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.store.maintenance import Pruned, check, prune
+from services.optimizer.store.schema.maintenance import Pruned, check, prune
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, begun, completed
 from tests.store.examples import spec as walks

@@ -15,12 +15,12 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
 from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store import engine as engine_module
-from services.optimizer.store.engine import Database, connect, parse_url
-from services.optimizer.store.migrate import lock_for_migration
-from services.optimizer.store.revisions import MIGRATIONS, head
+from services.optimizer.store.connections import engine as engine_module
+from services.optimizer.store.connections.engine import Database, connect, parse_url
+from services.optimizer.store.rows.tables import metadata
+from services.optimizer.store.schema.migrate import lock_for_migration
+from services.optimizer.store.schema.revisions import MIGRATIONS, head
 from services.optimizer.store.sql_store import SqlStore, open_store
-from services.optimizer.store.tables import metadata
 from tests.examples.processes import loaded_by
 from tests.store.examples import LEASE, spec
 

@@ -18,8 +18,8 @@ from sqlalchemy import text
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.run.runner import Runner
-from services.optimizer.store import postgresql
-from services.optimizer.store.engine import Database, connect, parse_url
+from services.optimizer.store.connections import postgresql
+from services.optimizer.store.connections.engine import Database, connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.jobs import Bits, history
 from tests.examples.paths import ROOT

@@ -15,7 +15,7 @@ from sqlalchemy import text
 
 from services.optimizer.errors import Conflict
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.processes import output, start_python
 from tests.store.examples import LEASE, Clock, ask, spec

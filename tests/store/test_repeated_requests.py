@@ -11,7 +11,7 @@ from services.optimizer.errors import IdempotencyConflict
 from services.optimizer.jobs.kinds import walks
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore
 from sim.scenario import Scenario, find_scenario
 

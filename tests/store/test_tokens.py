@@ -10,7 +10,7 @@ from sqlalchemy import text
 
 from services.optimizer.access import Scope, Token
 from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import Clock, spec
 

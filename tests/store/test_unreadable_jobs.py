@@ -13,9 +13,9 @@ from services.optimizer.errors import Conflict, IdempotencyConflict, Unreadable
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from services.optimizer.jobs.kinds.identification import IdentificationSpec
 from services.optimizer.service import JobService
-from services.optimizer.store.engine import connect, parse_url
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.tables import jobs
 from services.optimizer.store.sql_store import SqlStore
-from services.optimizer.store.tables import jobs
 from tests.examples.hostile import TOML, URDF, chain
 from tests.store.examples import LEASE, Clock, begun, completed, spec
 from tests.store.test_recordings import recording

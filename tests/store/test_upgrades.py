@@ -12,10 +12,10 @@ from alembic.config import Config
 from sqlalchemy import text
 
 from services.optimizer.errors import Conflict, StoreUnavailable
-from services.optimizer.store.engine import connect, parse_url
-from services.optimizer.store.in_use import exclusive
-from services.optimizer.store.migrate import upgrade
-from services.optimizer.store.revisions import MIGRATIONS, head, read_revision
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.schema.in_use import exclusive
+from services.optimizer.store.schema.migrate import upgrade
+from services.optimizer.store.schema.revisions import MIGRATIONS, head, read_revision
 from services.optimizer.store.sql_store import open_store
 from tests.examples.paths import ROOT
 from tests.store.examples import spec
@@ -90,10 +90,10 @@ def test_no_upgrade_touches_what_a_newer_gaitswarm_has_made(fresh_url: str) -> N
 
 USER = """
 import sys
-from services.optimizer.store import revisions
+from services.optimizer.store.schema import revisions
 revisions.head = lambda: "0002"
-from services.optimizer.store.engine import connect, parse_url
-from services.optimizer.store.in_use import admit
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.schema.in_use import admit
 database = connect(parse_url(sys.argv[1]))
 admit(database)
 with database.transaction(write=False):
@@ -148,7 +148,7 @@ def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
 
 
 def test_nobody_comes_in_during_an_upgrade(fresh_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.optimizer.store.engine.BUSY_SECONDS", 0.2)
+    monkeypatch.setattr("services.optimizer.store.connections.engine.BUSY_SECONDS", 0.2)
     open_store(fresh_url).close()
     with (
         closing(connect(parse_url(fresh_url), for_migration=True)) as database,

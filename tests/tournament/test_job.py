@@ -19,7 +19,7 @@ from services.optimizer.jobs.kinds.race_case import RaceCase
 from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
 from services.optimizer.service import JobService
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from services.runtime import open_evaluator, run_embedded
 from services.worker.dispatch import Dispatcher
 from sim.case import LongCase

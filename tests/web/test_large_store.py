@@ -28,9 +28,9 @@ from sqlalchemy import (
 from api.page import FOLDER
 from benchmarks.large_store import PARTICLES, fill
 from services.optimizer.service import JobService
-from services.optimizer.store.engine import connect, parse_url
-from services.optimizer.store.records import ID_ALPHABET
-from services.optimizer.store.tables import evaluations, iterations, jobs
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.tables import evaluations, iterations, jobs
+from services.optimizer.store.statements.records import ID_ALPHABET
 from services.runtime import open_store
 from tests.examples.servers import Server
 from tests.web.job_page import wait_for_iteration

@@ -13,7 +13,7 @@ from services.optimizer.run.runner import Runner
 from services.optimizer.store.sql_store import SqlStore
 from services.worker.in_process import InProcessEvaluator
 from sim.errors import ProcessEnded
-from sim.kernel import derivation
+from sim.kernel.compiled import derivation
 from sim.robot import RobotFiles
 from tests.examples.hostile import TOML, URDF
 from tests.examples.processes import eventually

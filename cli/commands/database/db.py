@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from cli.options import Db, Json
+from cli.inputs.options import Db, Json
 
 Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
 
@@ -26,8 +26,8 @@ def upgrade(db: Db = None) -> None:
     It must not be in use, and a backup of it is advisable.
     """
     from cli.output import note
-    from services.optimizer.store import migrate
-    from services.optimizer.store.revisions import head
+    from services.optimizer.store.schema import migrate
+    from services.optimizer.store.schema.revisions import head
 
     before = migrate.upgrade(_database(db))
     if before == head():
@@ -45,7 +45,7 @@ def check(db: Db = None, as_json: Json = False) -> None:
 
     from cli.exit_codes import CheckFailed
     from cli.output import note, print_text
-    from services.optimizer.store import maintenance
+    from services.optimizer.store.schema import maintenance
 
     findings = maintenance.check(_database(db))
     if as_json:
@@ -67,7 +67,7 @@ def backup(
     The file is an SQLite database, whatever the database is.
     """
     from cli.output import note
-    from services.optimizer.store import backup
+    from services.optimizer.store.schema import backup
 
     backup.backup(_database(db), file, overwrite=force)
     note(f"{file} holds all of the database")
@@ -86,7 +86,7 @@ def restore(
     from cli.output import note
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
-    from services.optimizer.store import backup
+    from services.optimizer.store.schema import backup
 
     backup.restore(database_to_write(read_settings(db=db or None)), file, overwrite=force)
     note(f"the database holds what {file} does")
@@ -112,7 +112,7 @@ def prune(
     from cli.output import note
     from services.optimizer.errors import InvalidRequest
     from services.optimizer.jobs.job import ENDED, JobState
-    from services.optimizer.store import maintenance
+    from services.optimizer.store.schema import maintenance
 
     if state is not None and older_than is None:
         raise InvalidRequest("deletes nothing without --older-than", field="state")

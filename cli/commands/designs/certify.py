@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cli.options import JobName, Json, Precision, RobotOption, WorkerOptions, with_groups
+from cli.inputs.options import JobName, Json, Precision, RobotOption, WorkerOptions, with_groups
 
 
 def register(app: typer.Typer) -> None:
@@ -109,10 +109,10 @@ def certify(
     from contextlib import closing
     from dataclasses import asdict
 
-    from cli.certificate_spec import certificate_spec
-    from cli.certificate_table import show_certificate, show_world
     from cli.embedded import Embedded, job_run
+    from cli.inputs.certificate_spec import certificate_spec
     from cli.output import print_json
+    from cli.tables.certificate import show_certificate, show_world
     from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings

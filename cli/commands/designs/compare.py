@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, Json, RobotOption, Server
+from cli.inputs.options import Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
     from sim.studies.drives import NamedDrive, WalkFigures
@@ -40,9 +40,9 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Let several drives walk the same scenarios: speed, power, effectivity, objectives."""
+    from cli.inputs.robots import chosen_robot, chosen_scenarios
     from cli.output import note, print_text
-    from cli.plots import draw_comparison, save
-    from cli.robots import chosen_robot, chosen_scenarios
+    from cli.pictures.plots import draw_comparison, save
     from sim.studies.drives import DRIVES
     from sim.studies.drives import compare as compare_drives
 
@@ -58,7 +58,7 @@ def compare(
 
 
 def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
-    from cli.design_file import read_design
+    from cli.inputs.design_file import read_design
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.errors import InvalidRequest
     from services.optimizer.jobs.kinds.tuning import JobSpec
@@ -98,9 +98,9 @@ def _row(figures: WalkFigures) -> dict[str, object]:
 
 
 def _show(drives: list[NamedDrive], figures: tuple[WalkFigures, ...]) -> None:
-    from cli.fitted_table import Table
     from cli.output import stdout_console
-    from cli.tables import number
+    from cli.tables.fitted import Table
+    from cli.tables.views import number
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("scenario\ndrive", no_wrap=True)

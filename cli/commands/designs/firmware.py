@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, Json, RobotOption, Server
+from cli.inputs.options import Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.firmware import FirmwareView
@@ -54,9 +54,9 @@ def firmware(
     as_json: Json = False,
 ) -> None:
     """Write a design as C for the robot's microcontrollers, with a test that repeats its walks."""
-    from cli.design_file import given_design
+    from cli.inputs.design_file import given_design
+    from cli.inputs.robots import chosen_robot, chosen_scenarios
     from cli.output import print_json
-    from cli.robots import chosen_robot, chosen_scenarios
     from gaitswarm.firmware import write_firmware
     from sim.scenario import SCENARIOS
 
@@ -88,8 +88,8 @@ def _bits(text: str) -> tuple[int, int]:
 
 
 def _show(view: FirmwareView) -> None:
-    from cli.fitted_table import Table
     from cli.output import note, stdout_console
+    from cli.tables.fitted import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("scenario", no_wrap=True)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, JobId, Json, Server
+from cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from cli.front_tables import Placed
+    from cli.tables.front import Placed
     from gaitswarm.jobs.port import Jobs
 
 
@@ -42,8 +42,8 @@ def front(
     preference, and the hypervolume.
     """
     from cli.atomic_file import replacing
-    from cli.front_tables import front_csv, marked_table, placed_lines, summary
     from cli.output import note, print_json, stdout_console
+    from cli.tables.front import front_csv, marked_table, placed_lines, summary
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.errors import InvalidRequest
 
@@ -70,7 +70,7 @@ def front(
 def _published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
     """Where the published designs lie; raises InvalidRequest where they cannot be compared."""
     from cli.comparison import published_walk
-    from cli.front_tables import placed
+    from cli.tables.front import placed
     from services.optimizer.errors import InvalidRequest
     from services.optimizer.jobs.kinds.tuning import JobSpec
     from sim.controllers import CONTROLLERS

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cli.options import Db, JobId, Json, Server
+from cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.importance import (
@@ -43,7 +43,7 @@ def _print(view: ImportanceView) -> None:
     from rich.table import Table
 
     from cli.output import stdout_console
-    from cli.tables import MISSING, SHORT
+    from cli.tables.views import MISSING, SHORT
 
     table = Table(box=None, padding=(0, 1, 0, 0))
     table.add_column("variable", no_wrap=True)

@@ -16,7 +16,7 @@ from cli.commands.designs.robustness import (
     estimate,
     robustness_request,
 )
-from cli.options import Db, JobId, Precision, RobotOption, Server
+from cli.inputs.options import Db, JobId, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.requests.robustness import RobustnessRequest
@@ -41,7 +41,7 @@ def register(app: typer.Typer) -> None:
 def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
     """Draw a job's fitness over its iterations: best so far, and its designs."""
     from cli.output import note
-    from cli.plots import draw_convergence, save
+    from cli.pictures.plots import draw_convergence, save
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -53,9 +53,9 @@ def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = N
 
 def front(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
     """Draw the Pareto front of a job in every pair of objectives, with its knees and winners."""
-    from cli.front_tables import draw_front
     from cli.output import note
-    from cli.plots import save
+    from cli.pictures.plots import save
+    from cli.tables.front import draw_front
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -76,9 +76,9 @@ def surface(
     ] = "published:A",
 ) -> None:
     """Draw the output of a Fuzzy-PI design over angle error and motor current, as quantised."""
-    from cli.design_file import read_design
+    from cli.inputs.design_file import read_design
     from cli.output import note
-    from cli.plots import draw_surface, save
+    from cli.pictures.plots import draw_surface, save
     from sim.controllers import CONTROLLERS
     from sim.controllers.surface import surface as surface_of
 
@@ -106,10 +106,10 @@ def robustness(
     db: Db = None,
 ) -> None:
     """Draw designs' robustness indices by scenario side by side, with their intervals."""
-    from cli.design_file import given_design
+    from cli.inputs.design_file import given_design
     from cli.output import note
-    from cli.plots import save
-    from cli.robustness_tables import draw_robustness
+    from cli.pictures.plots import save
+    from cli.tables.robustness import draw_robustness
     from services.optimizer.errors import InvalidRequest
 
     requests: dict[str, RobustnessRequest] = {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from cli.commands.designs.robustness import Radius, Samples, Seed
-from cli.options import Db, JobId, Json, Precision, Server
+from cli.inputs.options import Db, JobId, Json, Precision, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.preferences import RobustPreferencesView
@@ -77,8 +77,8 @@ def preferences(
 def _suit(
     job_id: str, for_design: str, *, server: str | None, db: str | None, as_json: bool
 ) -> None:
-    from cli.front_tables import fits_table, verdict
     from cli.output import print_json, stdout_console
+    from cli.tables.front import fits_table, verdict
     from gaitswarm.jobs.open import open_jobs
 
     iteration, particle = _place(for_design)
@@ -105,9 +105,9 @@ def _place(design: str) -> tuple[int, int]:
 
 
 def _print(view: RobustPreferencesView) -> None:
-    from cli.fitted_table import Table
     from cli.output import stdout_console
-    from cli.tables import MISSING, number
+    from cli.tables.fitted import Table
+    from cli.tables.views import MISSING, number
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     heads = ("design", "index", "95 %", "wins under", "fitness", "loss %", "bias", "exponent")

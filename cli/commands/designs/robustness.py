@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.options import Db, Json, Precision, RobotOption, Server
+from cli.inputs.options import Db, Json, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
-    from cli.design_file import GivenDesign
+    from cli.inputs.design_file import GivenDesign
     from gaitswarm.requests.robustness import Progress, RobustnessRequest
     from gaitswarm.views.robustness import RobustnessView
 
@@ -65,7 +65,7 @@ def robustness(
     It is the norm of the Jacobian of the objectives' logarithms, by the variables as shares of
     their bounds, from a regression over designs that are drawn around the given one.
     """
-    from cli.design_file import given_design
+    from cli.inputs.design_file import given_design
     from cli.output import print_json
 
     given = given_design(design, controller, server=server, db=db)
@@ -101,7 +101,7 @@ def robustness_request(
     """
     from pydantic import ValidationError
 
-    from cli.robots import chosen_robot, scenario_data
+    from cli.inputs.robots import chosen_robot, scenario_data
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.robustness import RobustnessRequest
 
@@ -155,7 +155,7 @@ def shown_progress() -> Iterator[Progress]:
 
 def _print(view: RobustnessView) -> None:
     from cli.output import stdout_console
-    from cli.robustness_tables import scenarios_table, summary, variables_table
+    from cli.tables.robustness import scenarios_table, summary, variables_table
 
     console = stdout_console()
     console.print(scenarios_table(view))

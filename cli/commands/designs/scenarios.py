@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, JobId, Json, Server
+from cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.families import LossView, ScenarioFamiliesView
@@ -43,9 +43,9 @@ def scenarios(
 
 
 def _print(view: ScenarioFamiliesView) -> None:
-    from cli.fitted_table import Table
     from cli.output import stdout_console
-    from cli.tables import MISSING, number
+    from cli.tables.fitted import Table
+    from cli.tables.views import MISSING, number
 
     without = Table(title="Left out", title_justify="left", box=None, padding=(0, 1, 0, 0))
     without.add_column("scenario", no_wrap=True)

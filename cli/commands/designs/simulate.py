@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.options import Db, Json, Precision, RobotOption, Server
+from cli.inputs.options import Db, Json, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views import SimulationView
@@ -73,10 +73,10 @@ def simulate(
     """Let one design walk and say what it is worth; a fall is a result, not an error."""
     from pydantic import ValidationError
 
-    from cli.design_file import given_design
+    from cli.inputs.design_file import given_design
+    from cli.inputs.robots import chosen_robot, scenario_data
+    from cli.inputs.spec_file import json_object
     from cli.output import note
-    from cli.robots import chosen_robot, scenario_data
-    from cli.spec_file import json_object
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
@@ -114,7 +114,7 @@ def simulate(
 
 def _show(view: SimulationView, *, as_json: bool) -> None:
     from cli.output import print_text, stdout_console
-    from cli.tables import gait_in_words, measurements_table, results_table, worth
+    from cli.tables.views import gait_in_words, measurements_table, results_table, worth
     from sim.outcome import OBJECTIVES
 
     if as_json:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.options import Db, Json
+from cli.inputs.options import Db, Json
 
 
 def register(app: typer.Typer) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, JobId, Json, Server
+from cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, Json, Server
+from cli.inputs.options import Db, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.comparison import JobComparisonView
@@ -44,7 +44,7 @@ def _print(view: JobComparisonView) -> None:
     from rich.table import Table
 
     from cli.output import stdout_console
-    from cli.tables import MISSING, number
+    from cli.tables.views import MISSING, number
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("", no_wrap=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, JobId, Json, Server
+from cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -124,9 +124,9 @@ def _in_full(
 def _print(found: VerificationView | HistoryVerificationView) -> None:
     from rich.text import Text
 
-    from cli.fitted_table import Table
     from cli.output import stdout_console
-    from cli.tables import number
+    from cli.tables.fitted import Table
+    from cli.tables.views import number
     from gaitswarm.views.verification import VerificationView
 
     console = stdout_console()

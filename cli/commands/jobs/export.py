@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, JobId, Server
+from cli.inputs.options import Db, JobId, Server
 
 if TYPE_CHECKING:
     from gaitswarm.tables import TableFormat

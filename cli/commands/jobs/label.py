@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.options import Db, JobId, Json, Server
+from cli.inputs.options import Db, JobId, Json, Server
 
 
 def register(app: typer.Typer) -> None:

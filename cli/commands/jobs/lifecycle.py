@@ -7,7 +7,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from cli.options import (
+from cli.inputs.options import (
     AcceptChanges,
     Db,
     JobId,
@@ -48,8 +48,8 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Queue a job for a running server; see `optimize` to run one here and now."""
+    from cli.inputs.spec_file import build_spec
     from cli.output import note, print_json, stdout_console
-    from cli.spec_file import build_spec
     from gaitswarm.jobs.open import open_jobs
 
     asked = build_spec(options)
@@ -108,7 +108,7 @@ def list_jobs(
 ) -> None:
     """List jobs, newest first unless another order is chosen."""
     from cli.output import print_json_list, stdout_console
-    from cli.tables import jobs_table
+    from cli.tables.views import jobs_table
     from gaitswarm.jobs.open import open_jobs
     from services.optimizer.jobs.job import JobOrder, JobState
     from services.optimizer.jobs.labels import JobFilter
@@ -134,7 +134,7 @@ def list_jobs(
 def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show a job: state, progress, best design, and why it failed if it did."""
     from cli.output import print_json
-    from cli.tables import print_job
+    from cli.tables.views import print_job
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:

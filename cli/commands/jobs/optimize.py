@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.options import AcceptChanges, Json, SpecOptions, WorkerOptions, with_groups
+from cli.inputs.options import AcceptChanges, Json, SpecOptions, WorkerOptions, with_groups
 
 
 def register(app: typer.Typer) -> None:
@@ -48,8 +48,8 @@ def optimize(
     from dataclasses import asdict
 
     from cli.embedded import Embedded, finish, job_run, resumed_job
+    from cli.inputs.spec_file import build_spec, by_other_optimizer, check_optimizer_name
     from cli.output import note
-    from cli.spec_file import build_spec, by_other_optimizer, check_optimizer_name
     from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
@@ -94,7 +94,7 @@ def optimize(
 def optimizers(as_json: Json = False) -> None:
     """List search methods with what can be set of them."""
     from cli.output import print_json_list, stdout_console
-    from cli.tables import optimizers_table
+    from cli.tables.views import optimizers_table
     from gaitswarm.views import optimizer_views
 
     if as_json:

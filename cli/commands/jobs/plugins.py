@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from cli.options import Json
+from cli.inputs.options import Json
 
 
 def register(app: typer.Typer) -> None:

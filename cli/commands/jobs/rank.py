@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Db, JobId, Json, Server
+from cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views import RankingRequest, RankingView
@@ -49,7 +49,7 @@ def _request(preference: str, top: int) -> RankingRequest:
     """Raises InvalidRequest that names the field."""
     from pydantic import ValidationError
 
-    from cli.spec_file import preference_choice
+    from cli.inputs.spec_file import preference_choice
     from gaitswarm.errors import invalid_request
     from gaitswarm.views import RankingRequest
 
@@ -62,7 +62,7 @@ def _request(preference: str, top: int) -> RankingRequest:
 
 def _print(ranking: RankingView) -> None:
     from cli.output import stdout_console
-    from cli.tables import MISSING, number, ranking_table
+    from cli.tables.views import MISSING, number, ranking_table
 
     console = stdout_console()
     console.print(ranking_table(ranking))

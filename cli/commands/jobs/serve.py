@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from cli.options import RunnerOptions, with_groups
+from cli.inputs.options import RunnerOptions, with_groups
 
 if TYPE_CHECKING:
     import threading

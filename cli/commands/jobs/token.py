@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cli.options import Db, Json
+from cli.inputs.options import Db, Json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from cli.options import Db, JobName, Json, Precision, Server, WorkerOptions, with_groups
+from cli.inputs.options import Db, JobName, Json, Precision, Server, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -72,8 +72,8 @@ def calibrate(
 ) -> None:
     """Fit a robot and open conventions to a table of results, here and now."""
     from cli.embedded import run_seeds
-    from cli.spec_file import parse_spec
-    from cli.target_file import read_targets
+    from cli.inputs.spec_file import parse_spec
+    from cli.inputs.target_file import read_targets
     from gaitswarm.requests.arguments import leave_out
 
     leave_out(leave_one_out)
@@ -125,7 +125,7 @@ def _show(jobs: Jobs, job_ids: list[str], leave_one_out: str | None, *, as_json:
     import json
 
     from cli.output import print_text
-    from cli.targets_table import show_targets
+    from cli.tables.targets import show_targets
     from gaitswarm.requests.arguments import leave_out
 
     reached = jobs.targets(job_ids, leave_out=leave_out(leave_one_out))
@@ -140,7 +140,7 @@ def _show(jobs: Jobs, job_ids: list[str], leave_one_out: str | None, *, as_json:
 
 def _robots(text: str | None) -> dict[str, Any]:
     """What a spec has of one robot, or of several shipped ones."""
-    from cli.robots import chosen_robot
+    from cli.inputs.robots import chosen_robot
 
     if text is None or text.lstrip().startswith("{") or "," not in text:
         return {"robot": chosen_robot(text)}
@@ -149,7 +149,7 @@ def _robots(text: str | None) -> dict[str, Any]:
 
 def _variables(document: dict[str, Any], text: str) -> list[Any]:
     """Names, and variables with bounds or choices of the user's own."""
-    from cli.spec_file import parse_spec
+    from cli.inputs.spec_file import parse_spec
     from services.optimizer.errors import InvalidRequest
     from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Json, RobotOption
+from cli.inputs.options import Json, RobotOption
 
 if TYPE_CHECKING:
     from gaitswarm.gaits import GaitsView, GaitView
@@ -38,8 +38,8 @@ def gaits(
     as_json: Json = False,
 ) -> None:
     """List gaits: order of footfalls, feet that stand, and whether they are statically stable."""
+    from cli.inputs.robots import chosen_robot
     from cli.output import print_json, print_text
-    from cli.robots import chosen_robot
     from gaitswarm.gaits import planned_gaits
 
     view = planned_gaits(
@@ -53,7 +53,7 @@ def gaits(
 
 
 def _scenario(given: str | None, robot: str | None) -> Scenario:
-    from cli.robots import chosen_scenarios, folder_defaults
+    from cli.inputs.robots import chosen_scenarios, folder_defaults
     from services.optimizer.errors import InvalidRequest
     from sim.scenario import Scenario, find_scenario
 
@@ -98,6 +98,6 @@ def diagram(item: GaitView) -> str:
 
 
 def _plan(item: GaitView) -> str:
-    from cli.tables import gait_in_words
+    from cli.tables.views import gait_in_words
 
     return "out of the legs' reach" if item.planned is None else gait_in_words(item.planned)

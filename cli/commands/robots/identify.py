@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from cli.measured_walk import (
+from cli.inputs.measured_walk import (
     CyclesOption,
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
     WalkController,
 )
-from cli.options import (
+from cli.inputs.options import (
     Db,
     JobName,
     Json,
@@ -57,7 +57,7 @@ def record(
     as_json: Json = False,
 ) -> None:
     """Keep a measured walk where jobs can fit a robot to it; prints the recording's id."""
-    from cli.measured_walk import read_measured, read_walk, simulated_walk, synchronised
+    from cli.inputs.measured_walk import read_measured, read_walk, simulated_walk, synchronised
     from cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
     from sim.identification.recorded_walk import record as recorded
@@ -109,9 +109,9 @@ def identify(
 ) -> None:
     """Fit parameters of a robot to recorded walks, here and now, and say which can be trusted."""
     from cli.embedded import run_seeds
-    from cli.parameters_table import read_truth, show_parameters
-    from cli.robots import chosen_robot
-    from cli.spec_file import parse_spec
+    from cli.inputs.robots import chosen_robot
+    from cli.inputs.spec_file import parse_spec
+    from cli.tables.parameters import read_truth, show_parameters
 
     known = read_truth(truth)
     document = {
@@ -156,8 +156,8 @@ def parameters(
 ) -> None:
     """Say which fitted parameters can be trusted: intervals at twelve fitness thresholds."""
     from cli.output import note
-    from cli.parameters_table import draw_parameters, read_truth, show_parameters
-    from cli.plots import save
+    from cli.pictures.plots import save
+    from cli.tables.parameters import draw_parameters, read_truth, show_parameters
     from gaitswarm.jobs.open import open_jobs
 
     known = read_truth(truth)

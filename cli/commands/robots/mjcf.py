@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cli.options import RobotOption
+from cli.inputs.options import RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -36,8 +36,8 @@ def mjcf(
     Needs pip install 'gaitswarm[mujoco]'. The viewer comes with pip install mujoco:
     python -m mujoco.viewer --mjcf=FILE.xml.
     """
+    from cli.inputs.robots import chosen_robot, chosen_scenarios
     from cli.output import note, print_text
-    from cli.robots import chosen_robot, chosen_scenarios
     from services.optimizer.errors import InvalidRequest
     from sim.mujoco.engines import check_installed
     from sim.robot import load_robot

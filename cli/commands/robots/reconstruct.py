@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import WorkerOptions, with_groups
+from cli.inputs.options import WorkerOptions, with_groups
 
 if TYPE_CHECKING:
     from services.optimizer.jobs.columns import EvaluationColumns

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from cli.options import Json
+from cli.inputs.options import Json
 
 if TYPE_CHECKING:
     from gaitswarm.views.robot_check import RobotCheckView
@@ -88,8 +88,8 @@ def check(
 
     view = check_robot(_files(folder), folder=folder, packages=package_path or [])
     if draw is not None:
-        from cli.plots import save
-        from cli.robot_picture import draw_robot
+        from cli.pictures.plots import save
+        from cli.pictures.robot import draw_robot
 
         save(draw_robot(view), draw, "draw")
         note(f"picture written to {draw}")
@@ -112,7 +112,7 @@ def _kind(text: str) -> ActuatorChoice:
 
 
 def _files(folder: Path) -> RobotFiles:
-    from cli.robots import chosen_robot
+    from cli.inputs.robots import chosen_robot
     from services.optimizer.errors import InvalidRequest
     from sim.robot import RobotFiles
 

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from cli.measured_walk import (
+from cli.inputs.measured_walk import (
     CyclesOption,
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
     WalkController,
 )
-from cli.options import RobotOption
+from cli.inputs.options import RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -45,9 +45,9 @@ def synthesize(
 ) -> None:
     """Write a SYNTHETIC log: a perturbed twin of the robot, with sensor noise. No measurement."""
     from cli.atomic_file import replacing
-    from cli.measured_walk import read_walk
+    from cli.inputs.measured_walk import read_walk
     from cli.output import note
-    from cli.parameters_table import read_truth
+    from cli.tables.parameters import read_truth
     from services.optimizer.errors import InvalidRequest
     from sim.measurement.measured_csv import format_measured_log
     from sim.measurement.synthetic import Perturbation, synthetic_log

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from cli.measured_walk import (
+from cli.inputs.measured_walk import (
     CyclesOption,
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
     WalkController,
 )
-from cli.options import Json, RobotOption
+from cli.inputs.options import Json, RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -46,10 +46,10 @@ def validate(
     as_json: Json = False,
 ) -> None:
     """Simulate the walk that was measured, and judge the differences by tolerance classes."""
-    from cli.measured_walk import read_measured, read_walk, simulated_walk, synchronised
+    from cli.inputs.measured_walk import read_measured, read_walk, simulated_walk, synchronised
     from cli.output import note, print_json, stdout_console
+    from cli.tables.validation import alignment, comparison_table, confidence_table, remarks
     from cli.validation_report import write_report
-    from cli.validation_table import alignment, comparison_table, confidence_table, remarks
     from sim.validation.comparison import compare_synchronised
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from cli.options import Json, Precision
+from cli.inputs.options import Json, Precision
 
 if TYPE_CHECKING:
     from services.profile import JobProfile

@@ -9,7 +9,7 @@ import typer
 from cli.commands.studies.study_controllers import controllers
 from cli.commands.studies.study_precision import precision
 from cli.commands.studies.study_worlds import worlds
-from cli.options import Json, RobotOption
+from cli.inputs.options import Json, RobotOption
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -47,8 +47,8 @@ def tables(
     as_json: Json = False,
 ) -> None:
     """Compare a Fuzzy-PI's tables of 6 x 6, 8 x 8 and 10 x 6 bits with full inference."""
-    from cli.design_file import read_design
-    from cli.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.design_file import read_design
+    from cli.inputs.robots import chosen_robot, chosen_scenarios
     from sim.studies.accuracy import tables_against_inference
 
     values = read_design(design, "fuzzy-pi")
@@ -66,8 +66,8 @@ def steps(
     as_json: Json = False,
 ) -> None:
     """Compare physics at 2.5, 5, 10 and 20 kHz with 40 kHz."""
-    from cli.design_file import read_design
-    from cli.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.design_file import read_design
+    from cli.inputs.robots import chosen_robot, chosen_scenarios
     from sim.studies.accuracy import step_halving
 
     values = read_design(design, controller)
@@ -92,8 +92,8 @@ def noise(
     as_json: Json = False,
 ) -> None:
     """Put noise on one kind of link after the other; ratios to the noiseless walk (table 2.9)."""
-    from cli.design_file import read_design
-    from cli.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.design_file import read_design
+    from cli.inputs.robots import chosen_robot, chosen_scenarios
     from sim.studies.accuracy import noise_on_links
 
     values = read_design(design, controller)
@@ -118,8 +118,8 @@ def _show(deviations: Iterable[Deviation], *, as_json: bool, ratios: bool = Fals
     import json
     import math
 
-    from cli.fitted_table import Table
     from cli.output import print_text, stdout_console
+    from cli.tables.fitted import Table
     from sim.outcome import OBJECTIVE_NAMES
 
     def finite(value: float) -> float | None:

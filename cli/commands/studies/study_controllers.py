@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Json, Precision, WorkerOptions, with_groups
+from cli.inputs.options import Json, Precision, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
-    from cli.controllers_study import Comparison, Runs
+    from cli.studies.controllers import Comparison, Runs
 
 
 @with_groups
@@ -41,9 +41,9 @@ def controllers(
     """
     import json
 
-    from cli.controllers_study import Budget, comparisons, study_document, study_table
+    from cli.inputs.robots import chosen_robot
     from cli.output import note, print_text, stdout_console
-    from cli.robots import chosen_robot
+    from cli.studies.controllers import Budget, comparisons, study_document, study_table
     from services.optimizer.errors import InvalidRequest
     from sim.robot.shipped import SHIPPED
 

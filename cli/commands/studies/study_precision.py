@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.options import Json
+from cli.inputs.options import Json
 
 
 def precision(
@@ -36,7 +36,7 @@ def precision(
     import json
 
     from cli.output import note, print_text, stdout_console
-    from cli.precision_study import compare, study_document, study_tables, variants
+    from cli.studies.precision import compare, study_document, study_tables, variants
     from services.optimizer.errors import InvalidRequest
     from sim.robot import DEFAULT_ROBOT
     from sim.robot.shipped import SHIPPED

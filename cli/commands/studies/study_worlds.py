@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.options import Json, RobotOption, WorkerOptions, with_groups
+from cli.inputs.options import Json, RobotOption, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
-    from cli.worlds_study import Contestant, HeldOut
+    from cli.studies.worlds import Contestant, HeldOut
 
 
 @with_groups
@@ -64,9 +64,9 @@ def worlds(
     """
     import json
 
+    from cli.inputs.robots import chosen_robot
     from cli.output import note, print_text, stdout_console
-    from cli.robots import chosen_robot
-    from cli.worlds_study import (
+    from cli.studies.worlds import (
         HeldOut,
         check_held_out,
         contestants,
@@ -124,7 +124,7 @@ def _run(planned: list[Contestant], held_out: HeldOut, workers: WorkerOptions) -
     from dataclasses import replace
 
     from cli.embedded import study_jobs
-    from cli.worlds_study import Run, certificate_of
+    from cli.studies.worlds import Run, certificate_of
 
     with study_jobs(workers) as (jobs, run):
 

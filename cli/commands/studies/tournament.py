@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cli.options import Json, WorkerOptions, with_groups
+from cli.inputs.options import Json, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -98,8 +98,8 @@ def tournament(
     """
     import json
 
+    from cli.inputs.spec_file import read_json_object
     from cli.output import print_text
-    from cli.spec_file import read_json_object
     from cli.tournament.plan import PRESETS, Size, chosen_methods, chosen_problems, tournament_jobs
     from cli.tournament.report import write_report
     from cli.tournament.runs import read_runs, results_of, run_jobs, write_runs
@@ -164,8 +164,8 @@ def _versions(specs: Iterable[TournamentSpec]) -> dict[str, str]:
 
 def _show(found: Standings) -> None:
     """Mean ranks, and medians of the best at the end of the budget."""
-    from cli.fitted_table import Table
     from cli.output import stdout_console
+    from cli.tables.fitted import Table
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in ("method", "mean rank", "from", "to", *found.by_problem):

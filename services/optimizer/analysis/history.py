@@ -10,7 +10,7 @@ from typing import Final
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation, Iteration
 from services.optimizer.jobs.job import Job
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 PIECE: Final = 2000
 """Evaluations read in one transaction."""

@@ -20,7 +20,7 @@ from services.optimizer.analysis.history import PIECE, iterations_of
 from services.optimizer.errors import Conflict, EvaluatorUnavailable
 from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.job import Job
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 DEFAULT_BYTES: Final = 512 << 20
 """Ten jobs of 100 000 evaluations in six scenarios."""

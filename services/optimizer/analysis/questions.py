@@ -26,7 +26,7 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.preference import Preference
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import changes_since, job_provenance
 from services.optimizer.jobs.reference import Reference, published_for
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.case import Walk, run_together
 from sim.errors import SimulationError
 from sim.outcome import Status

@@ -21,9 +21,9 @@ from services.optimizer.jobs.columns import EvaluationColumns
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.iteration import Reevaluation, best_particle
 from services.optimizer.jobs.job import Job
-from services.optimizer.store.base import Store
-from services.optimizer.store.reading import StoredLink
-from services.optimizer.store.rows import fitness_summary
+from services.optimizer.store.port.base import Store
+from services.optimizer.store.port.reading import StoredLink
+from services.optimizer.store.rows.evaluation_rows import fitness_summary
 
 _PIECE: Final = 2000
 """Evaluations read in one transaction."""

@@ -12,7 +12,7 @@ import numpy as np
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.iteration import Known
 from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.outcome import Outcome, Status
 
 _NEW: Final = -1

@@ -16,7 +16,7 @@ from services.optimizer.run.execution import OnCommit, OnRetry, Surroundings, ru
 from services.optimizer.run.heartbeat import Heartbeat
 from services.optimizer.run.outage import Backoff
 from services.optimizer.run.runner import runner_name
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 EMBEDDED_LEASE_SECONDS: Final = 5.0
 """Short, because a person waits for it when the process before was killed."""

@@ -55,7 +55,7 @@ from services.optimizer.run.events import (
 )
 from services.optimizer.run.heartbeat import Heartbeat
 from services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 OnCommit = Callable[[CompletedIteration, JobState], None]
 """Called after an iteration is stored, in the thread that runs the job."""

@@ -12,7 +12,7 @@ from services.optimizer.errors import LeaseLost
 from services.optimizer.jobs.job import Claim, JobState
 from services.optimizer.log_context import log_context
 from services.optimizer.run.outage import Outage, is_infrastructure
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 
 _BEATS_PER_LEASE: Final = 3
 _LONGEST_INTERVAL: Final = 1.0

@@ -23,7 +23,7 @@ from services.optimizer.log_context import log_context
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from services.optimizer.store.base import Store
+from services.optimizer.store.port.base import Store
 from sim.provenance import simulator_digest
 
 _PAUSES: Final = Backoff(first=0.5, longest=10.0)

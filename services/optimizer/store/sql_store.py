@@ -28,14 +28,8 @@ from services.optimizer.jobs.provenance import JobProvenance, first_record
 from services.optimizer.jobs.quota import Quota
 from services.optimizer.jobs.reference import Reference
 from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.audit import audit_page, note_change, note_submission
-from services.optimizer.store.changes import SqlChanges
-from services.optimizer.store.claims import (
-    lease_is_live,
-    take_job,
-)
-from services.optimizer.store.deletion import SqlDeletion
-from services.optimizer.store.engine import (
+from services.optimizer.store.connections.changes import SqlChanges
+from services.optimizer.store.connections.engine import (
     Clock,
     Database,
     check_file,
@@ -43,36 +37,52 @@ from services.optimizer.store.engine import (
     database_time,
     parse_url,
 )
-from services.optimizer.store.file_system import check_file_system
-from services.optimizer.store.history import SqlHistory, checked_limit
-from services.optimizer.store.in_use import admit
-from services.optimizer.store.job_cursors import cursor_of
-from services.optimizer.store.job_list import among_jobs, fittest_jobs, job_rows, newest_jobs
-from services.optimizer.store.job_orders import sort_jobs
-from services.optimizer.store.job_rows import request_digest, to_job
-from services.optimizer.store.job_views import shown_job
-from services.optimizer.store.labels import count_facets, label_job
-from services.optimizer.store.migrate import create
-from services.optimizer.store.outbox import SqlOutbox
-from services.optimizer.store.queue import count_jobs
-from services.optimizer.store.reading import Page, Queue
-from services.optimizer.store.recordings import (
+from services.optimizer.store.connections.file_system import check_file_system
+from services.optimizer.store.port.reading import Page, Queue
+from services.optimizer.store.rows.job_rows import request_digest, to_job
+from services.optimizer.store.rows.job_views import shown_job
+from services.optimizer.store.rows.tables import jobs
+from services.optimizer.store.schema.in_use import admit
+from services.optimizer.store.schema.migrate import create
+from services.optimizer.store.schema.revisions import check_revision
+from services.optimizer.store.statements.audit import audit_page, note_change, note_submission
+from services.optimizer.store.statements.claims import (
+    lease_is_live,
+    take_job,
+)
+from services.optimizer.store.statements.job_cursors import cursor_of
+from services.optimizer.store.statements.job_list import (
+    among_jobs,
+    fittest_jobs,
+    job_rows,
+    newest_jobs,
+)
+from services.optimizer.store.statements.job_orders import sort_jobs
+from services.optimizer.store.statements.labels import count_facets, label_job
+from services.optimizer.store.statements.queue import count_jobs
+from services.optimizer.store.statements.recordings import (
     insert_recording,
     load_recordings,
     recording_id,
 )
-from services.optimizer.store.records import (
+from services.optimizer.store.statements.records import (
     entering,
     job_row,
     require_readable,
     shown_row,
     update_job,
 )
-from services.optimizer.store.revisions import check_revision
-from services.optimizer.store.runs import SqlRuns
-from services.optimizer.store.submissions import Submission, check_quota, insert_job, repeated_job
-from services.optimizer.store.tables import jobs
-from services.optimizer.store.tokens import SqlTokens
+from services.optimizer.store.statements.submissions import (
+    Submission,
+    check_quota,
+    insert_job,
+    repeated_job,
+)
+from services.optimizer.store.transactions.deletion import SqlDeletion
+from services.optimizer.store.transactions.history import SqlHistory, checked_limit
+from services.optimizer.store.transactions.outbox import SqlOutbox
+from services.optimizer.store.transactions.runs import SqlRuns
+from services.optimizer.store.transactions.tokens import SqlTokens
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _LONGEST_KEY: Final = 200

@@ -1,0 +1,201 @@
+"""Designs as commands are given them: JSON, files, published names, ids of jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from cli.inputs.job_ids import full_id
+from cli.inputs.spec_file import json_object, read_json_object
+from services.optimizer.errors import InvalidRequest, NotFound
+from sim.controllers import CONTROLLERS, Controller, ControllerName
+from sim.gait_variables import GAIT_VARIABLES
+from sim.variables import Variable, VariableCatalogue
+
+if TYPE_CHECKING:
+    from services.optimizer.jobs.kinds.tuning import JobSpec
+
+_PUBLISHED: Final = "published:"
+_JOB: Final = "job:"
+_DEFAULT_CONTROLLER: Final = "fuzzy-pi"
+
+
+@dataclass(frozen=True, slots=True)
+class GivenDesign:
+    """A design from a file, from the literature, or a job's best.
+
+    Attributes:
+        label: what people call it.
+        controller: that it is a design of.
+        values: by name, in the variables' units; of a categorical variable the index of a choice.
+        spec: of the job whose best it is, with its robot, scenarios and variables; None for a
+            design from elsewhere.
+    """
+
+    label: str
+    controller: ControllerName
+    values: dict[str, float]
+    spec: JobSpec | None = None
+
+
+def given_design(
+    given: str,
+    controller: str | None,
+    trajectory: Path | None = None,
+    *,
+    server: str | None,
+    db: str | None,
+) -> GivenDesign:
+    """The design that an argument DESIGN|ID names.
+
+    Args:
+        given: a JSON object, `published:NAME`, a file, `-` for standard input, or the id of a job
+            that tunes a drive; `job:ID` is always a job, whatever files there are.
+        controller: of the design; None for the job's, or for fuzzy-pi.
+        trajectory: as for `read_design`.
+        server: URL of the server to ask for the job, or None.
+        db: database to look for it, or None.
+
+    Returns:
+        The design, its numbers not checked yet.
+
+    Raises:
+        InvalidRequest: it is no design of the controller, or the job tunes no drive; names the
+            field.
+        NotFound: no such job, or none of its designs has walked in every scenario.
+    """
+    if not may_be_file(given):
+        best = _best_of_job(given.removeprefix(_JOB), controller, server, db)
+        return replace(best, values=_in_gait(best.values, trajectory))
+    if given.startswith(_PUBLISHED):
+        label = f"published {given.removeprefix(_PUBLISHED)}"
+    else:
+        label = "design" if _is_json(given) else Path(given).stem
+    chosen = _controller_name(controller or _DEFAULT_CONTROLLER)
+    return GivenDesign(label, chosen, read_design(given, chosen, trajectory))
+
+
+def may_be_file(given: str) -> bool:
+    """Whether an argument DESIGN|ID names something else than a job.
+
+    given: as for `given_design`.
+    """
+    if given.startswith(_JOB):
+        return False
+    named = given == "-" or given.startswith(_PUBLISHED) or given.endswith(".json")
+    return named or _is_json(given) or Path(given).exists()
+
+
+def _is_json(given: str) -> bool:
+    return given.lstrip().startswith("{")
+
+
+def _best_of_job(
+    job_id: str, controller: str | None, server: str | None, db: str | None
+) -> GivenDesign:
+    from gaitswarm.jobs.open import open_jobs
+    from services.optimizer.jobs.kinds.tuning import JobSpec
+    from sim.catalogue import design_numbers
+
+    with open_jobs(server, db) as jobs:
+        job_id = full_id(jobs, job_id)
+        try:
+            spec = jobs.job(job_id).spec
+        except NotFound as error:
+            hint = "a design is the id of a job, a file, or published:NAME"
+            raise NotFound(f"{error}; {hint}") from error
+        if not isinstance(spec, JobSpec):
+            raise InvalidRequest(
+                f"job {job_id} is of kind {spec.kind}, which tunes no drive", field="design"
+            )
+        best = jobs.best(job_id)
+    if controller not in (None, spec.controller):
+        raise InvalidRequest(
+            f"job {job_id} tunes {spec.controller}, not {controller}", field="controller"
+        )
+    values = design_numbers(spec.controller, best.design)
+    return GivenDesign(spec.name or f"job {job_id}", spec.controller, values, spec)
+
+
+def read_design(design: str, controller: str, trajectory: Path | None = None) -> dict[str, Any]:
+    """Values by name, choices as their indices; numbers are not checked yet.
+
+    design: a flat JSON object {name: value}, or one with that under `design`, as `best --json`
+        prints; or a file that holds it; or `published:NAME` for a design of the literature; or
+        `job:ID` for the best of a job in the database that the environment names.
+    trajectory: a file with gait parameters only, none of which a design file may set as well; a
+        published design walks in this gait in place of its own.
+    Raises InvalidRequest that names the field.
+    """
+    values = _read_values(design, controller)
+    own = _controller(controller)
+    known = (*own.variables, *own.conventions, *GAIT_VARIABLES)
+    values = _checked(values, known, "design")
+    return _in_gait(values, trajectory, replacing=design.startswith(_PUBLISHED))
+
+
+def _in_gait(
+    values: dict[str, Any], trajectory: Path | None, *, replacing: bool = False
+) -> dict[str, Any]:
+    """A design with the gait parameters of a file; replacing: also those that it sets itself."""
+    if trajectory is None:
+        return values
+    gait = _checked(read_json_object(trajectory, "trajectory"), GAIT_VARIABLES, "trajectory")
+    for name in gait:
+        if name in values and not replacing:
+            raise InvalidRequest("set in the design too; choose one", field=f"trajectory.{name}")
+    return {**values, **gait}
+
+
+def _read_values(design: str, controller: str) -> dict[str, Any]:
+    if design.startswith(_PUBLISHED):
+        published = _controller(controller).published
+        name = design.removeprefix(_PUBLISHED)
+        if name not in published:
+            known = ", ".join(published)
+            raise InvalidRequest(
+                f"no published design {name!r} of {controller}; known are {known}", field="design"
+            )
+        return dict(published[name])
+    if design.startswith(_JOB):
+        return _best_of_job(design.removeprefix(_JOB), controller, None, None).values
+    if _is_json(design):
+        content = json_object(design, "design")
+    else:
+        content = read_json_object(Path(design), "design")
+    values = content.get("design", content)
+    if not isinstance(values, dict):
+        raise InvalidRequest("must be an object of values by name", field="design")
+    return values
+
+
+def _controller(name: str) -> Controller:
+    return CONTROLLERS[_controller_name(name)]
+
+
+def _controller_name(name: str) -> ControllerName:
+    if name not in CONTROLLERS:
+        raise InvalidRequest(CONTROLLERS.unknown(name), field="controller")
+    return name
+
+
+def _checked(values: dict[str, Any], known: Sequence[Variable], field: str) -> dict[str, Any]:
+    """Values of known variables, with the index of a choice in place of its name."""
+    variables = VariableCatalogue(known)
+    checked = dict(values)
+    for name, value in values.items():
+        if name not in variables:
+            raise InvalidRequest(
+                f"unknown variable; known are {', '.join(sorted(variables))}",
+                field=f"{field}.{name}",
+            )
+        if variables[name].kind == "categorical" and isinstance(value, str):
+            try:
+                checked[name] = variables[name].number(value)
+            except ValueError as error:
+                raise InvalidRequest(
+                    str(error).removeprefix(f"{name}: "), field=f"{field}.{name}"
+                ) from error
+    return checked

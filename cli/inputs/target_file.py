@@ -1,0 +1,196 @@
+"""Tables of measured or published results, TARGETS.csv, as a calibration has them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from cli.inputs.design_file import read_design
+from cli.inputs.spec_file import read_json_object
+from services.optimizer.errors import InvalidRequest
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+_NEEDED: Final = ("walk", "controller", "design", "scenario", "quantity", "value", "tolerance")
+_OPTIONAL: Final = ("relative_to", "use")
+_OF_WALK: Final = ("controller", "design", "scenario")
+
+_LARGEST: Final = 1 << 20
+"""Largest table that is read [B]."""
+
+
+def read_targets(path: Path) -> dict[str, list[dict[str, Any]]]:
+    """Walks and targets, as a spec of kind `calibration` has them.
+
+    path: a CSV file with a head; empty lines and those that begin with # are left out. A walk's
+        controller, design and scenario may be left empty in its further rows. Files of
+        designs and scenarios are looked up from the table's folder.
+
+    Raises InvalidRequest that names line and column.
+    """
+    walks: dict[str, dict[str, Any]] = {}
+    cells_of: dict[str, dict[str, str]] = {}
+    targets = []
+    for line, row in _rows(path):
+        name = row["walk"]
+        cells = {column: row[column] for column in _OF_WALK}
+        if name in walks:
+            for column, cell in cells.items():
+                if cell not in ("", cells_of[name][column]):
+                    raise _refusal(
+                        path, line, column, f"the walk {name!r} has another above; rename one"
+                    )
+        else:
+            walks[name] = _walk(path, line, name, cells)
+            cells_of[name] = cells
+        targets.append(_target(path, line, row, walks))
+    if not targets:
+        raise InvalidRequest(f"{path} has no rows", field="targets")
+    return {"walks": list(walks.values()), "targets": targets}
+
+
+def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
+    """Line numbers and cells by column, stripped."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            text = file.read(_LARGEST + 1)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidRequest(f"cannot read {path}: {error}", field="targets") from error
+    if len(text) > _LARGEST:
+        raise InvalidRequest(f"{path} is larger than {_LARGEST >> 20} MiB", field="targets")
+    reader = csv.reader(text.splitlines(), strict=True, skipinitialspace=True)
+    head: list[str] | None = None
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if not any(cells) or cells[0].startswith("#"):
+                continue
+            if head is None:
+                head = _head(path, reader.line_num, cells)
+            elif len(cells) > len(head):
+                raise _refusal(
+                    path, reader.line_num, head[-1], "the line has more cells than the head"
+                )
+            else:
+                named = dict(zip(head, cells, strict=False))
+                yield reader.line_num, dict.fromkeys((*_NEEDED, *_OPTIONAL), "") | named
+    except csv.Error as error:
+        raise InvalidRequest(f"{path}, line {reader.line_num}: {error}", field="targets") from error
+
+
+def _head(path: Path, line: int, columns: list[str]) -> list[str]:
+    for column in columns:
+        if column not in (*_NEEDED, *_OPTIONAL):
+            known = ", ".join((*_NEEDED, *_OPTIONAL))
+            raise _refusal(path, line, column, f"unknown column; known are {known}")
+        if columns.count(column) > 1:
+            raise _refusal(path, line, column, "there are two columns of this name")
+    for column in _NEEDED:
+        if column not in columns:
+            raise _refusal(path, line, column, "the head lacks this column")
+    return columns
+
+
+def _walk(path: Path, line: int, name: str, cells: Mapping[str, str]) -> dict[str, Any]:
+    from sim.calibration.targets import TargetWalk
+
+    for column, cell in cells.items():
+        if not cell:
+            raise _refusal(path, line, column, f"empty in the first row of the walk {name!r}")
+    document = {
+        "name": name,
+        "controller": cells["controller"],
+        "design": _design(path, line, cells),
+        "scenarios": [
+            _scenario(path, line, entry) if entry.endswith(".json") else entry
+            for entry in cells["scenario"].split()
+        ],
+    }
+    columns = {"name": "walk", "scenarios": "scenario"}
+    return _checked(path, line, TargetWalk, document, columns).model_dump(mode="json")
+
+
+def _scenario(path: Path, line: int, name: str) -> dict[str, Any]:
+    try:
+        return read_json_object(path.parent / name, "scenario")
+    except InvalidRequest as error:
+        message = str(error).removeprefix("scenario: ")
+        raise _refusal(path, line, "scenario", message) from error
+
+
+def _design(path: Path, line: int, cells: Mapping[str, str]) -> dict[str, Any]:
+    cell = cells["design"]
+    try:
+        if cell.startswith("{"):
+            design = json.loads(cell)
+            return dict(design)
+        if not cell.startswith("published:"):
+            cell = str(path.parent / cell)
+        return read_design(cell, cells["controller"])
+    except InvalidRequest as error:
+        column = "controller" if error.field == "controller" else "design"
+        raise _refusal(path, line, column, str(error).removeprefix("design: ")) from error
+    except ValueError as error:
+        raise _refusal(path, line, "design", f"not JSON: {error}") from error
+
+
+def _target(
+    path: Path, line: int, row: Mapping[str, str], walks: Mapping[str, dict[str, Any]]
+) -> dict[str, Any]:
+    from sim.calibration.targets import QUANTITIES, Target
+
+    document: dict[str, Any] = {
+        "walk": row["walk"],
+        "quantity": row["quantity"],
+        "relative_to": row["relative_to"] or None,
+        "use": row["use"] or "fit",
+    }
+    for column in ("value", "tolerance"):
+        try:
+            document[column] = float(row[column])
+        except ValueError as error:
+            raise _refusal(path, line, column, f"{row[column]!r} is not a number") from error
+    target = _checked(path, line, Target, document, {})
+    scenarios = len(walks[row["walk"]]["scenarios"])
+    if scenarios > 1 and not QUANTITIES[document["quantity"]].scenarios:
+        raise _refusal(
+            path, line, "quantity", f"of one scenario, and the walk has {scenarios}; name another"
+        )
+    return target.model_dump(mode="json")
+
+
+def _checked(
+    path: Path,
+    line: int,
+    model: type[BaseModel],
+    document: dict[str, Any],
+    columns: Mapping[str, str],
+) -> BaseModel:
+    """columns: of the fields that are called otherwise in the table."""
+    from pydantic import ValidationError
+
+    from sim.choice import without_tags
+    from sim.wording import message_of
+
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        message = message_of(first)
+        location = without_tags(first["loc"])
+        if location:
+            field = str(location[0])
+            if len(location) > 1 and field == "design":
+                message = f"{location[1]}: {message}"
+        else:
+            # A validator of the whole names the field first.
+            field, _, message = message.partition(": ")
+        raise _refusal(path, line, columns.get(field, field), message) from error
+
+
+def _refusal(path: Path, line: int, column: str, message: str) -> InvalidRequest:
+    return InvalidRequest(f"{path}, line {line}, column {column}: {message}", field="targets")

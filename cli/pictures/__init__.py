@@ -1,0 +1,1 @@
+"""Pictures of jobs, robots and comparisons, drawn without a screen."""

@@ -1,0 +1,1 @@
+"""Studies of several jobs, and what they come to."""

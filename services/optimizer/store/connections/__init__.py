@@ -1,0 +1,1 @@
+"""Connections to SQLite and PostgreSQL, their transactions, and news of commits."""

@@ -1,0 +1,1 @@
+"""Tables, and rows to objects of the domain and back."""

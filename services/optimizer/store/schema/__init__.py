@@ -1,0 +1,1 @@
+"""The schema's revisions, and what is done to a whole database: upgrade, check, backup."""

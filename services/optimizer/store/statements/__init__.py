@@ -1,0 +1,1 @@
+"""Statements inside a transaction that someone else began."""

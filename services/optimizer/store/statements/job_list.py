@@ -1,0 +1,122 @@
+"""The job list as most ask for it: by its indexes, no more of it than a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sqlalchemy import ColumnElement, Connection, false, func, select, tuple_
+
+from services.optimizer.jobs.job import Job, JobOrder, JobState
+from services.optimizer.store.port.reading import Page
+from services.optimizer.store.rows.evaluation_rows import Row
+from services.optimizer.store.rows.job_views import SHOWN, shown_job
+from services.optimizer.store.rows.tables import EXISTING, jobs
+from services.optimizer.store.statements.job_cursors import (
+    cursor_of,
+    from_cursor,
+    from_fitness_cursor,
+    to_cursor,
+)
+from services.optimizer.store.statements.records import is_job_id
+
+Among = tuple[ColumnElement[bool], ...]
+"""Conditions on jobs, all of which hold for those that are wanted."""
+
+
+def among_jobs(state: JobState | None, parent: str | None, archived: bool | None = None) -> Among:
+    """Conditions on jobs that the database itself can tell.
+
+    Args:
+        state: Only jobs in this state; None for any.
+        parent: Only jobs that were forked from the job of this id; None for any.
+        archived: Only jobs that are archived, or that are not; None for both.
+
+    Returns:
+        The conditions.
+    """
+    found: list[ColumnElement[bool]] = [EXISTING]
+    if archived is not None:
+        found.append(func.coalesce(jobs.c.archived, False).is_(archived))
+    if state is not None:
+        found.append(jobs.c.state == state)
+    # An id that is none might have characters that a database refuses.
+    if parent is not None:
+        found.append(jobs.c.parent_id == parent if is_job_id(parent) else false())
+    return tuple(found)
+
+
+def newest_jobs(connection: Connection, among: Among, after: str | None, limit: int) -> Page[Job]:
+    """Read the list as most ask for it: by one query, which reads no more than the page.
+
+    Args:
+        connection: An open transaction.
+        among: Only jobs for which these hold.
+        after: `next` of the page before.
+        limit: Most jobs on the page.
+
+    Returns:
+        The page, newest first.
+
+    Raises:
+        InvalidRequest: `after` is no cursor of this order.
+    """
+    newest = select(*SHOWN).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
+    query = newest.where(*among).limit(limit + 1)
+    if after is not None:
+        created_at, job_id = from_cursor(after)
+        types = (jobs.c.created_at.type, jobs.c.id.type)
+        place = tuple_(created_at, job_id, types=types)
+        query = query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
+    rows = connection.execute(query).mappings().all()
+    found = tuple(shown_job(row) for row in rows[:limit])
+    more = len(rows) > limit
+    return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
+
+
+def fittest_jobs(connection: Connection, among: Among, after: str | None, limit: int) -> Page[Job]:
+    """Read the list by fitness, no more of it than the page.
+
+    Args:
+        connection: An open transaction.
+        among: Only jobs for which these hold.
+        after: `next` of the page before.
+        limit: Most jobs on the page.
+
+    Returns:
+        The page, the best fitness first, jobs without one last.
+
+    Raises:
+        InvalidRequest: `after` is no cursor of this order.
+    """
+    fitness, job_id = (None, "") if after is None else from_fitness_cursor(after)
+    columns = (jobs.c.best_fitness, jobs.c.id)
+    rows: list[Row] = []
+    # Apart, for an index has those without a fitness at its other end.
+    if after is None or fitness is not None:
+        query = select(*SHOWN).where(*among, columns[0].is_not(None))
+        if after is not None:
+            place = tuple_(fitness, job_id, types=tuple(column.type for column in columns))
+            query = query.where(tuple_(*columns) > place)
+        rows += connection.execute(query.order_by(*columns).limit(limit + 1)).mappings()
+    if len(rows) <= limit:
+        last = job_id if fitness is None else ""
+        query = select(*SHOWN).where(*among, columns[0].is_(None), columns[1] > last)
+        query = query.order_by(*columns).limit(limit + 1 - len(rows))
+        rows += connection.execute(query).mappings()
+    following = cursor_of(rows[limit - 1], JobOrder.FITNESS) if len(rows) > limit else None
+    return Page(tuple(shown_job(row) for row in rows[:limit]), following)
+
+
+def job_rows(connection: Connection, ids: Sequence[str]) -> list[Row]:
+    """Read the rows of jobs.
+
+    Args:
+        connection: An open transaction.
+        ids: Of the jobs.
+
+    Returns:
+        The columns `SHOWN`, in the order of the ids.
+    """
+    query = select(*SHOWN).where(jobs.c.id.in_(ids))
+    rows = {row["id"]: row for row in connection.execute(query).mappings()}
+    return [rows[job_id] for job_id in ids]

@@ -1,0 +1,114 @@
+"""What people write on jobs, and how many jobs there are of a kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any, Final
+
+from sqlalchemy import ColumnElement, Connection, Text, case, cast, func, select
+
+from services.optimizer.jobs.audit import AuditAction
+from services.optimizer.jobs.labels import (
+    FacetCounts,
+    Facets,
+    LabelsChange,
+    preference_name,
+    robot_name,
+)
+from services.optimizer.store.rows.evaluation_rows import Row
+from services.optimizer.store.rows.job_rows import labels_of
+from services.optimizer.store.rows.tables import jobs
+from services.optimizer.store.statements.audit import note_change
+from services.optimizer.store.statements.records import job_row, update_job
+
+_FIELDS: Final = ("robot", "controller", "preference")
+"""Of a spec, by which jobs are found."""
+
+
+def label_job(
+    connection: Connection, job_id: str, change: LabelsChange, *, now: datetime, actor: str
+) -> Row:
+    """Change what is written on a job.
+
+    Args:
+        connection: An open transaction that may write.
+        job_id: Of the job.
+        change: What is to be different.
+        now: The time at which it is.
+        actor: Whom the audit log is to name.
+
+    Returns:
+        The job's row as it is then.
+    """
+    row = job_row(connection, job_id, lock=True)
+    columns: dict[str, Any] = {"labels": change.applied(labels_of(row)).model_dump(mode="json")}
+    if change.archived is not None:
+        columns["archived"] = change.archived
+    note_change(connection, now, actor, AuditAction.LABEL, job_id)
+    return update_job(connection, row, columns)
+
+
+def spec_field(connection: Connection, name: str) -> ColumnElement[str]:
+    """Select a text of a job's spec.
+
+    Args:
+        connection: Tells the dialect.
+        name: Of a field of the spec.
+
+    Returns:
+        The text; "" where the spec has none of this name, or is no JSON.
+    """
+    document = cast(jobs.c.spec, Text)
+    if connection.dialect.name == "sqlite":
+        # It keeps any text, and fails at a path into one that is not JSON.
+        is_readable: ColumnElement[bool] = func.json_valid(document)
+    else:
+        # A zero byte, as JSON spells it, makes PostgreSQL fail at any path into the document.
+        is_readable = func.strpos(document, r"\u0000") == 0
+    found = case((is_readable, jobs.c.spec[name].as_string()), else_="")
+    return func.coalesce(cast(found, Text), "")
+
+
+def facet_columns(connection: Connection) -> list[ColumnElement[Any]]:
+    """Select what jobs are found by.
+
+    Args:
+        connection: Tells the dialect.
+
+    Returns:
+        Columns that `to_facets` reads, in order.
+    """
+    return [jobs.c.state, jobs.c.labels, *(spec_field(connection, name) for name in _FIELDS)]
+
+
+def to_facets(row: Any) -> Facets:
+    """Read what a job is found by.
+
+    Args:
+        row: Values of `facet_columns`.
+
+    Returns:
+        Its facets.
+    """
+    state, labels, robot, controller, preference = row
+    tags = labels.get("tags", ()) if isinstance(labels, dict) else ()
+    return Facets(
+        state, robot_name(robot), controller or None, preference_name(preference), tuple(tags)
+    )
+
+
+def count_facets(connection: Connection, among: Sequence[ColumnElement[bool]]) -> FacetCounts:
+    """Count jobs by what they are found by.
+
+    Args:
+        connection: An open transaction.
+        among: Only jobs for which these hold.
+
+    Returns:
+        The counts.
+    """
+    counts = FacetCounts()
+    for row in connection.execute(select(*facet_columns(connection)).where(*among)):
+        counts.add(to_facets(row))
+    return counts

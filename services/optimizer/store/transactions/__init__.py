@@ -1,0 +1,1 @@
+"""What is done in transactions of its own: runs, history, deletion, tokens, notifications."""

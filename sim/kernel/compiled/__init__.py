@@ -1,0 +1,1 @@
+"""The compiled kernel: loaded, called, and kept busy."""

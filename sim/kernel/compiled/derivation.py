@@ -1,0 +1,71 @@
+"""A kernel's C text for a robot by anybody, derived in a process that may be ended."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from sim.errors import KernelBuildError, ProcessEnded
+from sim.kernel.emitted.source import kernel_source
+from sim.limited_process import Document, LimitedProcesses, serve
+from sim.robot import Robot
+from sim.robot.description import RobotDescription
+from sim.robot.robot import assembled
+
+if TYPE_CHECKING:
+    from sim.kernel.walk import Precision
+
+SECONDS: Final = 120.0
+"""That a derivation may take; it takes one or two, and a second more to start."""
+
+CPU_SECONDS: Final = 60
+
+MEMORY: Final = 4 << 30
+"""Address space of a process that derives [B]; it takes a tenth of that."""
+
+# Not kept: CasADi's symbols would take memory, and robots with a new kernel are rare.
+PROCESSES: Final = LimitedProcesses(
+    "sim.kernel.compiled.derivation",
+    count=2,
+    seconds=SECONDS,
+    cpu_seconds=CPU_SECONDS,
+    memory=MEMORY,
+    kept=False,
+)
+
+
+def derived_source(robot: Robot, precision: Precision = "double") -> str:
+    """As `kernel_source`; in a process of its own, unless the robot ships.
+
+    Args:
+        robot: As for `native_kernel`.
+        precision: Of the physics.
+
+    Returns:
+        C text that lacks the definition of DOUBLES only.
+
+    Raises:
+        KernelBuildError: It took too much time or memory, or ended its process.
+    """
+    if robot.ships:
+        return kernel_source(robot, precision)
+    request = {
+        "description": robot.description.model_dump(mode="json"),
+        "urdf": robot.urdf.text,
+        "precision": precision,
+    }
+    try:
+        return str(PROCESSES.ask(request)["source"])
+    except ProcessEnded as error:
+        raise KernelBuildError(
+            f"there is no kernel for {robot.description.name!r}: deriving it {error}"
+        ) from error
+
+
+def _answer(request: Document) -> Document:
+    description = RobotDescription.model_validate(request["description"])
+    robot = assembled(description, request["urdf"])
+    return {"source": kernel_source(robot, request["precision"])}
+
+
+if __name__ == "__main__":
+    serve(_answer)

@@ -1,0 +1,1 @@
+"""A physics step as symbols: rigid bodies, motors and contact, derived from Pinocchio's model."""

@@ -1,0 +1,284 @@
+"""Ground contact of a point foot and its laws of friction, as symbols (thesis 2.2.6).
+
+What a law reads and carries from step to step, as data: `sim.kernel.parameters.CONTACT_LAWS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import casadi as ca
+
+from sim.kernel.dynamics.articulated_body import LinkState
+from sim.kernel.dynamics.spatial import (
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    cross,
+    dot,
+    mirrored,
+    outer,
+    plus,
+    scale,
+    subtract,
+)
+from sim.robot.description import ContactLaw
+
+InternalState = tuple[Scalar, ...]
+"""What a law carries of one foot from step to step; for most laws nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Foot:
+    """A foot in its link's frame.
+
+    Attributes:
+        at: the tibia's end [m].
+        up: the ground's normal.
+        ahead: the world's x axis.
+        left: the world's y axis.
+        velocity: of the tibia's end [m/s].
+        rising: part of the velocity along `up` [m/s].
+        normal: force of the ground's spring [N].
+        touching: 1 on the ground, 0 in the air.
+        damping: of the normal force, while it is not held at zero [N s/m].
+        penetration: of the sole into the ground, negative in the air [m].
+        mobility: upper bound of the foot's acceleration under a force [1/kg].
+    """
+
+    at: Vector
+    up: Vector
+    ahead: Vector
+    left: Vector
+    velocity: Vector
+    rising: Scalar
+    normal: Scalar
+    touching: Scalar
+    damping: Scalar
+    penetration: Scalar
+    mobility: Scalar
+
+    def lands_within(self, time: float) -> Scalar:
+        """Whether the foot may come down.
+
+        Args:
+            time: [s].
+
+        Returns:
+            1 if it is in the air and, at this speed, on the ground by then; else 0.
+        """
+        return (1.0 - self.touching) * (self.penetration > self.rising * time)
+
+    def sliding(self, drag: Scalar, timestep: Scalar) -> Scalar:
+        """How sure it is that a sliding foot still slides after a step.
+
+        A friction that does not depend on the speed must not be taken as constant over a step in
+        which it may bring the foot to rest: the step would turn the foot round.
+
+        Args:
+            drag: The whole friction per speed [N s/m].
+            timestep: [s].
+
+        Returns:
+            1 for sure, 0 if the friction may stop the foot.
+        """
+        return ca.fmax(1.0 - drag * (timestep * self.mobility), 0.0)
+
+    def resisting(self, sideways: Scalar, further: Scalar = 0.0) -> Matrix:
+        """How a force at the foot falls as the foot moves faster.
+
+        Args:
+            sideways: Along the ground, in every direction [N s/m].
+            further: What is added along the slip, over the slip's square [N s3/m3].
+
+        Returns:
+            -dF/dv in the link's frame, with the damping along `up`, symmetric [N s/m].
+        """
+        resistance = outer(scale(self.damping - sideways, self.up), self.up)
+        even = ((sideways, 0.0, 0.0), (0.0, sideways, 0.0), (0.0, 0.0, sideways))
+        resistance = plus(resistance, even)
+        if not isinstance(further, float):
+            slip = subtract(self.velocity, scale(self.rising, self.up))
+            resistance = plus(resistance, outer(scale(further, slip), slip))
+        return mirrored(resistance)
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """The ground's answer to a foot, in the link's frame.
+
+    Attributes:
+        force: on the foot [N].
+        resistance: -dF/dv, symmetric [N s/m].
+        internal_state: after the step.
+    """
+
+    force: Vector
+    resistance: Matrix
+    internal_state: InternalState = ()
+
+
+Friction = Callable[[Foot, Mapping[str, Scalar], InternalState, Scalar], Reaction]
+"""A law of friction: (foot, ground, internal state, timestep) -> reaction. Its resistance leaves
+out how friction follows the normal force, which is not symmetric."""
+
+
+def foot_on_ground(
+    link: LinkState, at: Vector, ground: Mapping[str, Scalar], mobility: Scalar
+) -> Foot:
+    """F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling.
+
+    The sole's spring hangs below the tibia's end along the ground's normal.
+
+    Args:
+        link: State of the tibia.
+        at: The tibia's end in its frame [m].
+        ground: Parameters of the foot by the names of `sim.robot.description.Contact`.
+        mobility: Upper bound of the tibia's end's acceleration under a force [1/kg].
+
+    Returns:
+        The foot.
+    """
+    velocity = add(link.velocity.linear, cross(link.velocity.angular, at))
+    penetration = ground["sole"] - (link.height + dot(link.up, at))
+    rising = dot(link.up, velocity)
+    touching = penetration > 0.0
+    elastic = ground["stiffness"] * penetration - ground["damping"] * rising
+    return Foot(
+        at=at,
+        up=link.up,
+        ahead=link.ahead,
+        left=cross(link.up, link.ahead),
+        velocity=velocity,
+        rising=rising,
+        normal=ca.fmax(elastic, 0.0) * touching,
+        touching=touching,
+        damping=ground["damping"] * ((elastic > 0.0) * touching),
+        penetration=penetration,
+        mobility=mobility,
+    )
+
+
+def linear_zone(
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
+) -> Reaction:
+    """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6).
+
+    Args:
+        foot: The foot.
+        ground: Its `friction` and `slip_velocity`.
+        internal_state: Nothing.
+        timestep: Of the physics [s].
+
+    Returns:
+        The reaction.
+    """
+    del internal_state
+    zone = ground["slip_velocity"]
+    # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
+    squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
+    pace = 1.0 / ca.sqrt(ca.fmax(squared, zone * zone))
+    limit = ground["friction"] * foot.normal
+    drag = limit * pace
+    force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
+    constant = (squared > zone * zone) * foot.sliding(drag, timestep)
+    further = -constant * drag * (pace * pace)
+    return Reaction(force, foot.resisting(drag, further))
+
+
+def karnopp(
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
+) -> Reaction:
+    """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14).
+
+    Args:
+        foot: The foot.
+        ground: Its `friction` and `stick_velocity`.
+        internal_state: Nothing.
+        timestep: Not needed.
+
+    Returns:
+        The reaction.
+    """
+    del internal_state, timestep
+    threshold, limit = ground["stick_velocity"], ground["friction"] * foot.normal
+    force = scale(foot.normal, foot.up)
+    for axis in (foot.ahead, foot.left):
+        speed = dot(axis, foot.velocity)
+        sign = (threshold < speed) - (speed < -threshold)
+        force = add(force, scale(-limit * sign, axis))
+    return Reaction(force, foot.resisting(0.0))
+
+
+def stick(
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
+) -> Reaction:
+    """Spring and damper along the ground from where the foot came down, saturated at mu F_z.
+
+    Args:
+        foot: The foot.
+        ground: Its `friction`, `stick_stiffness` and `stick_damping`.
+        internal_state: The spring's elongation along the world's x and y [m].
+        timestep: Of the physics [s].
+
+    Returns:
+        The reaction, with the elongation after the step, which shrinks when the foot slips, and is
+        gone when it lifts off.
+    """
+    k, c = ground["stick_stiffness"], ground["stick_damping"]
+    stretched, wanted = [], []
+    for axis, elongation in zip((foot.ahead, foot.left), internal_state, strict=True):
+        speed = dot(axis, foot.velocity)
+        longer = (elongation + timestep * speed) * foot.touching
+        stretched.append(longer)
+        wanted.append(-(k * longer + c * speed))
+    limit = ground["friction"] * foot.normal
+    squared = wanted[0] * wanted[0] + wanted[1] * wanted[1]
+    # A foot in the air wants nothing and may have nothing: the bound keeps 0 / 0 away.
+    share = limit / ca.sqrt(ca.fmax(ca.fmax(squared, limit * limit), 1e-18))
+    force = scale(foot.normal, foot.up)
+    for axis, component in zip((foot.ahead, foot.left), wanted, strict=True):
+        force = add(force, scale(share * component, axis))
+    after = tuple(share * longer for longer in stretched)
+    return Reaction(force, foot.resisting(share * c * foot.touching), after)
+
+
+def dead_zone(
+    foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
+) -> Reaction:
+    """F_t = -mu F_z min(1, (|v| - v_d) / (v_lin - v_d)) v / |v|, none below v_d (table 2.6).
+
+    Args:
+        foot: The foot.
+        ground: Its `friction`, `stick_velocity` v_d and `slip_velocity` v_lin.
+        internal_state: Nothing.
+        timestep: Of the physics [s].
+
+    Returns:
+        The reaction.
+    """
+    del internal_state
+    threshold = ground["stick_velocity"]
+    # Identified speeds may cross: the friction then jumps at v_d.
+    width = ca.fmax(ground["slip_velocity"] - threshold, 1e-9)
+    squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
+    slip = ca.sqrt(ca.fmax(squared, threshold * threshold))
+    pace, steepness = 1.0 / slip, 1.0 / width
+    share = ca.fmin((slip - threshold) * steepness, 1.0)
+    limit = ground["friction"] * foot.normal
+    drag = limit * share * pace
+    force = add(scale(foot.normal + drag * foot.rising, foot.up), scale(-drag, foot.velocity))
+    steep = (squared > threshold * threshold) * (slip < threshold + width)
+    slope = limit * steep * steepness - drag
+    further = foot.sliding(limit * pace, timestep) * slope * (pace * pace)
+    return Reaction(force, foot.resisting(drag, further))
+
+
+FRICTION: Final[Mapping[ContactLaw, Friction]] = MappingProxyType(
+    {"linear_zone": linear_zone, "karnopp": karnopp, "stick": stick, "dead_zone": dead_zone}
+)
+"""By name."""

@@ -1,0 +1,40 @@
+"""The battery that all motors share, as symbols or numbers (thesis 2.2.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sim.kernel.dynamics.spatial import Scalar
+
+
+def supply_voltage(
+    duty: Sequence[Scalar],
+    rates: Sequence[Scalar],
+    torque: Sequence[Scalar],
+    conductance: Sequence[Scalar],
+    source: Scalar,
+    internal: Scalar,
+) -> Scalar:
+    """Voltage of one battery of finite resistance under quasi-static motor currents.
+
+    The bridges conserve power, so the battery's current is sum(duty_j I_j); with
+    I_j = (duty_j U_S - k_j omega_j) / R_j, U_S = V - R_i sum(duty_j I_j) is linear in U_S (thesis
+    2.2.5). The electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static.
+
+    Args:
+        duty: Motor voltage per supply voltage, (J,) [1].
+        rates: Motor velocities at the gearheads' outputs, (J,) [rad/s].
+        torque: r K_M, (J,) [N m/A].
+        conductance: Of the motors, (J,) [1/ohm].
+        source: Open-circuit voltage of the battery [V].
+        internal: Resistance of the battery [ohm].
+
+    Returns:
+        Under load [V].
+    """
+    back, load = 0.0, 0.0
+    for share, rate, k, g in zip(duty, rates, torque, conductance, strict=True):
+        per_ohm = share * g
+        back = back + per_ohm * (k * rate)
+        load = load + per_ohm * share
+    return (source + internal * back) / (1.0 + internal * load)

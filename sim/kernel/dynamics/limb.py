@@ -1,0 +1,366 @@
+"""One limb in a physics step, as symbols: what it passes to the body, and what comes back.
+
+A step is the kick of a leapfrog: it changes velocities at fixed positions. Forces that depend on
+velocity are taken at the step's middle by one linearly implicit equation, whose matrix is the
+articulated inertia with half a step's damping added (implicit midpoint rule; Hairer and Wanner,
+Solving Ordinary Differential Equations II, 1996, IV.7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import casadi as ca
+
+from sim.controllers.fixed_point import CONTROL_PERIOD
+from sim.kernel.dynamics.articulated_body import Link, LinkState, Passed, inward, outward
+from sim.kernel.dynamics.contact import FRICTION, foot_on_ground
+from sim.kernel.dynamics.drives import Drive, at_middle, drive_of, friction_of
+from sim.kernel.dynamics.gearhead import shaft_torque
+from sim.kernel.dynamics.inertia import Force, Inertia, Motion, RigidBody
+from sim.kernel.dynamics.rotation import Rotation
+from sim.kernel.dynamics.spatial import (
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    scale,
+    subtract,
+)
+from sim.kernel.parameters import CONTACT_LAWS
+from sim.robot.description import ContactLaw
+from sim.robot.limbs import Limb, LimbJoint
+
+Scalars = tuple[Scalar, ...]
+
+LANDING_HORIZON: Final = 1.25 * CONTROL_PERIOD
+"""How far a landing is seen [s]: at the last step of a control tick, to the end of the next one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """What is the same for all limbs in a step.
+
+    Attributes:
+        timestep: [s].
+        supply: voltage of the battery under load [V].
+        displaced: whether disturbances are angles, 1 or 0; for backlash only.
+    """
+
+    timestep: Scalar
+    supply: Scalar
+    displaced: Scalar = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LimbState:
+    """Joints and motors of a limb before a step, by joint.
+
+    Attributes:
+        angles: of the links [rad].
+        rates: of the links [rad/s].
+        duty: motor voltage per supply voltage, or commanded torque per torque limit [1].
+        disturbance: torque on the link [N m], or angle [rad].
+        motor_angles: with backlash [rad].
+        motor_rates: with backlash [rad/s].
+        carried: what the law of contact carries of the foot.
+    """
+
+    angles: Scalars
+    rates: Scalars
+    duty: Scalars
+    disturbance: Scalars
+    motor_angles: Scalars = ()
+    motor_rates: Scalars = ()
+    carried: Scalars = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What a limb keeps between the body's two halves of a step.
+
+    Attributes:
+        sines: of the joints' turning about their axes.
+        cosines: likewise.
+        passed: by `articulated_body.inward`.
+        drives: by joint.
+        armature: of the rotors, with half a step's damping [kg m2].
+        landing: 1 if the foot may come down within `LANDING_HORIZON`, else 0.
+        torques: that the gearheads pass to the links, before the step; without backlash with what
+            turns the rotors themselves [N m].
+        spins: accelerations of rotors behind backlash [rad/s2].
+    """
+
+    sines: Scalars
+    cosines: Scalars
+    passed: tuple[Passed, ...]
+    drives: tuple[Drive, ...]
+    armature: Scalars
+    landing: Scalar
+    torques: Scalars
+    spins: Scalars = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """What a limb comes to before the body's acceleration is known.
+
+    Attributes:
+        inertia: articulated, in the body's frame.
+        force: that the bias takes, in the body's frame.
+        held: for `after`.
+        motor_rates: after the step, with backlash.
+        carried: after the step.
+        foot_force: before the step: along the world's x, y, z [N].
+    """
+
+    inertia: Inertia
+    force: Force
+    held: Held
+    motor_rates: Scalars
+    carried: Scalars
+    foot_force: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class After:
+    """What a limb comes to.
+
+    Attributes:
+        accelerations: of the joints [rad/s2].
+        rates: of the joints after the step [rad/s].
+        currents: of the motors, at the step's middle [A].
+        loads: torques that the gearheads pass to the links, at the step's middle [N m].
+        tallies: sums over the limb's motors at the step's middle: |load| [N m], electrical power
+            [W], its absolute value [W], |current| [A], heat [W]; then the largest |current| [A],
+            and 1 if the foot may come down within `LANDING_HORIZON`, else 0.
+    """
+
+    accelerations: Scalars
+    rates: Scalars
+    currents: Scalars
+    loads: Scalars
+    tallies: Scalars
+
+
+def before(
+    limb: Limb,
+    law: ContactLaw,
+    base: LinkState,
+    state: LimbState,
+    environment: Environment,
+    p: Mapping[str, Scalars],
+) -> Before:
+    """From the body's state to what the body feels of the limb.
+
+    Args:
+        limb: Its constants.
+        law: Of contact.
+        base: State of the body.
+        state: Of the limb.
+        environment: Of the step.
+        p: Run-time parameters of the limb, by the names of `parameters.Layout`: by joint, or one
+            by foot.
+
+    Returns:
+        What the body and `after` need.
+    """
+    half = 0.5 * environment.timestep
+    sines, cosines = _turns(limb, state.angles)
+    links = _links(limb, sines, cosines, state.rates)
+    states = []
+    for link in links:
+        base = base.carries(link)
+        states.append(base)
+    drives = _drives(limb, state, environment, p)
+    if state.motor_angles:
+        shafts, spins = _behind_backlash(limb, state, drives, environment, p)
+        share = 1.0 - environment.displaced
+        torques = [a + share * b for a, b in zip(shafts, state.disturbance, strict=True)]
+        armature: list[Scalar] = [0.0] * len(links)
+    else:
+        spins = ()
+        torques = [d.torque + more for d, more in zip(drives, state.disturbance, strict=True)]
+        armature = [j.armature + half * d.damping for j, d in zip(limb.joints, drives, strict=True)]
+    passed_on, rotors = tuple(torques), tuple(armature)
+    for k, (angle, rate) in enumerate(zip(state.angles, state.rates, strict=True)):
+        obstacle = p["jam_stiffness"][k] * (angle - p["jam_angle"][k]) + p["jam_damping"][k] * rate
+        torques[k] = torques[k] - obstacle
+        armature[k] = armature[k] + half * p["jam_damping"][k]
+    ground = {name: p[name][0] for name in CONTACT_LAWS[law].parameters}
+    foot = foot_on_ground(states[-1], limb.foot, ground, limb.mobility)
+    reaction = FRICTION[law](foot, ground, state.carried, environment.timestep)
+    resistance = _scaled(half, reaction.resistance)
+    # Accelerations are relative to free fall until the end; the foot's resistance is not. A damper
+    # keeps its direction in the axes of the tibia.
+    gain = add(states[-1].gain_at(limb.foot), states[-1].gravity)
+    push = subtract(reaction.force, apply(resistance, gain))
+    inertia, force, passed = inward(
+        links,
+        states,
+        [joint.sign * torque for joint, torque in zip(limb.joints, torques, strict=True)],
+        armature,
+        Inertia.at_point(limb.foot, resistance),
+        Force(push, cross(limb.foot, push)),
+    )
+    dt = environment.timestep
+    return Before(
+        inertia,
+        force,
+        Held(
+            sines,
+            cosines,
+            passed,
+            drives,
+            rotors,
+            foot.lands_within(LANDING_HORIZON),
+            passed_on,
+            spins,
+        ),
+        tuple(rate + dt * spin for rate, spin in zip(state.motor_rates, spins, strict=True)),
+        reaction.internal_state,
+        (
+            dot(foot.ahead, reaction.force),
+            dot(foot.left, reaction.force),
+            dot(foot.up, reaction.force),
+        ),
+    )
+
+
+def after(
+    limb: Limb,
+    held: Held,
+    carrier: Motion,
+    rates: Scalars,
+    timestep: Scalar,
+) -> After:
+    """From the body's acceleration to the limb's.
+
+    Args:
+        limb: Its constants.
+        held: By `before`.
+        carrier: Acceleration of the body, relative to free fall.
+        rates: Of the joints before the step [rad/s].
+        timestep: [s].
+
+    Returns:
+        What the limb comes to.
+    """
+    half = 0.5 * timestep
+    links = _links(limb, held.sines, held.cosines, rates)
+    turned = outward(links, held.passed, carrier)
+    accelerations = tuple(j.sign * a for j, a in zip(limb.joints, turned, strict=True))
+    voltages, currents, loads = [], [], []
+    for k, (joint, drive) in enumerate(zip(limb.joints, held.drives, strict=True)):
+        spin = held.spins[k] if held.spins else accelerations[k]
+        voltage, current = at_middle(joint, drive, half * spin)
+        voltages.append(voltage)
+        currents.append(current)
+        if held.spins:
+            loads.append(held.torques[k])
+        else:
+            # M_L = r K_M I - B omega - J r^2 domega.
+            loads.append(held.torques[k] - held.armature[k] * spin)
+    powers = [voltage * current for voltage, current in zip(voltages, currents, strict=True)]
+    sizes = [ca.fabs(current) for current in currents]
+    largest = sizes[0]
+    for size in sizes[1:]:
+        largest = ca.fmax(largest, size)
+    heat = sum(j.resistance * (c * c) for j, c in zip(limb.joints, currents, strict=True))
+    return After(
+        accelerations,
+        tuple(rate + timestep * a for rate, a in zip(rates, accelerations, strict=True)),
+        tuple(currents),
+        tuple(loads),
+        (
+            sum(ca.fabs(load) for load in loads),
+            sum(powers),
+            sum(ca.fabs(power) for power in powers),
+            sum(sizes),
+            heat,
+            largest,
+            held.landing,
+        ),
+    )
+
+
+def links_at(limb: Limb, angles: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Link]:
+    """The links of a limb.
+
+    Args:
+        limb: Its constants.
+        angles: Of the joints [rad].
+        rates: Of the joints [rad/s].
+
+    Returns:
+        From the body on.
+    """
+    return _links(limb, *_turns(limb, angles), rates)
+
+
+def _turns(limb: Limb, angles: Sequence[Scalar]) -> tuple[Scalars, Scalars]:
+    """Sines and cosines of what the links are turned by about their axes."""
+    sines = tuple(j.sign * ca.sin(angle) for j, angle in zip(limb.joints, angles, strict=True))
+    return sines, tuple(ca.cos(angle) for angle in angles)
+
+
+def _links(limb: Limb, sines: Scalars, cosines: Scalars, rates: Sequence[Scalar]) -> list[Link]:
+    return [
+        Link(
+            axis=joint.axis,
+            rotation=Rotation(joint.rotation, joint.axis, sine, cosine),
+            offset=joint.offset,
+            body=_body(joint),
+            rate=joint.sign * rate,
+        )
+        for joint, sine, cosine, rate in zip(limb.joints, sines, cosines, rates, strict=True)
+    ]
+
+
+def _body(joint: LimbJoint) -> RigidBody:
+    xx, yy, zz, xy, xz, yz = joint.angular
+    return RigidBody(joint.mass, joint.moment, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+
+
+def _drives(
+    limb: Limb, state: LimbState, environment: Environment, p: Mapping[str, Scalars]
+) -> tuple[Drive, ...]:
+    rates = state.motor_rates or state.rates
+    return tuple(
+        drive_of(joint, duty, rate, environment.supply, friction_of(k, p))
+        for k, (joint, duty, rate) in enumerate(zip(limb.joints, state.duty, rates, strict=True))
+    )
+
+
+def _behind_backlash(
+    limb: Limb,
+    state: LimbState,
+    drives: tuple[Drive, ...],
+    environment: Environment,
+    p: Mapping[str, Scalars],
+) -> tuple[Scalars, Scalars]:
+    """Torques of the shafts, accelerations of the rotors."""
+    half = 0.5 * environment.timestep
+    shafts, spins = [], []
+    for k, (joint, drive) in enumerate(zip(limb.joints, drives, strict=True)):
+        ahead = state.motor_angles[k] - state.angles[k]
+        ahead = ahead + environment.displaced * state.disturbance[k]
+        shaft = shaft_torque(
+            ahead,
+            state.motor_rates[k] - state.rates[k],
+            p["backlash"][k],
+            joint.shaft_stiffness,
+            joint.shaft_damping,
+        )
+        shafts.append(shaft)
+        spins.append((drive.torque - shaft) / (joint.armature + half * drive.damping))
+    return tuple(shafts), tuple(spins)
+
+
+def _scaled(factor: Scalar, m: Matrix) -> Matrix:
+    return scale(factor, m[0]), scale(factor, m[1]), scale(factor, m[2])

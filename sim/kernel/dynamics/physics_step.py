@@ -1,0 +1,277 @@
+"""A physics step of a whole robot as CasADi functions, derived from Pinocchio's model of it.
+
+The readable form: the reference kernel steps with it, logs are observed through it, and it is what
+the tests hold against Pinocchio and MuJoCo. The compiled kernel has the same formulas limb by limb
+(`sim.kernel.emitted.pieces`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, reduce
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+
+from sim.kernel.dynamics.body import body_integrands, body_of, body_state, drifted, pushed, solved
+from sim.kernel.dynamics.drives import battery_voltage
+from sim.kernel.dynamics.inertia import Force
+from sim.kernel.dynamics.limb import After, Before, Environment, LimbState, after, before
+from sim.kernel.dynamics.spatial import Scalar, add
+from sim.kernel.parameters import Layout, internal_state_size
+from sim.robot import Robot
+from sim.robot.chain import Placement
+from sim.robot.description import JOINTS_PER_LEG
+from sim.robot.inertia import BodyInertia
+from sim.robot.limbs import Limb, electrical_constants, limb_of, limbs_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhysicsModel:
+    """CasADi functions of one robot.
+
+    Their inputs are q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its
+    own frame, joint rates; internal_state (I), as `parameters.internal_state_size` says; duty (J):
+    motor voltage per supply voltage, or torque per torque limit; disturbance (J): torque on each
+    link [N m], or, as the parameter `displaced` says, angle [rad] by which its gearhead is turned
+    further; parameters (P), as `parameters.Layout` says.
+
+    Attributes:
+        kick: to v and internal state after a step at these positions, current (J), integrands (8)
+            and largest absolute current (1) at its middle; landing (1), 1 if a foot may come down
+            within `limb.LANDING_HORIZON`.
+        drift: from q, v, internal state and time (1) [s] to q and internal state then.
+        observe: to current (J), voltage (J), load torque (J), foot force in the world (3 L), supply
+            (1) and acceleration (6+J) as `pinocchio.aba` gives it, all at this instant.
+        layout: of the parameters.
+    """
+
+    kick: Any
+    drift: Any
+    observe: Any
+    layout: Layout
+
+
+@dataclass(frozen=True, slots=True)
+class _Symbols:
+    q: list[Scalar]
+    v: list[Scalar]
+    internal_state: list[Scalar]
+    duty: list[Scalar]
+    disturbance: list[Scalar]
+    p: dict[str, list[Scalar]]
+    inputs: tuple[Any, ...]
+
+
+@lru_cache(maxsize=8)
+def physics_model(robot: Robot) -> PhysicsModel:
+    """Derive the step from a robot's URDF.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Its functions.
+
+    Raises:
+        RobotFileError: The tree is not one that can be simulated.
+    """
+    limbs = _limbs_by_pinocchio(robot)
+    layout = Layout(robot)
+    s = _symbols(robot, layout)
+    kick = _step(robot, limbs, layout, s, s.p["timestep"][0])
+    # At an instant: forces that depend on velocity are those of the velocities given.
+    still = _step(robot, limbs, layout, s, 0.0)
+    n = robot.n_joints
+    time = ca.SX.sym("time")
+    motors = s.internal_state[: 2 * n] if robot.has_backlash else []
+    angles = [angle + time * rate for angle, rate in zip(motors[:n], motors[n:], strict=True)]
+    return PhysicsModel(
+        kick=_function(
+            "kick",
+            s.inputs,
+            [
+                kick.velocity,
+                kick.internal_state,
+                kick.by_joint("currents"),
+                kick.integrands(),
+                [kick.tallies()[-2]],
+                [kick.tallies()[-1]],
+            ],
+        ),
+        drift=_function(
+            "drift",
+            (*s.inputs[:3], time),
+            [drifted(s.q, s.v, time), [*angles, *s.internal_state[len(angles) :]]],
+        ),
+        observe=_function(
+            "observe",
+            s.inputs,
+            [
+                still.by_joint("currents"),
+                [drive.voltage for limb in still.before for drive in limb.held.drives],
+                still.by_joint("loads"),
+                [component for limb in still.before for component in limb.foot_force],
+                [still.supply],
+                [*still.acceleration, *still.by_joint("accelerations")],
+            ],
+        ),
+        layout=layout,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A step of the whole robot."""
+
+    supply: Scalar
+    before: Sequence[Before]
+    after: Sequence[After]
+    acceleration: Sequence[Scalar]
+    velocity: Sequence[Scalar]
+    internal_state: Sequence[Scalar]
+    of_body: Sequence[Scalar]
+
+    def by_joint(self, name: str) -> list[Scalar]:
+        return [value for limb in self.after for value in getattr(limb, name)]
+
+    def tallies(self) -> list[Scalar]:
+        *sums, currents, landing = zip(*(limb.tallies for limb in self.after), strict=True)
+        return [*map(sum, sums), reduce(ca.fmax, currents), reduce(ca.fmax, landing)]
+
+    def integrands(self) -> list[Scalar]:
+        load, power, absolute_power, current, heat, _, _ = self.tallies()
+        acceleration, angular, forward = self.of_body
+        return [
+            load * load,
+            acceleration,
+            angular,
+            power,
+            forward,
+            absolute_power,
+            current,
+            heat,
+        ]
+
+
+def _step(
+    robot: Robot, limbs: Sequence[Limb], layout: Layout, s: _Symbols, timestep: Scalar
+) -> _Step:
+    n, law = robot.n_joints, robot.description.contact_law
+    motors = s.internal_state[: 2 * n] if robot.has_backlash else []
+    carried = s.internal_state[len(motors) :]
+    joints = [joint for limb in limbs for joint in limb.joints]
+    supply = battery_voltage(
+        electrical_constants(joints),
+        s.duty,
+        motors[n:] or s.v[6:],
+        s.p["supply_voltage"][0],
+        s.p["supply_resistance"][0],
+        torque=robot.is_torque_controlled,
+    )
+    environment = Environment(timestep, supply, *s.p["displaced"])
+    body, own = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)
+    befores = [
+        before(
+            limb,
+            law,
+            body,
+            LimbState(
+                *(
+                    _of_limb(values, k, len(limbs))
+                    for values in (
+                        s.q[7:],
+                        s.v[6:],
+                        s.duty,
+                        s.disturbance,
+                        motors[:n],
+                        motors[n:],
+                        carried,
+                    )
+                )
+            ),
+            environment,
+            {name: _of_limb(s.p[name], k, len(limbs)) for name in layout.by_limb},
+        )
+        for k, limb in enumerate(limbs)
+    ]
+    inertia, force = own.inertia(), body.force(own)
+    force = Force(add(force.linear, pushed(body, s.p["push"])), force.angular)
+    for limb in befores:
+        inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
+    falling, true = solved(body, inertia, force)
+    afters = [
+        after(limb, found.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
+        for k, (limb, found) in enumerate(zip(limbs, befores, strict=True))
+    ]
+    twist = [*true.linear, *true.angular]
+    faster = [old + timestep * rate for old, rate in zip(s.v[:6], twist, strict=True)]
+    return _Step(
+        supply=supply,
+        before=befores,
+        after=afters,
+        acceleration=twist,
+        velocity=[*faster, *(rate for limb in afters for rate in limb.rates)],
+        internal_state=[
+            *motors[:n],
+            *(rate for limb in befores for rate in limb.motor_rates),
+            *(value for limb in befores for value in limb.carried),
+        ],
+        of_body=body_integrands(body, true, timestep),
+    )
+
+
+def _of_limb(values: Sequence[Scalar], k: int, n_limbs: int) -> tuple[Scalar, ...]:
+    size = len(values) // n_limbs
+    return tuple(values[k * size : (k + 1) * size])
+
+
+def _symbols(robot: Robot, layout: Layout) -> _Symbols:
+    n = robot.n_joints
+    sizes = {
+        "q": 7 + n,
+        "v": 6 + n,
+        "internal_state": internal_state_size(robot),
+        "duty": n,
+        "disturbance": n,
+        "p": layout.size,
+    }
+    inputs = tuple(ca.SX.sym(name, size) for name, size in sizes.items())
+    q, v, internal_state, duty, disturbance, p = ([s[k] for k in range(s.numel())] for s in inputs)
+    fields = {name: p[where] for name, where in layout.slices.items()}
+    return _Symbols(q, v, internal_state, duty, disturbance, fields, inputs)
+
+
+def _limbs_by_pinocchio(robot: Robot) -> tuple[Limb, ...]:
+    """The limbs as Pinocchio reads the URDF."""
+    limbs_of(robot)  # Refuses what cannot be simulated, with the reason.
+    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
+    limbs = []
+    for number, leg in enumerate(robot.description.legs):
+        placements = []
+        for name in leg.joints:
+            j = model.getJointId(name)
+            inertia = model.inertias[j]
+            placements.append(
+                Placement(
+                    np.asarray(model.joints[j].createData().S).reshape(-1)[3:],
+                    np.asarray(model.jointPlacements[j].rotation),
+                    np.asarray(model.jointPlacements[j].translation),
+                    BodyInertia(
+                        float(inertia.mass),
+                        np.asarray(inertia.lever),
+                        np.asarray(inertia.inertia),
+                    ),
+                )
+            )
+        foot = model.frames[model.getFrameId(leg.foot)].placement.translation
+        limbs.append(limb_of(robot, number, placements, np.asarray(foot)))
+    assert len(limbs[0].joints) == JOINTS_PER_LEG  # noqa: S101
+    return tuple(limbs)
+
+
+def _function(name: str, inputs: Sequence[Any], outputs: list[Sequence[Scalar]]) -> Any:
+    return ca.Function(name, list(inputs), [ca.vertcat(*o) for o in outputs], {"cse": True})

@@ -1,0 +1,1 @@
+"""The readable twin of the compiled kernel, over CasADi's interpreter."""

@@ -1,0 +1,229 @@
+"""The readable driver: the same walk over CasADi's interpreter.
+
+The oracle of driver.c (of tick.c and control.c: control_tick.py, of sensors.c: sensors.py), and the
+fallback where there is no C compiler. Function by function their twin; the physics agrees to
+rounding, the integer arithmetic exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
+from sim.kernel.gains import check_gains
+from sim.kernel.readable.control_tick import (
+    Past,
+    coded,
+    control,
+    low_pass,
+    padded_states,
+    status_of,
+)
+from sim.kernel.readable.joint_pd import InnerLoop
+from sim.kernel.sensors import Sensors
+from sim.kernel.walk import (
+    INTEGRANDS,
+    Coding,
+    LaneUse,
+    WalkResult,
+    WalkResults,
+    WalkSetup,
+)
+from sim.outcome import Status
+from sim.robot import Robot
+
+Floats = NDArray[np.float64]
+
+
+class ReferenceKernel:
+    """Walks over CasADi's interpreter, some hundred times slower than the compiled kernel.
+
+    Args:
+        robot: That walks.
+        model: Its physics.
+    """
+
+    backend: Final = "reference"
+    lanes: Final = 1
+
+    def __init__(self, robot: Robot, model: PhysicsModel) -> None:
+        self._model, self._robot = model, robot
+        self.layout = model.layout
+        self.internal_state_size = model.kick.numel_in(2)
+
+    def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
+        """All walks, one after the other."""
+        for setup in setups:
+            check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
+            setup.check(
+                joints=self._model.kick.numel_in(3),
+                internal_state=self.internal_state_size,
+                parameters=self.layout.size,
+            )
+        walks = [self._walk(setup, coding, log=log) for setup in setups]
+        rounds = sum(walked for _, walked in walks)
+        return WalkResults(tuple(result for result, _ in walks), LaneUse(rounds, rounds))
+
+    def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> tuple[WalkResult, int]:
+        """What became of the walk, and how many rounds of physics steps it took."""
+        step = Stepper(self._model, setup)
+        past, sensors = Past.of(setup.desired.shape[1]), Sensors(setup.sensors)
+        sensed = np.zeros(setup.desired.shape[1])
+        inner = InnerLoop(self._robot, setup, coding)
+        sums, peak_current = np.zeros(len(INTEGRANDS)), 0.0
+        rows: list[Floats] = []
+        status, rounds = Status.OK, 0
+        for tick, desired in enumerate(setup.desired):
+            encoder, turning = step.motors(loose=self._robot.has_backlash)
+            readings = sensors.read(encoder, np.abs(sensed))
+            error, load = coded(*readings, desired, coding)
+            output = control(setup.control_law, coding, error, load, past)
+            inner.begin(tick, output)
+            step.duty[:] = inner.command(encoder, turning)
+            if setup.disturbance is not None:
+                step.disturbance[:] = setup.disturbance[tick]
+            if log:
+                seen = np.abs(sensed)
+                rows.append(np.concatenate([step.q, step.v, step.internal_state, seen, step.duty]))
+            refinement = coding.refinement if step.landing[0] > 0.0 else 1
+            step.refine(refinement)
+            step.push(tick)
+            rounds += refinement
+            period = refinement * coding.substeps // coding.inner_ticks
+            for lap in range(refinement):
+                step.drift(0.5)
+                for left in reversed(range(coding.substeps)):
+                    walked = (lap + 1) * coding.substeps - left - 1
+                    if walked and walked % period == 0:
+                        # Positions are those of the step's middle.
+                        seen, turning = step.motors(loose=self._robot.has_backlash)
+                        ago = 0.5 * step.timestep
+                        step.duty[:] = inner.command(seen - ago * turning, turning)
+                    step.kick()
+                    step.drift(1.0 if left else 0.5)
+                    current = np.abs(step.current)
+                    sensed = low_pass(sensed, current, setup.smoothing(refinement))
+                    sums += step.integrands / refinement
+                    peak_current = max(peak_current, float(step.largest_current[0]))
+            status = status_of(step.q, step.v, step.internal_state, setup)
+            if status is not Status.OK:
+                break
+        states = padded_states(rows, setup.ticks) if log else None
+        return WalkResult(status, sums, step.q.copy(), peak_current, states), rounds
+
+
+class Stepper:
+    """CasADi's kick and drift on fixed buffers: several times cheaper than calling the functions.
+
+    Args:
+        model: The robot's physics.
+        setup: The walk to be stepped, from its start.
+    """
+
+    def __init__(self, model: PhysicsModel, setup: WalkSetup) -> None:
+        n_joints = setup.desired.shape[1]
+        self.q, self.v = setup.start.copy(), np.zeros(6 + n_joints)
+        self.internal_state, self.parameters = (
+            setup.internal_state.copy(),
+            np.array(setup.parameters),
+        )
+        self.duty, self.disturbance, self.current = (np.zeros(n_joints) for _ in range(3))
+        self.integrands, self.largest_current = np.zeros(len(INTEGRANDS)), np.zeros(1)
+        self.landing = np.zeros(1)
+        self._at = model.layout.slices["timestep"]
+        self._timestep = float(setup.parameters[self._at][0])
+        self._push_at, self._shove_ticks = model.layout.slices["push"], setup.shove_ticks
+        self._push = setup.parameters[self._push_at]
+        self._time = np.zeros(1)
+        kicked = [np.zeros_like(array) for array in (self.v, self.internal_state)]
+        drifted = [np.zeros_like(array) for array in (self.q, self.internal_state)]
+        state = [self.q, self.v, self.internal_state]
+        self._kick = _buffered(
+            model.kick,
+            [*state, self.duty, self.disturbance, self.parameters],
+            [*kicked, self.current, self.integrands, self.largest_current, self.landing],
+        )
+        self._drift = _buffered(model.drift, [*state, self._time], drifted)
+        self._kicked = list(zip((self.v, self.internal_state), kicked, strict=True))
+        self._drifted = list(zip((self.q, self.internal_state), drifted, strict=True))
+
+    @property
+    def timestep(self) -> float:
+        """Length of the steps that follow [s]."""
+        return float(self.parameters[self._at][0])
+
+    def motors(self, *, loose: bool) -> tuple[Floats, Floats]:
+        """Angles and rates that the encoders see.
+
+        Args:
+            loose: Whether backlash parts motors from links.
+
+        Returns:
+            Views, (J,) [rad] and (J,) [rad/s].
+        """
+        n = len(self.duty)
+        if loose:
+            return self.internal_state[:n], self.internal_state[n : 2 * n]
+        return self.q[7:], self.v[6:]
+
+    def push(self, tick: int) -> None:
+        """Let the shove's force act, or not.
+
+        Args:
+            tick: Of the walk.
+        """
+        begin, end = self._shove_ticks
+        self.parameters[self._push_at] = self._push * (begin <= tick < end)
+
+    def refine(self, refinement: int) -> None:
+        """Set the length of the steps that follow.
+
+        Args:
+            refinement: How many of them are a physics step.
+        """
+        self.parameters[self._at] = self._timestep / refinement
+
+    def kick(self) -> None:
+        """Velocities of the next step, in place; what is measured is of its middle."""
+        self._kick[1]()
+        for array, after in self._kicked:
+            array[:] = after
+
+    def drift(self, steps: float) -> None:
+        """Positions at these velocities, in place.
+
+        Args:
+            steps: For how many of the steps that `refine` set.
+        """
+        self._time[:] = steps * self.parameters[self._at]
+        self._drift[1]()
+        for array, after in self._drifted:
+            array[:] = after
+
+
+def _buffered(function: Any, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Any:
+    """A CasADi function bound to arrays: its buffer, which must be kept, and what evaluates it."""
+    buffer, evaluate = function.buffer()
+    for k, array in enumerate(inputs):
+        buffer.set_arg(k, array.data)
+    for k, array in enumerate(outputs):
+        buffer.set_res(k, array.data)
+    return buffer, evaluate
+
+
+@lru_cache(maxsize=8)
+def reference_kernel(robot: Robot) -> ReferenceKernel:
+    """The robot's interpreter kernel.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        The kernel, made once.
+    """
+    return ReferenceKernel(robot, physics_model(robot))

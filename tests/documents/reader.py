@@ -11,6 +11,7 @@ the job that was made last.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -94,6 +95,16 @@ class Reader:
                 self._console(block)
             else:
                 assert_says(said, block.text, block.where)
+
+    def read_notebook(self, notebook: str) -> str:
+        """Run the cells of a notebook, by its path in the repository; what they say."""
+        cells = json.loads((ROOT / notebook).read_text(encoding="utf-8"))["cells"]
+        code = [cell for cell in cells if cell["cell_type"] == "code"]
+        blocks = (
+            Block("python", "".join(cell["source"]), f"{notebook}, cell {k}", 0)
+            for k, cell in enumerate(code, start=1)
+        )
+        return "".join(map(self._python, blocks))
 
     def _python(self, block: Block) -> str:
         code = "\n" * block.line + self._typed(block.text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -15,6 +16,8 @@ from tests.examples.paths import ROOT
 from tests.examples.servers import Server
 
 pytestmark = pytest.mark.slow
+
+NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 
 
 @pytest.fixture
@@ -64,6 +67,13 @@ def test_the_readmes_tour_over_rest_does_what_it_says(reader: Reader) -> None:
 def test_the_readmes_python_runs(reader: Reader) -> None:
     reader.read("README.md", languages="python")
     assert reader.names["job"].state == "succeeded"
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_and_holds_no_outputs(notebook: Path, reader: Reader) -> None:
+    assert "fitness" in reader.read_notebook(notebook.relative_to(ROOT).as_posix())
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells)
 
 
 def test_the_page_about_the_library_runs(reader: Reader) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sim.errors import RobotFileError
 from sim.robot.description import Leg
 from sim.robot.elements import MOST_TURNED
-from sim.robot.inertia import BodyInertia
+from sim.robot.inertia import BodyInertia, product
 from sim.robot.joints import Joint
 from sim.robot.urdf import Place, Urdf
 
@@ -94,8 +94,8 @@ def chain_of(urdf: Urdf, leg: Leg) -> Chain:
         placements.append(
             Placement(
                 joint.axis,
-                parent.rotation @ joint.origin.matrix(),
-                parent.rotation @ joint.origin.xyz + parent.position,
+                product(parent.rotation, joint.origin.matrix()),
+                product(parent.rotation, joint.origin.xyz) + parent.position,
                 urdf.bodies[joint.child],
             )
         )

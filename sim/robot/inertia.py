@@ -37,8 +37,8 @@ class BodyInertia:
         """
         # A ball's inertia turns into itself. Pinocchio sets it apart too, and so rounds alike.
         ball = self.rotational[2, 2] * np.eye(3)
-        turned = rotation @ (self.rotational - ball) @ rotation.T + ball
-        return BodyInertia(self.mass, rotation @ self.centre + position, turned)
+        turned = product(product(rotation, self.rotational - ball), rotation.T) + ball
+        return BodyInertia(self.mass, product(rotation, self.centre) + position, turned)
 
     def joined(self, other: BodyInertia) -> BodyInertia:
         """Two bodies as one.
@@ -74,4 +74,22 @@ def parallel_axis(offset: Floats) -> Floats:
     Returns:
         (3, 3) [m2], to be multiplied by the mass [kg].
     """
-    return float(offset @ offset) * np.eye(3) - np.outer(offset, offset)
+    x, y, z = offset.tolist()
+    return (x * x + y * y + z * z) * np.eye(3) - np.outer(offset, offset)
+
+
+def product(rotation: Floats, other: Floats) -> Floats:
+    """Matrix product that rounds alike on every machine.
+
+    NumPy's `@` is that of a BLAS library, which sums by other instructions on each kind of
+    processor: a robot's inertias, and every walk with them, would differ in their last bits.
+
+    Args:
+        rotation: (3, 3).
+        other: (3,) or (3, 3).
+
+    Returns:
+        Of the shape of `other`.
+    """
+    x, y, z = (np.multiply.outer(rotation[:, k], other[k]) for k in range(3))
+    return np.asarray(x + y + z)

@@ -72,7 +72,7 @@ def joint_of(element: ET.Element) -> Joint:
     whose = f"joint {name!r}"
     direction = element.find("axis")
     axis = np.array([1.0, 0.0, 0.0]) if direction is None else numbers_of(direction, "xyz", whose)
-    length = float(np.linalg.norm(axis))
+    length = math.hypot(*axis.tolist())
     kind = element.get("type", "")
     if length == 0.0 and kind != "fixed":
         raise RobotFileError(f"robot.urdf: {whose}: its axis needs a direction, as 0 1 0")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sim.errors import RobotFileError
 from sim.robot.bounds import check_urdf, shortened
 from sim.robot.elements import Origin, numbers_of, origin_of
-from sim.robot.inertia import NO_INERTIA, BodyInertia
+from sim.robot.inertia import NO_INERTIA, BodyInertia, product
 from sim.robot.joints import Joint, joint_of, standardise
 from sim.robot.urdf_errors import by_line
 
@@ -266,8 +266,8 @@ def _rigid_bodies(
         bodies[place.body] = bodies.get(place.body, NO_INERTIA).joined(own)
         for joint in carried[name]:
             if joint.fixed:
-                turned = place.rotation @ joint.origin.matrix()
-                at = place.rotation @ joint.origin.xyz
+                turned = product(place.rotation, joint.origin.matrix())
+                at = product(place.rotation, joint.origin.xyz)
                 waiting.append((joint.child, Place(place.body, turned, place.position + at)))
             else:
                 waiting.append((joint.child, Place(joint.child, np.eye(3), np.zeros(3))))
@@ -287,7 +287,8 @@ def _inertia(link: ET.Element, whose: str) -> BodyInertia:
     )
     origin = origin_of(inertial, whose)
     turn = origin.matrix()
-    rotational = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    about_own_axes = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    rotational = product(product(turn, about_own_axes), turn.T)
     kilograms = float(numbers_of(mass, "value", whose)[0])
     if kilograms < 0.0:
         raise RobotFileError(f"robot.urdf: {whose}: a mass must not be less than 0 [kg]")

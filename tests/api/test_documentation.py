@@ -30,6 +30,8 @@ def test_the_routes_are_these(document: Document) -> None:
     job = "/v1/jobs/{job_id}"
 
     assert {name for name, _ in operations(document)} == {
+        "get /v1/robots/{digest}/meshes",
+        "get /v1/robots/{digest}/meshes/{number}",
         "post /v1/jobs",
         "get /v1/jobs",
         f"get {job}",

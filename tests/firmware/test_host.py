@@ -160,5 +160,5 @@ def test_whatever_a_design_is_called_its_firmware_compiles(tmp_path: Path) -> No
 
 def test_simulator_and_firmware_compile_one_text(published_a: Path) -> None:
     text = (published_a / "tick.c").read_text(encoding="utf-8")
-    assert text == (ROOT / "sim" / "kernel" / "tick.c").read_text(encoding="utf-8")
+    assert text == (ROOT / "sim" / "kernel" / "emitted" / "tick.c").read_text(encoding="utf-8")
     assert text in kernel_source(load_robot("szabadka2"))

@@ -66,6 +66,7 @@ def test_the_list_of_jobs_says_what_it_is(
             "Analysis",
             "Variables",
             "Iterations",
+            "Activity",
             "Spec",
         ]
     )

@@ -43,7 +43,7 @@ def test_it_has_the_parts_that_make_sense_for_one_design(
     page.get_by_role("link", name="two steps in many worlds").click()
     tabs = page.get_by_role("navigation", name="Parts of the job")
     expect(tabs.get_by_role("link")).to_have_text(
-        ["Overview", "Certificate", "Variables", "Iterations", "Spec"]
+        ["Overview", "Certificate", "Variables", "Iterations", "Activity", "Spec"]
     )
     expect(page.get_by_role("progressbar", name="14 of 14 designs")).to_be_visible()
 

@@ -100,6 +100,7 @@ def test_brushing_an_axis_selects_designs(
     selected = page.locator("[data-selected]")
     expect(selected).to_have_attribute("data-selected", every)
 
+    page.locator(".axis").last.scroll_into_view_if_needed()
     axis = page.locator(".axis").last.bounding_box()
     assert axis is not None
     x, bottom = axis["x"] + axis["width"] / 2, axis["y"] + axis["height"]

@@ -157,8 +157,7 @@ def run_here(
         raise _interrupted(service.job(job_id), url) from error
     if interrupted.is_set() and not ended.state.terminal:
         raise _interrupted(ended, url)
-    note_reference(service.store, ended)
-    return ended
+    return note_reference(service.store, ended)
 
 
 def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:

@@ -111,20 +111,24 @@ def _why_none(job: Job) -> str:
     return "it has found no design yet that walks in every scenario"
 
 
-def note_reference(store: Store, job: Job) -> None:
+def note_reference(store: Store, job: Job) -> Job:
     """As `with_reference` of a job that has ended or paused; the log says what went wrong.
 
     Args:
         store: Where the job is kept.
         job: As it was read.
+
+    Returns:
+        The job with its reference, as far as that is known.
     """
     if job.reference is not None:
-        return
+        return job
     try:
-        _, reason = with_reference(store, job)
+        job, reason = with_reference(store, job)
     except Exception:  # noqa: BLE001
         # Whatever it is: the job's results are stored, and need it for nothing.
         _log.exception("job %s: its best is compared with nothing", job.id)
     else:
         if reason is not None:
             _log.debug("job %s: no gain over a published design: %s", job.id, reason)
+    return job

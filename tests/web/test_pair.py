@@ -49,7 +49,7 @@ def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
     page.get_by_label("objectives too").check()
     page.get_by_label("Across").select_option("energy")
     page.get_by_label("Up").select_option("torque")
-    expect(page).to_have_url(re.compile("x=energy&y=torque"))
+    expect(page).to_have_url(re.compile("x=energy&(objectives=yes&)?y=torque"))
     expect(page.get_by_role("img", name=MAP)).to_have_attribute(
         "aria-label", "48 designs by energy and torque"
     )

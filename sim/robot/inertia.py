@@ -75,7 +75,8 @@ def parallel_axis(offset: Floats) -> Floats:
         (3, 3) [m2], to be multiplied by the mass [kg].
     """
     x, y, z = offset.tolist()
-    return (x * x + y * y + z * z) * np.eye(3) - np.outer(offset, offset)
+    squared = float(x * x + y * y + z * z)
+    return squared * np.eye(3) - np.outer(offset, offset)
 
 
 def product(rotation: Floats, other: Floats) -> Floats:

@@ -78,7 +78,7 @@ class Runner:
         cache: bool = False,
         quarantine_after: int = QUARANTINE_AFTER,
         name: str | None = None,
-        on_ended: Callable[[Job], None] | None = None,
+        on_ended: Callable[[Job], object] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         if concurrency < 1:

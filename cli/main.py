@@ -9,10 +9,12 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
+from functools import cache
 from typing import Annotated, Any, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
+from typer.main import get_command
 
 from cli.commands.database import db
 from cli.commands.designs import (
@@ -177,11 +179,17 @@ def main() -> None:
     sys.exit(run(sys.argv[1:]))
 
 
+@cache
+def _commands() -> Callable[..., object]:
+    """All commands with their options: making them takes longer than most of them do."""
+    return get_command(app)
+
+
 def run(arguments: Sequence[str]) -> int:
     """One command; returns its exit code. Messages about what went wrong are on stderr."""
     stdout = Stdout(sys.stdout)
     with redirect_stdout(cast(TextIO, stdout)):
-        code = _exit_code_of(lambda: app(list(arguments), prog_name="gaitswarm"))
+        code = _exit_code_of(lambda: _commands()(list(arguments), prog_name="gaitswarm"))
         # Not left to the interpreter, which could only complain.
         flushed = _exit_code_of(stdout.flush)
     return code or flushed

@@ -97,7 +97,7 @@ class Server(Served):
         self._thread = threading.Thread(target=self._server.run)
         self._thread.start()
         self.url = self._server.url
-        self.client = httpx2.Client(base_url=self.url, timeout=20.0)
+        self.client = httpx2.Client(base_url=self.url, timeout=20.0, verify=False)
 
     def serve(self, service: JobService) -> None:
         """Serve the jobs of another database from now on."""
@@ -134,7 +134,7 @@ class ServerProcess(Served):
             stdout=None,
         )
         self.url = line_with(self.process.stderr, r"serves (http://[\d.:]+) and")[1]
-        self.client = httpx2.Client(base_url=self.url, timeout=60.0)
+        self.client = httpx2.Client(base_url=self.url, timeout=60.0, verify=False)
         # A full pipe would stop the server.
         self._drain = threading.Thread(target=output(self.process.stderr).read)
         self._drain.start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import ssl
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import aclosing
 from datetime import UTC, datetime, timedelta
@@ -15,7 +16,7 @@ import httpx2
 import pytest
 
 import gaitswarm
-from gaitswarm.jobs.server.attempts import Attempts, error_of
+from gaitswarm.jobs.server.attempts import Attempts, authorities, error_of
 from gaitswarm.jobs.server.call import Call
 from tests.library.conftest import SMALL, Finished
 
@@ -274,6 +275,14 @@ def test_what_is_no_url_is_refused_at_once() -> None:
     for connect in (gaitswarm.connect, gaitswarm.connect_async):
         with pytest.raises(gaitswarm.InvalidRequest, match="not a URL"):
             connect("jobs.db")
+
+
+def test_a_server_without_certificates_is_trusted_for_none() -> None:
+    nobody = authorities("http://127.0.0.1:8000")
+    assert isinstance(nobody, ssl.SSLContext)
+    assert nobody.verify_mode is ssl.CERT_REQUIRED
+    assert nobody.cert_store_stats()["x509"] == 0
+    assert authorities("HTTPS://gaitswarm.example") is True
 
 
 @pytest.mark.parametrize("body", [b"<html>", b"{}", b'{"items": 3}'])

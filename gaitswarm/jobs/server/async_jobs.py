@@ -24,6 +24,7 @@ from gaitswarm.jobs.server.attempts import (
     RECONNECT,
     Attempts,
     Following,
+    authorities,
     foreign,
     request_of,
     result,
@@ -87,7 +88,11 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         self._backoff = backoff
         self._reconnect = reconnect
         self._client = httpx2.AsyncClient(
-            base_url=self._url + PREFIX, timeout=timeout, headers=headers, transport=transport
+            base_url=self._url + PREFIX,
+            timeout=timeout,
+            headers=headers,
+            transport=transport,
+            verify=authorities(self._url),
         )
 
     @property

@@ -7,6 +7,7 @@ the connection could not be made or broke, and on 503, after the time that the s
 
 from __future__ import annotations
 
+import ssl
 import time
 from collections.abc import Mapping
 from email.utils import parsedate_to_datetime
@@ -312,6 +313,19 @@ def server_url(url: str) -> str:
     if not valid:
         raise InvalidRequest(f"{url!r} is not a URL like http://127.0.0.1:8000", field="server")
     return url.rstrip("/")
+
+
+def authorities(url: str) -> ssl.SSLContext | bool:
+    """Who vouches for the certificates of a server.
+
+    Args:
+        url: Of the server.
+
+    Returns:
+        True for those that are usual. For a server without certificates, a context that trusts
+        nobody: reading the usual ones takes longer than most answers.
+    """
+    return urlsplit(url).scheme == "https" or ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 
 
 def request_of(client: httpx2.Client | httpx2.AsyncClient, call: Call[T]) -> httpx2.Request:

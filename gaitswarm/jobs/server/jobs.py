@@ -21,6 +21,7 @@ from gaitswarm.jobs.server.attempts import (
     RECONNECT,
     Attempts,
     Following,
+    authorities,
     foreign,
     request_of,
     result,
@@ -92,7 +93,11 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
         self._backoff = backoff
         self._reconnect = reconnect
         self._client = httpx2.Client(
-            base_url=self._url + PREFIX, timeout=timeout, headers=headers, transport=transport
+            base_url=self._url + PREFIX,
+            timeout=timeout,
+            headers=headers,
+            transport=transport,
+            verify=authorities(self._url),
         )
 
     @property

@@ -3,6 +3,7 @@
 import { type Brushes, withBrush } from '../charts/parallel-coordinates'
 import { type Axis, type ParallelModel, placeOf, valueAt } from '../charts/parallel-model'
 import { BrokenName } from '../components/broken-name'
+import { NumberField } from '../components/number-field'
 import { Unit } from '../components/unit'
 import { inWords } from '../format/words'
 
@@ -77,16 +78,14 @@ function Bound({
     )
   }
   return (
-    <label class="row small">
+    <div class="row small">
       {name}
-      <input
-        class="short"
-        type="number"
-        step="any"
-        aria-label={label}
+      <NumberField
+        label={label}
         value={Number(valueAt(axis, place).toPrecision(4))}
-        onChange={(event) => onChange(event.currentTarget.value)}
+        narrow
+        onChange={onChange}
       />
-    </label>
+    </div>
   )
 }

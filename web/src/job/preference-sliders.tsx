@@ -1,7 +1,7 @@
 /** Biases and exponents of the objectives to move, and the published preferences. */
 
-import { useState } from 'preact/hooks'
 import type { Preference, PreferencePreset } from '../api/types'
+import { NumberField } from '../components/number-field'
 import { writtenUnit } from '../format/number'
 import { inWords } from '../format/words'
 import { weighed } from './preference'
@@ -91,8 +91,6 @@ function Weight({
   value: number
   onChange: (value: number) => void
 }) {
-  // What is being written must outlast the news that a running job brings.
-  const [written, setWritten] = useState<string | null>(null)
   return (
     <div class="weight">
       <span aria-hidden="true">{label}</span>
@@ -105,15 +103,12 @@ function Weight({
         aria-label={name}
         onInput={(event) => onChange(event.currentTarget.valueAsNumber)}
       />
-      <input
-        type="number"
+      <NumberField
+        label={`${name}, number`}
+        value={Number(value.toPrecision(6))}
         min={0}
         step={0.01}
-        value={written ?? Number(value.toPrecision(6))}
-        aria-label={`${name}, number`}
-        onInput={(event) => setWritten(event.currentTarget.value)}
-        onChange={(event) => onChange(event.currentTarget.valueAsNumber)}
-        onBlur={() => setWritten(null)}
+        onChange={(text) => onChange(text === '' ? Number.NaN : Number(text))}
       />
       <span class="unit">{unit === '1' ? '' : writtenUnit(unit)}</span>
     </div>

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from http import HTTPStatus
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
-from fastapi import FastAPI, Request, Response
+from fastapi import Depends, FastAPI, Request, Response
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
 
 from api.documentation import policy_of
@@ -25,8 +25,9 @@ def add_manual(app: FastAPI, folder: Path) -> None:
 
     Args:
         app: takes on the routes.
-        folder: of the HTML that Sphinx made.
+        folder: of the HTML that Sphinx made; there need be none.
     """
+    app.state.manual_folder = folder
 
     def first(request: Request) -> Response:
         root = request.scope.get("root_path", "")
@@ -36,8 +37,8 @@ def add_manual(app: FastAPI, folder: Path) -> None:
         root = folder.resolve()
         path = (root / request.path_params["path"]).resolve()
         if not (path.is_relative_to(root) and path.is_file()):
-            built = (folder / _FIRST).is_file()
-            detail = "the manual has no such page; begin at /manual" if built else _UNBUILT
+            known = "the manual has no such page; begin at /manual"
+            detail = known if _is_built(folder) else _UNBUILT
             return problem(request.url.path, HTTPStatus.NOT_FOUND, "not-found", detail)
         if path.suffix != ".html":
             return FileResponse(path, headers={"Cache-Control": "no-cache"})
@@ -48,3 +49,15 @@ def add_manual(app: FastAPI, folder: Path) -> None:
     app.add_route("/manual", first, include_in_schema=False)
     app.add_route("/manual/", first, include_in_schema=False)
     app.add_route("/manual/{path:path}", page, include_in_schema=False)
+
+
+def _is_built(folder: Path) -> bool:
+    return (folder / _FIRST).is_file()
+
+
+async def _has_manual(request: Request) -> bool:
+    return _is_built(request.app.state.manual_folder)
+
+
+HasManual = Annotated[bool, Depends(_has_manual)]
+"""Whether this server has a built manual at /manual."""

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from api.access import COOKIE, secret_of
 from api.dependencies import ServerSettings, Service
 from api.documentation import problems
+from api.manual import HasManual
 from gaitswarm.views import PREFIX, View
 from services.optimizer.access import Scope, Token
 from services.optimizer.errors import Unauthorized
@@ -31,7 +32,7 @@ class SessionRequest(BaseModel):
 
 
 class SessionView(View):
-    """Who is asking."""
+    """Who is asking, and what the server has for readers."""
 
     required: bool = Field(description="Whether this server asks for a token.")
     name: str | None = Field(
@@ -39,6 +40,7 @@ class SessionView(View):
         examples=["ci"],
     )
     scope: Scope | None = Field(description="What that token allows; null without one.")
+    manual: bool = Field(description="Whether this server has the manual at /manual.")
 
 
 @router.get(
@@ -47,11 +49,13 @@ class SessionView(View):
     summary="See who is asking",
     responses=problems(429, asks=False),
 )
-def get_session(request: Request, service: Service, settings: ServerSettings) -> SessionView:
+def get_session(
+    request: Request, service: Service, settings: ServerSettings, manual: HasManual
+) -> SessionView:
     """Answers with or without a token, so that a page can tell whether it has to ask for one."""
     secret = secret_of(request.headers)
     token = None if secret is None else service.store.tokens.find(secret)
-    return _view(token, required=settings.tokens_required)
+    return _view(token, required=settings.tokens_required, manual=manual)
 
 
 @router.post(
@@ -66,6 +70,7 @@ def begin_session(
     asked: SessionRequest,
     service: Service,
     settings: ServerSettings,
+    manual: HasManual,
     response: Response,
 ) -> SessionView:
     """For browsers, which cannot send a header with a link; programs send `Authorization`."""
@@ -84,7 +89,7 @@ def begin_session(
         # By HTTPS, which a proxy may bring: then the cookie is not to go without it either.
         secure=request.url.scheme == "https",
     )
-    return _view(token, required=settings.tokens_required)
+    return _view(token, required=settings.tokens_required, manual=manual)
 
 
 @router.delete(
@@ -99,9 +104,10 @@ def end_session(response: Response) -> None:
     response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
 
 
-def _view(token: Token | None, *, required: bool) -> SessionView:
+def _view(token: Token | None, *, required: bool, manual: bool) -> SessionView:
     return SessionView(
         required=required,
         name=None if token is None else token.name,
         scope=None if token is None else token.scope,
+        manual=manual,
     )

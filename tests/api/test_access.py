@@ -220,7 +220,7 @@ def test_a_browser_asks_with_a_cookie_that_no_script_reads(
 ) -> None:
     secret = bearer(Scope.READ)["Authorization"].removeprefix("Bearer ")
     begun = guarded.post("/v1/session", json={"token": secret})
-    assert begun.json() == {"required": True, "name": "read", "scope": "read"}
+    assert begun.json() == {"required": True, "name": "read", "scope": "read", "manual": False}
     cookie = begun.headers["Set-Cookie"].lower()
     assert cookie.startswith(f"{COOKIE}={secret}".lower())
     assert "httponly" in cookie and "samesite=strict" in cookie
@@ -233,7 +233,8 @@ def test_a_session_begins_with_a_valid_token_only(guarded: httpx2.Client) -> Non
     answer = guarded.post("/v1/session", json={"token": "guessed"})
     assert answer.status_code == 401
     assert "Set-Cookie" not in answer.headers
-    assert guarded.get("/v1/session").json() == {"required": True, "name": None, "scope": None}
+    nobody = {"required": True, "name": None, "scope": None, "manual": False}
+    assert guarded.get("/v1/session").json() == nobody
 
 
 def test_a_program_sends_the_token_of_its_environment(

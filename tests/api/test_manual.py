@@ -38,6 +38,7 @@ def test_a_manual_that_is_not_built_is_said_to_be_with_the_way_out(server: Serve
     answer = server.client.get("/manual", follow_redirects=True)
     assert answer.status_code == 404
     assert "make manual" in answer.json()["detail"]
+    assert server.client.get("/v1/session").json()["manual"] is False
 
 
 def test_its_first_page_is_at_manual_and_its_own_inline_scripts_alone_may_run(
@@ -48,6 +49,7 @@ def test_its_first_page_is_at_manual_and_its_own_inline_scripts_alone_may_run(
     digest = base64.b64encode(hashlib.sha256(SCRIPT.encode()).digest()).decode()
     assert answer.headers["content-type"].startswith("text/html")
     assert f"script-src 'self' 'sha256-{digest}';" in answer.headers["content-security-policy"]
+    assert server.client.get("/v1/session").json()["manual"] is True
 
 
 def test_other_files_have_their_types(server: Server, folder: Path) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.examples.servers import ServerProcess
+from tests.examples.servers import Server, ServerProcess
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -82,3 +83,23 @@ def test_a_link_shows_a_walk_at_its_moment(
     page.get_by_role("button", name="One frame ahead").click()
     page.get_by_label("Forces").uncheck()
     expect(page).to_have_url(re.compile(r"t=1\.26&view=no-forces%2Cno-trail$"))
+
+
+def test_the_manual_is_linked_where_the_server_has_it(
+    start_server: Callable[..., Server], visit: Callable[..., Visit], tmp_path: Path
+) -> None:
+    server = start_server(manual_folder=tmp_path)
+    page = visit(server.url).go("/jobs")
+    expect(page.get_by_role("link", name="API", exact=True)).to_be_visible()
+    page.wait_for_load_state("networkidle")
+    expect(page.get_by_role("link", name="Manual", exact=True)).to_have_count(0)
+
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "index.html").write_text("<h1>The manual</h1>", encoding="utf-8")
+    page.reload()
+    page.keyboard.press("Control+k")
+    page.get_by_role("combobox", name="Find pages").fill("manual")
+    expect(page.get_by_role("option", name="Manual")).to_be_visible()
+    page.keyboard.press("Escape")
+    manual = page.get_by_role("link", name="Manual", exact=True)
+    expect(manual).to_have_attribute("href", "/manual")

@@ -9,7 +9,7 @@ import { Keys } from './palette/keys'
 import { forgetIgnored, IgnoredNotice } from './router/ignored'
 import { usePlace } from './router/navigation'
 import { type Route, routeOf } from './router/routes'
-import { useUnauthorized } from './session/session'
+import { useManual, useUnauthorized } from './session/session'
 import { SignIn } from './session/sign-in'
 import { toggleTheme, useTheme } from './theme'
 import { setTitle } from './title'
@@ -44,6 +44,7 @@ export function App() {
   const place = usePlace()
   const route = routeOf(place.path)
   const unauthorized = useUnauthorized()
+  const manual = useManual()
   const identity = 'id' in route ? `${route.page} ${route.id}` : route.page
   return (
     <>
@@ -66,6 +67,7 @@ export function App() {
             </a>
           ))}
           <a href="/docs">API</a>
+          {manual && <a href="/manual">Manual</a>}
         </nav>
         <Keys />
         <ThemeToggle />

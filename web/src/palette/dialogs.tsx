@@ -6,6 +6,7 @@ import { messageOf } from '../api/problem'
 import { useResource } from '../api/resource'
 import { navigate } from '../router/navigation'
 import { jobPath } from '../router/routes'
+import { useManual } from '../session/session'
 import { toggleTheme } from '../theme'
 import { type Entry, entriesOfPage, found } from './entries'
 import type { Shown } from './keys'
@@ -16,6 +17,13 @@ import { SHORTCUTS, shortcutsOn, switchShortcuts } from './shortcuts'
 const MOST_JOBS = 8
 /** After the last letter [ms]. */
 const DELAY = 150
+
+const MANUAL: Entry = {
+  key: 'manual',
+  label: 'Manual',
+  kind: 'page',
+  run: () => location.assign('/manual'),
+}
 
 export interface DialogsProps {
   readonly shown: Exclude<Shown, null>
@@ -50,6 +58,7 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
   const [own] = useState(entriesOfPage)
   const id = useId()
   const asked = useDelayed(text.trim())
+  const manual = useManual()
   const jobs = useResource(`palette ${asked}`, (signal) =>
     get('/v1/jobs', { query: { search: asked || undefined, limit: MOST_JOBS }, signal }),
   )
@@ -61,6 +70,7 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
     ),
     { key: 'compare', label: 'Tournaments', kind: 'page', run: () => navigate('/tournaments') },
     { key: 'api', label: 'API', kind: 'page', run: () => location.assign('/docs') },
+    ...(manual ? [MANUAL] : []),
     { key: 'theme', label: 'Light or dark', kind: 'command', run: toggleTheme },
     { key: 'help', label: 'Keys', kind: 'command', run: onHelp },
   ]

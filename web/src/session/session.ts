@@ -1,7 +1,7 @@
 /** Whether the server knows who asks: a token that it asks for, kept as a cookie by the browser. */
 
 import { useEffect, useState } from 'preact/hooks'
-import { onUnauthorized, post } from '../api/client'
+import { get, onUnauthorized, post } from '../api/client'
 
 const IN_FRAGMENT = '#token='
 
@@ -27,4 +27,20 @@ export function useUnauthorized(): boolean {
   const [refused, setRefused] = useState(false)
   useEffect(() => onUnauthorized(() => setRefused(true)), [])
   return refused
+}
+
+let manual: Promise<boolean> | null = null
+
+/** Whether this server has the manual at /manual; asked once. */
+export function useManual(): boolean {
+  const [there, setThere] = useState(false)
+  useEffect(() => {
+    // Without an answer there is no link, which is all that is lost.
+    manual ??= get('/v1/session').then(
+      (session) => session.manual,
+      () => false,
+    )
+    manual.then(setThere)
+  }, [])
+  return there
 }

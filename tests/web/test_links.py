@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 from playwright.sync_api import expect
@@ -76,13 +77,22 @@ def test_keys_find_jobs_and_commands_and_can_be_switched_off(
 def test_a_link_shows_a_walk_at_its_moment(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
-    page = visit(server.url).go("/walk?t=1.25&view=no-trail")
+    camera = "0.9:-1.3:0.6:0.1:0:0"
+    page = visit(server.url).go(f"/walk?t=1.25&view=no-trail&camera={camera}")
     player = page.locator("[data-player]")
     expect(player).to_have_attribute("data-time", "1.2500")
     expect(page.get_by_label("Trail")).not_to_be_checked()
     page.get_by_role("button", name="One frame ahead").click()
     page.get_by_label("Forces").uncheck()
-    expect(page).to_have_url(re.compile(r"t=1\.26&view=no-forces%2Cno-trail$"))
+    query = re.compile(r"t=1\.26&view=no-forces%2Cno-trail&camera=(.+)$")
+    expect(page).to_have_url(query)
+    # The camera stands where the link puts it: turned to and fro, it is there again.
+    player.locator("canvas").press("Shift+ArrowLeft")
+    expect(page).not_to_have_url(re.compile(quote(camera)))
+    page.keyboard.press("Shift+ArrowRight")
+    expect(page).to_have_url(re.compile(f"camera={re.escape(quote(camera))}$"))
+    page.get_by_role("button", name="Reset view").click()
+    expect(page).not_to_have_url(re.compile("camera="))
 
 
 def test_the_manual_is_linked_where_the_server_has_it(

@@ -54,10 +54,15 @@ export function flag(usual: boolean): Codec<boolean> {
   }
 }
 
+/** Numbers between colons; NaN for what is none. */
+export function numbersOf(text: string): number[] {
+  return text.split(':').map((part) => Number(part || Number.NaN))
+}
+
 /** Two numbers in rising order, or none: `2:40`. */
 export const RANGE: Codec<readonly [number, number] | null> = {
   read: (text) => {
-    const [low, high, ...rest] = text.split(':').map((part) => Number(part || Number.NaN))
+    const [low, high, ...rest] = numbersOf(text)
     return rest.length === 0 && Number.isFinite(high - low) && low < high ? [low, high] : undefined
   },
   write: (range) => range && range.map((end) => Number(end.toPrecision(5))).join(':'),

@@ -16,7 +16,7 @@ import { Player } from './player'
 import { DEFAULT_RATE, RATES, type Recorded, recordWalk } from './recorded'
 import { type ResolvedDesign, resolveDesign } from './resolve-design'
 import { ScenarioPicker } from './scenario-picker'
-import { MOMENT, USUAL_VIEW, VIEW } from './view-words'
+import { CAMERA, MOMENT, USUAL_VIEW, VIEW } from './view-words'
 import './walk.css'
 import { WalkPlots } from './walk-plots'
 import { FailureNotices } from './walk-result'
@@ -102,6 +102,7 @@ function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
   const walks = useMemo(() => (other ? [one, other] : [one]), [one, other])
   const shown = useMemo(() => walks.filter(({ replay }) => replay.frames > 0), [walks])
   const [choices, setChoices] = useQueryValue('view', VIEW, USUAL_VIEW)
+  const [camera, setCamera] = useQueryValue('camera', CAMERA, null)
   const [asked] = useQueryValue('t', MOMENT, null)
   const tell = useDelayedQuery('t')
   // A moment of another walk means nothing.
@@ -116,7 +117,11 @@ function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
       <FailureNotices walks={walks} />
       {shown.length > 0 && (
         <>
-          <Player walks={shown} playback={playback} choices={choices} onChoose={setChoices} />
+          <Player
+            {...{ walks: shown, playback, choices, camera }}
+            onChoose={setChoices}
+            onCamera={setCamera}
+          />
           <WalkPlots walks={shown} all={walks} playback={playback} />
         </>
       )}

@@ -12,7 +12,7 @@ import { pressed } from './player-keys'
 import { type Recorded, replaysOf } from './recorded'
 import type { Replay } from './replay'
 import { ReplayDriver } from './replay-driver'
-import type { ViewName } from './scene/camera-rig'
+import type { CameraPlace, ViewName } from './scene/camera-rig'
 import type { WalkScene } from './scene/walk-scene'
 
 export function Player({
@@ -20,12 +20,17 @@ export function Player({
   playback,
   choices,
   onChoose,
+  camera,
+  onCamera,
 }: {
   /** One walk, or two to be compared. */
   walks: readonly Recorded[]
   playback: Playback
   choices: ViewChoices
   onChoose: (choices: ViewChoices) => void
+  /** Where it is at first; null for the usual place. */
+  camera: CameraPlace | null
+  onCamera: (camera: CameraPlace | null) => void
 }) {
   const player = useRef<HTMLElement>(null)
   const stage = useRef<HTMLDivElement>(null)
@@ -38,6 +43,8 @@ export function Player({
   /** Choices as they are when something is loaded later. */
   const shown = useRef(choices)
   shown.current = choices
+  const placed = useRef({ camera, onCamera })
+  placed.current = { camera, onCamera }
   const theme = useTheme()
   const extent = useMemo(() => extentOf(replaysOf(walks)), [walks])
   const newtons = useMemo(
@@ -63,6 +70,7 @@ export function Player({
           )
           scene.current = built
           observer = shownIn(container, built, () => replayDriver.request())
+          built.placeCamera(placed.current.camera, (place) => placed.current.onCamera(place))
           replayDriver.attach(built)
           built
             .loadMeshes(() => shown.current.meshes, leave.signal)
@@ -224,7 +232,6 @@ function shownIn(box: HTMLElement, scene: WalkScene, redraw: () => void): Resize
     redraw()
   }
   fill()
-  scene.look('three-quarter')
   const observer = new ResizeObserver(fill)
   observer.observe(box)
   return observer

@@ -1,7 +1,8 @@
 /** What a replay shows, as parts of an address. Pure. */
 
-import type { Codec } from '../router/query-value'
+import { type Codec, numbersOf } from '../router/query-value'
 import type { ViewChoices } from './player-controls'
+import type { CameraPlace } from './scene/camera-rig'
 
 /** What a replay shows where its address says nothing. */
 export const USUAL_VIEW: ViewChoices = {
@@ -41,4 +42,16 @@ export const MOMENT: Codec<number | null> = {
   read: (text) =>
     text !== '' && Number(text) >= 0 && Number.isFinite(Number(text)) ? Number(text) : undefined,
   write: (moment) => (moment ? String(Number(moment.toFixed(4))) : null),
+}
+
+/** Place of the camera and what it is turned to [m], to the mm: `0.81:-1.2:0.64:0:0:0.02`; null for the usual. */
+export const CAMERA: Codec<CameraPlace | null> = {
+  read: (text) => {
+    const [x, y, z, u, v, w, ...rest] = numbersOf(text)
+    if (rest.length > 0 || ![x, y, z, u, v, w].every(Number.isFinite)) return undefined
+    return x === u && y === v && z === w ? undefined : { position: [x, y, z], target: [u, v, w] }
+  },
+  write: (place) =>
+    // Adding zero makes the negative zero of rounding a plain one.
+    place && [...place.position, ...place.target].map((at) => Number(at.toFixed(3)) + 0).join(':'),
 }

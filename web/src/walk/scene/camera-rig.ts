@@ -18,9 +18,20 @@ const NEAREST = 0.47
 const FURTHEST = 11.3
 const SEEN = [0.038, 113] as const
 
+type Point = readonly [x: number, y: number, z: number]
+
+/** Where the camera is and what it is turned to, from the robots' middle while it follows them, else from
+ * where the walk begins [m]. */
+export interface CameraPlace {
+  readonly position: Point
+  readonly target: Point
+}
+
 export class CameraRig {
   readonly camera = new PerspectiveCamera(32, 1)
-  follow = true
+  /** Called when it was placed by hand, by a key or for a view; null: as it is at first. */
+  onPlaced: (place: CameraPlace | null) => void = () => undefined
+  private following = true
   /** Half the height of what is to be seen [m]. */
   reach = 1
   private readonly controls: OrbitControls
@@ -42,6 +53,7 @@ export class CameraRig {
     this.controls.maxDistance = FURTHEST * span
     this.controls.maxPolarAngle = 0.56 * Math.PI
     this.controls.addEventListener('change', onChange)
+    this.controls.addEventListener('end', () => this.onPlaced(this.place))
     // The wheel scrolls the page, as long as the scene was not clicked or reached by Tab.
     this.controls.enableZoom = false
     canvas.addEventListener('focus', () => {
@@ -53,11 +65,30 @@ export class CameraRig {
     canvas.style.touchAction = 'pan-y'
   }
 
+  get place(): CameraPlace {
+    const origin = this.following ? this.target : new Vector3()
+    const from = (point: Vector3): Point => point.clone().sub(origin).toArray()
+    return { position: from(this.camera.position), target: from(this.controls.target) }
+  }
+
+  set place({ position, target }: CameraPlace) {
+    const origin = this.following ? this.target : new Vector3()
+    this.camera.position.set(...position).add(origin)
+    this.controls.target.set(...target).add(origin)
+    this.controls.update()
+  }
+
+  set follow(follow: boolean) {
+    if (follow === this.following) return
+    this.following = follow
+    this.onPlaced(this.place)
+  }
+
   /** What is being looked at moved there; both stay as far from each other if it is followed. */
   moveTarget(target: Vector3): void {
     this.step.subVectors(target, this.target)
     this.target.copy(target)
-    if (!this.follow) return
+    if (!this.following) return
     this.controls.target.add(this.step)
     this.camera.position.add(this.step)
     this.controls.update()
@@ -72,6 +103,7 @@ export class CameraRig {
     this.controls.target.copy(this.target)
     this.camera.position.copy(this.target).addScaledVector(direction, distance)
     this.controls.update()
+    this.onPlaced(from === 'three-quarter' && this.following ? null : this.place)
   }
 
   /** Turn about what is looked at [rad]. */
@@ -84,6 +116,7 @@ export class CameraRig {
     const turned = new Vector3().setFromSpherical(angles)
     this.camera.position.copy(this.controls.target).add(new Vector3(turned.x, -turned.z, turned.y))
     this.controls.update()
+    this.onPlaced(this.place)
   }
 
   /** Come nearer by a factor. */
@@ -95,6 +128,7 @@ export class CameraRig {
     )
     this.camera.position.copy(this.controls.target).add(offset.setLength(length))
     this.controls.update()
+    this.onPlaced(this.place)
   }
 
   resize(width: number, height: number): void {

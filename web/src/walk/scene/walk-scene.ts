@@ -11,7 +11,7 @@ import {
 } from 'three'
 import type { Extent } from '../extent'
 import { hasMeshes, type Replay } from '../replay'
-import { CameraRig, type ViewName } from './camera-rig'
+import { type CameraPlace, CameraRig, type ViewName } from './camera-rig'
 import { disposeTree } from './dispose'
 import { FootMarks } from './foot-marks'
 import { Ground } from './ground'
@@ -205,6 +205,13 @@ export class WalkScene {
 
   look(from: ViewName): void {
     this.rig.look(from)
+  }
+
+  /** place: of the camera at first, null for the usual one; onPlaced: is told where it was put later. */
+  placeCamera(place: CameraPlace | null, onPlaced: (place: CameraPlace | null) => void): void {
+    if (place === null) this.rig.look('three-quarter')
+    else this.rig.place = place
+    this.rig.onPlaced = onPlaced
   }
 
   turn(around: number, up: number): void {

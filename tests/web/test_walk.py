@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -107,6 +108,53 @@ def test_a_replay_is_scrubbed_stepped_and_played(
     expect(player(page)).to_have_attribute("data-playing", "true")
     expect(player(page)).to_have_attribute("data-playing", "false")
     expect_frame(page, recording.header["frames"] - 1, recording)
+
+
+def test_a_replay_is_saved_as_a_video_of_the_chosen_size_and_speed(
+    server: ServerProcess, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go("/walk?published=A&scenario=normal-fast&t=0.5")
+    shown = player(page)
+    before = shown.locator("canvas").bounding_box()
+    page.get_by_role("button", name="Save as video").click()
+    dialog = page.get_by_role("dialog", name="Save as video")
+    # What is stopped is not saved.
+    dialog.get_by_label("Speed").select_option("0.1")
+    dialog.get_by_role("button", name="Record").click()
+    expect(dialog.get_by_role("progressbar")).to_be_visible()
+    dialog.get_by_role("button", name="Stop recording").click()
+
+    dialog.get_by_label("Size").select_option(label="640 × 360")
+    dialog.get_by_label("Speed").select_option("4")
+    duration = float((shown.locator(".moment").inner_text()).split()[2])
+    expect(dialog).to_contain_text(f"It takes {duration / 4:.1f}")
+    with page.expect_download() as download:
+        dialog.get_by_role("button", name="Record").click()
+    assert download.value.suggested_filename == "walk-normal-fast.webm"
+    video = download.value.path().read_bytes()
+    # EBML, the type of document, and the track's width and height (RFC 9559).
+    assert video[:4] == bytes.fromhex("1a45dfa3") and b"webm" in video[:64]
+    assert bytes.fromhex("b0820280") in video and bytes.fromhex("ba820168") in video
+    # A busy machine is slow to draw the first picture, which the film shows the longer for it.
+    assert 0.7 < video_seconds(video) / (duration / 4) < 3.0
+
+    # The replay is as it was.
+    expect(dialog).to_have_count(0)
+    expect(shown).to_have_attribute("data-time", "0.5000")
+    assert shown.locator("canvas").bounding_box() == before
+
+    page.evaluate("delete window.MediaRecorder")
+    page.get_by_role("button", name="Save as video").click()
+    expect(dialog.get_by_role("alert")).to_contain_text("cannot record")
+    expect(dialog.get_by_role("button", name="Record")).to_have_count(0)
+
+
+def video_seconds(video: bytes) -> float:
+    """Duration that a WebM tells [s]: a float in milliseconds."""
+    at = video.index(bytes.fromhex("4489")) + 2
+    size = video[at] & 0x7F
+    (milliseconds,) = struct.unpack(">f" if size == 4 else ">d", video[at + 1 : at + 1 + size])
+    return float(milliseconds) / 1000
 
 
 def goes_backward(walk: Recording) -> bool:

@@ -1,7 +1,7 @@
 /** Play, scrub, speed and view of a replay. */
 
 import { useId } from 'preact/hooks'
-import { formatNumber } from '../format/number'
+import { formatExact } from '../format/number'
 import { type Playback, SPEEDS } from './playback'
 import type { ViewName } from './scene/camera-rig'
 import type { SceneOptions } from './scene/walk-scene'
@@ -23,6 +23,7 @@ export function PlayerControls({
   choices,
   onChoose,
   onLook,
+  onFilm,
 }: {
   playback: Playback
   /** Whether there are two walks. */
@@ -32,6 +33,8 @@ export function PlayerControls({
   choices: ViewChoices
   onChoose: (choices: ViewChoices) => void
   onLook: (view: ViewName) => void
+  /** Null where there is no picture. */
+  onFilm: (() => void) | null
 }) {
   const set = (changes: Partial<ViewChoices>) => onChoose({ ...choices, ...changes })
   return (
@@ -70,6 +73,14 @@ export function PlayerControls({
             </button>
           ))}
         </span>
+        <button
+          type="button"
+          class="compact"
+          disabled={onFilm === null}
+          onClick={onFilm ?? undefined}
+        >
+          Save as video…
+        </button>
       </div>
     </div>
   )
@@ -78,7 +89,6 @@ export function PlayerControls({
 function Transport({ playback }: { playback: Playback }) {
   const { playing, speed } = usePlaybackState(playback)
   const time = usePlaybackTime(playback, 60)
-  const id = useId()
   const frame = playback.frame
   const seconds = (value: number) => value.toFixed(2)
   return (
@@ -112,23 +122,31 @@ function Transport({ playback }: { playback: Playback }) {
       <output class="moment">
         {seconds(time)} / {seconds(playback.duration)}&nbsp;s
       </output>
-      <span class="speed">
-        <label for={id} class="label">
-          Speed
-        </label>
-        <select
-          id={id}
-          value={String(speed)}
-          onChange={(event) => playback.setSpeed(Number(event.currentTarget.value))}
-        >
-          {SPEEDS.map((value) => (
-            <option key={value} value={String(value)}>
-              {formatNumber(value, 1)}×
-            </option>
-          ))}
-        </select>
-      </span>
+      <SpeedField playback={playback} speed={speed} />
     </div>
+  )
+}
+
+/** How fast it plays, as a share of real time. */
+export function SpeedField({ playback, speed }: { playback: Playback; speed: number }) {
+  const id = useId()
+  return (
+    <span class="speed">
+      <label for={id} class="label">
+        Speed
+      </label>
+      <select
+        id={id}
+        value={String(speed)}
+        onChange={(event) => playback.setSpeed(Number(event.currentTarget.value))}
+      >
+        {SPEEDS.map((value) => (
+          <option key={value} value={String(value)}>
+            {formatExact(value)}×
+          </option>
+        ))}
+      </select>
+    </span>
   )
 }
 

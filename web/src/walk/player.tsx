@@ -2,18 +2,20 @@
 
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
-import { formatExact } from '../format/number'
 import { useTheme } from '../theme'
-import { extentOf, lengthInWords } from './extent'
+import { extentOf } from './extent'
+import { film } from './film'
+import { FilmDialog, type FilmSize } from './film-dialog'
 import { newtonsPerCell, typicalLargest } from './force-scale'
 import type { Playback } from './playback'
 import { PlayerControls, type ViewChoices } from './player-controls'
 import { pressed } from './player-keys'
 import { type Recorded, replaysOf } from './recorded'
 import type { Replay } from './replay'
-import { ReplayDriver } from './replay-driver'
+import { LONGEST_STEP, LONGEST_STEP_OF_FILM, ReplayDriver } from './replay-driver'
 import type { CameraPlace, ViewName } from './scene/camera-rig'
 import type { WalkScene } from './scene/walk-scene'
+import { SceneLegend } from './scene-legend'
 
 export function Player({
   walks,
@@ -37,6 +39,8 @@ export function Player({
   const scene = useRef<WalkScene | null>(null)
   const driver = useRef<ReplayDriver | null>(null)
   const [failure, setFailure] = useState<string | null>(null)
+  const [drawn, setDrawn] = useState(false)
+  const [filming, setFilming] = useState(false)
   /** Meshes that were loaded, and why there are none of a robot that should have some. */
   const [meshes, setMeshes] = useState(0)
   const [lost, setLost] = useState<string | null>(null)
@@ -59,6 +63,7 @@ export function Player({
     const leave = new AbortController()
     let observer: ResizeObserver | null = null
     setFailure(null)
+    setDrawn(false)
     setMeshes(0)
     setLost(null)
     import('./scene/walk-scene').then(
@@ -69,6 +74,7 @@ export function Player({
             replayDriver.request(),
           )
           scene.current = built
+          setDrawn(true)
           observer = shownIn(container, built, () => replayDriver.request())
           built.placeCamera(placed.current.camera, (place) => placed.current.onCamera(place))
           replayDriver.attach(built)
@@ -105,6 +111,7 @@ export function Player({
   }, [theme])
 
   useEffect(() => {
+    if (filming) return
     const onKey = (event: KeyboardEvent) => {
       if (event.ctrlKey || event.metaKey || event.altKey) return
       const target = event.target as Element
@@ -116,11 +123,24 @@ export function Player({
     }
     addEventListener('keydown', onKey)
     return () => removeEventListener('keydown', onKey)
-  }, [playback])
+  }, [playback, filming])
 
   const look = (view: ViewName) => {
     scene.current?.look(view)
     driver.current?.request()
+  }
+  const record = async (size: FilmSize, type: string, signal: AbortSignal) => {
+    const [shot, drive, before] = [scene.current!, driver.current!, playback.time]
+    shot.film(size)
+    drive.longestStep = LONGEST_STEP_OF_FILM
+    try {
+      return await film(shot.canvas, playback, type, signal)
+    } finally {
+      drive.longestStep = LONGEST_STEP
+      shot.film(null)
+      playback.pause()
+      playback.seek(before)
+    }
   }
   return (
     <section class="card player" ref={player} aria-label="Replay" data-player data-meshes={meshes}>
@@ -136,7 +156,11 @@ export function Player({
         choices={choices}
         onChoose={onChoose}
         onLook={look}
+        onFilm={drawn ? () => setFilming(true) : null}
       />
+      {filming && (
+        <FilmDialog playback={playback} onRecord={record} onClose={() => setFilming(false)} />
+      )}
     </section>
   )
 }
@@ -151,55 +175,6 @@ function NoScene({ reason }: { reason: string }) {
       </p>
     </div>
   )
-}
-
-function SceneLegend({
-  walks,
-  cell,
-  newtons,
-  choices,
-}: {
-  walks: readonly Recorded[]
-  /** Of the grid [m]. */
-  cell: number
-  newtons: number
-  choices: ViewChoices
-}) {
-  const { ground, load_kg } = walks[0].replay.header
-  return (
-    <div class="legend">
-      {walks.map(({ label }, k) => (
-        <span key={k}>
-          <i class={`swatch walk-${k + 1}`} aria-hidden="true" />
-          {label}
-          {k > 0 && choices.arrangement === 'ghost' ? ' (ghost)' : ''}
-        </span>
-      ))}
-      <span>
-        <i class="disc" aria-hidden="true" />
-        foot on the ground
-      </span>
-      {choices.forces && (
-        <span data-force-scale={newtons}>
-          <i class="arrow" aria-hidden="true" />
-          force of the ground, {lengthInWords(cell)} for {formatExact(newtons)}&nbsp;N
-        </span>
-      )}
-      <span data-grid={cell}>grid of {lengthInWords(cell)}</span>
-      {ground.slope_deg !== 0 && (
-        <span data-slope={ground.slope_deg}>
-          slope of {formatExact(Math.abs(ground.slope_deg))}°,{' '}
-          {ground.slope_deg > 0 ? 'rising' : 'falling'} {towards(ground.slope_direction_deg)}
-        </span>
-      )}
-      {load_kg > 0 && <span data-load={load_kg}>load of {formatExact(load_kg)}&nbsp;kg</span>}
-    </div>
-  )
-}
-
-function towards(degrees: number): string {
-  if (degrees === 0) return 'ahead'
-  return `${Math.abs(degrees)}° to the ${degrees > 0 ? 'left' : 'right'}`
 }
 
 /** Size of the forces that arrows must show [N]. */

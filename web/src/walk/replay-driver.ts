@@ -5,7 +5,9 @@ import type { Replay } from './replay'
 import type { WalkScene } from './scene/walk-scene'
 
 /** Longest time that may pass between two pictures [s]; a tab in the background gets none. */
-const LONGEST_STEP = 0.1
+export const LONGEST_STEP = 0.1
+/** While it is recorded, when the clock must keep real time however slowly pictures are drawn [s]. */
+export const LONGEST_STEP_OF_FILM = 2
 
 /** Time over which pictures are counted [s]. */
 const COUNTED = 1
@@ -15,6 +17,7 @@ const COUNTED = 1
  * nothing. Works without a scene too: then the clock alone runs.
  */
 export class ReplayDriver {
+  longestStep = LONGEST_STEP
   private scene: WalkScene | null = null
   private requested = 0
   private before = 0
@@ -30,6 +33,8 @@ export class ReplayDriver {
     private readonly element: HTMLElement,
   ) {
     this.leave = playback.subscribe(() => {
+      // Time that passes while it stands, such as of a hidden tab, is not made up for.
+      if (!playback.playing) this.before = 0
       this.tell()
       this.request()
     })
@@ -56,7 +61,7 @@ export class ReplayDriver {
   private draw(now: number): void {
     // Not cleared before the clock moved, so that its own notice asks for no further picture.
     if (this.playback.playing) {
-      this.playback.advance(this.before === 0 ? 0 : Math.min(LONGEST_STEP, now - this.before))
+      this.playback.advance(this.before === 0 ? 0 : Math.min(this.longestStep, now - this.before))
     }
     this.requested = 0
     this.scene?.show(this.playback.time)

@@ -5,11 +5,15 @@ import {
   Group,
   Line,
   LineBasicMaterial,
+  type Quaternion,
   Sprite,
   SpriteMaterial,
   Vector3,
 } from 'three'
+import type { Replay } from '../replay'
 import { proportion, textTexture } from './label'
+
+type Ground = Replay['header']['ground']
 
 /** Of the level line, and of the arc about its end, in spans of the robot. */
 const LENGTH = 1.13
@@ -74,4 +78,27 @@ export class SlopeMark {
   private line(points: Vector3[]): Line {
     return new Line(new BufferGeometry().setFromPoints(points), this.material)
   }
+}
+
+/** None on level ground. tilt: from the ground's world to the scene. */
+export function slopeMark(ground: Ground, tilt: Quaternion, span: number): SlopeMark | null {
+  if (ground.slope_deg === 0) return null
+  return new SlopeMark(ground.slope_deg, uphill(ground).applyQuaternion(tilt), span)
+}
+
+/** Where the mark stands clear of the robots, from what is looked at, in the ground's world [m]; foot: the
+ * height of the ground's marks over that. */
+export function slopeCorner(ground: Ground, room: number, span: number, foot: number): Vector3 {
+  const rises = uphill(ground)
+  return new Vector3(-rises.y, rises.x, 0)
+    .multiplyScalar(room)
+    .addScaledVector(rises, -0.19 * span)
+    .setZ(foot)
+}
+
+/** Up the ground, in the ground's world. */
+function uphill({ slope_deg, slope_direction_deg }: Ground): Vector3 {
+  const direction = (slope_direction_deg * Math.PI) / 180
+  const rises = new Vector3(Math.cos(direction), Math.sin(direction), 0)
+  return slope_deg < 0 ? rises.negate() : rises
 }

@@ -18,7 +18,7 @@ import { Ground } from './ground'
 import { palette } from './palette'
 import { createRenderer } from './renderer'
 import { RobotFigure } from './robot-figure'
-import { SlopeMark } from './slope-mark'
+import { type SlopeMark, slopeCorner, slopeMark } from './slope-mark'
 import { Trail } from './trail'
 
 export type Arrangement = 'ghost' | 'beside'
@@ -56,6 +56,8 @@ const LIGHT = new Vector3(1.3, -2.1, 4.2)
 const SHADED = 1.7
 const DOWN = new Vector3(0, 0, -1)
 
+type Size = readonly [width: number, height: number]
+
 interface Lane {
   readonly replay: Replay
   readonly group: Group
@@ -76,6 +78,10 @@ export class WalkScene {
   private readonly sun = new DirectionalLight(0xffffff, 2.4)
   private readonly rig: CameraRig
   private readonly centre = new Vector3()
+  /** Pixels of a picture for one of the page. */
+  private readonly density: number
+  private shownSize: Size = [1, 1]
+  private filmSize: Size | null = null
 
   /** newtons: an arrow's for one cell of the grid; onChange: something else is to be drawn. */
   constructor(
@@ -86,6 +92,7 @@ export class WalkScene {
     onChange: () => void,
   ) {
     this.renderer = createRenderer()
+    this.density = this.renderer.getPixelRatio()
     const { span, width, cell } = extent
     this.lanes = replays.map((replay, k) => {
       const height = (MARKS - MARKS_LOWER * k) * span
@@ -164,7 +171,8 @@ export class WalkScene {
     })
     const { ground } = this.lanes[0].replay.header
     const room = SLOPE * this.extent.width + (beside ? this.beside / 2 : 0)
-    const corner = slopeCorner(ground, room, this.extent.span, this.middle)
+    const foot = MARKS * this.extent.span - this.middle
+    const corner = slopeCorner(ground, room, this.extent.span, foot)
     this.slope?.placeAt(corner.applyQuaternion(this.world.quaternion))
     this.slope?.moveTo(this.centre)
     this.rig.follow = options.follow
@@ -223,8 +231,15 @@ export class WalkScene {
   }
 
   resize(width: number, height: number): void {
-    this.renderer.setSize(width, height)
-    this.rig.resize(width, height)
+    this.shownSize = [width, height]
+    this.fit()
+  }
+
+  /** Draw pictures of this size [px], which the page scales to its own; null: in the page's own. */
+  film(size: Size | null): void {
+    this.filmSize = size
+    this.fit()
+    this.render()
   }
 
   render(): void {
@@ -241,6 +256,14 @@ export class WalkScene {
     this.renderer.dispose()
     this.renderer.forceContextLoss()
     this.canvas.remove()
+  }
+
+  private fit(): void {
+    const filmed = this.filmSize !== null
+    const [width, height] = this.filmSize ?? this.shownSize
+    this.renderer.setPixelRatio(filmed ? 1 : this.density)
+    this.renderer.setSize(width, height, !filmed)
+    this.rig.resize(width, height)
   }
 
   private prepareShadows(): void {
@@ -268,35 +291,4 @@ function laneOf(replay: Replay, feet: FootMarks): Lane {
   const trail = new Trail(replay)
   group.add(figure.object, feet.object, trail.object)
   return { replay, group, figure, feet, trail }
-}
-
-/** None on level ground. tilt: from the ground's world to the scene. */
-function slopeMark(
-  ground: Replay['header']['ground'],
-  tilt: Quaternion,
-  span: number,
-): SlopeMark | null {
-  if (ground.slope_deg === 0) return null
-  return new SlopeMark(ground.slope_deg, uphill(ground).applyQuaternion(tilt), span)
-}
-
-/** Where the mark stands clear of the robots, from what is looked at, in the ground's world [m]. */
-function slopeCorner(
-  ground: Replay['header']['ground'],
-  room: number,
-  span: number,
-  middle: number,
-): Vector3 {
-  const rises = uphill(ground)
-  return new Vector3(-rises.y, rises.x, 0)
-    .multiplyScalar(room)
-    .addScaledVector(rises, -0.19 * span)
-    .setZ(MARKS * span - middle)
-}
-
-/** Up the ground, in the ground's world. */
-function uphill({ slope_deg, slope_direction_deg }: Replay['header']['ground']): Vector3 {
-  const direction = (slope_direction_deg * Math.PI) / 180
-  const rises = new Vector3(Math.cos(direction), Math.sin(direction), 0)
-  return slope_deg < 0 ? rises.negate() : rises
 }

@@ -192,6 +192,7 @@ def test_a_jobs_headline_convergence_winner_and_walk(
     chart = page.get_by_role("img", name=re.compile("^Convergence over 6 iterations"))
     expect(chart).to_have_attribute("aria-label", re.compile("published A"))
     page.get_by_label("single designs").check()
+    expect(page).to_have_url(re.compile("dots=yes$"))
     walked = page.locator("[data-dots]")
     expect(walked).to_contain_text("designs")
     assert 0 < int(walked.get_attribute("data-dots") or 0) <= job["evaluations"]

@@ -1,9 +1,17 @@
 import { describe, expect, test } from 'vitest'
 import { buildModel } from '../src/charts/parallel-model'
 import { brushesOf, brushWords } from '../src/job/brush-words'
-import { flag, ORDER, RANGE } from '../src/router/query-value'
+import { flag, ORDER, oneOf, RANGE } from '../src/router/query-value'
 
 describe('what an address says', () => {
+  test('of a choice is one of its words, and nothing for the usual one', () => {
+    const layer = oneOf(['inference', 'table'], 'inference')
+    expect(layer.read('table')).toBe('table')
+    expect(layer.read('toString')).toBeUndefined()
+    expect(layer.write('inference')).toBeNull()
+    expect(layer.write('table')).toBe('table')
+  })
+
   test('of a stretch is two rising numbers, or nothing', () => {
     expect(RANGE.read('2:40.5')).toEqual([2, 40.5])
     for (const wrong of ['', '2', '2:', ':3', '40:2', '1:2:3', 'a:b', '1:Infinity']) {

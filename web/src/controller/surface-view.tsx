@@ -3,14 +3,17 @@
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
 import { ChartFrame } from '../components/chart-frame'
+import { Segmented } from '../components/segmented'
 import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
+import { oneOf, useQueryValue } from '../router/query-value'
 import { useTheme } from '../theme'
-import { Segmented } from '../walk/player-controls'
 import { type Cell, cells, extent, type Layer, layerData } from './surface'
 import type { SurfaceScene } from './surface-scene'
 
 const TURN = Math.PI / 24
+
+const LAYER = oneOf<Layer['key']>(['inference', 'table', 'difference'], 'inference')
 
 const TURNS: Readonly<Record<string, readonly [around: number, up: number]>> = {
   ArrowLeft: [-TURN, 0],
@@ -29,7 +32,7 @@ export function SurfaceView({
   name: string
   cell: Cell
 }) {
-  const [key, setKey] = useState<Layer['key']>('inference')
+  const [key, setKey] = useQueryValue('surface', LAYER, 'inference')
   const layer = layers.find((each) => each.key === key) ?? layers[0]
   return (
     <ChartFrame

@@ -1,6 +1,6 @@
 /** Best, median and quantiles of fitness over the iterations. */
 
-import { useCallback, useMemo, useRef, useState } from 'preact/hooks'
+import { useCallback, useMemo, useRef } from 'preact/hooks'
 import type uPlot from 'uplot'
 import { getBytes } from '../api/client'
 import { useResource, useSlowly } from '../api/resource'
@@ -40,7 +40,7 @@ export function ConvergenceChart({
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
-  const [single, setSingle] = useState(false)
+  const [single, setSingle] = useQueryValue('dots', flag(false), false)
   const dots = useDots(job, iterations.length, single)
   const drawn = useMemo(() => content(iterations, distribution), [iterations, distribution])
   const unit = fitnessUnit(job)

@@ -2,6 +2,7 @@
 
 import type { Preference, PreferencePreset } from '../api/types'
 import { NumberField } from '../components/number-field'
+import { Segmented } from '../components/segmented'
 import { writtenUnit } from '../format/number'
 import { inWords } from '../format/words'
 import { weighed } from './preference'
@@ -31,6 +32,10 @@ export function PreferenceSliders({
     values[index] = value
     onChange({ ...preference, [part]: values as Preference[Part] })
   }
+  const offered: readonly (readonly [name: string, preference: Preference])[] = [
+    ['the job’s own', own],
+    ...presets.map((preset) => [preset.name, preset] as const),
+  ]
   return (
     <section class="card" aria-labelledby="weights">
       <h2 id="weights">Preference</h2>
@@ -39,21 +44,12 @@ export function PreferenceSliders({
           A scenario’s utility is the product of (b + f)<sup>e</sup> over the objectives f. A larger
           e makes an objective matter more, a larger b makes small values of it matter less.
         </p>
-        <fieldset class="segmented" aria-label="Published preferences">
-          <Choice
-            label="the job’s own"
-            chosen={same(preference, own)}
-            onChoose={() => onChange(own)}
-          />
-          {presets.map((preset) => (
-            <Choice
-              key={preset.name}
-              label={preset.name}
-              chosen={same(preference, preset)}
-              onChoose={() => onChange({ bias: preset.bias, exponent: preset.exponent })}
-            />
-          ))}
-        </fieldset>
+        <Segmented
+          label="Published preferences"
+          value={offered.flatMap(([name, each]) => (same(preference, each) ? [name] : []))}
+          options={offered.map(([name]) => [name, name] as const)}
+          onChoose={(chosen) => onChange(weights(offered.find(([name]) => name === chosen)![1]))}
+        />
         {weighed(preference).map((objective, index) => (
           <fieldset key={objective} class="weights">
             <legend>{inWords(objective)}</legend>
@@ -115,20 +111,8 @@ function Weight({
   )
 }
 
-function Choice({
-  label,
-  chosen,
-  onChoose,
-}: {
-  label: string
-  chosen: boolean
-  onChoose: () => void
-}) {
-  return (
-    <button type="button" class="compact" aria-pressed={chosen} onClick={onChoose}>
-      {label}
-    </button>
-  )
+function weights({ bias, exponent }: Preference): Preference {
+  return { bias, exponent }
 }
 
 export function same(a: Preference, b: Preference): boolean {

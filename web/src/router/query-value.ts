@@ -54,6 +54,14 @@ export function flag(usual: boolean): Codec<boolean> {
   }
 }
 
+/** One of some words, written only where it is not the usual one. */
+export function oneOf<K extends string>(words: readonly K[], usual: K): Codec<K> {
+  return {
+    read: (text) => words.find((word) => word === text),
+    write: (word) => (word === usual ? null : word),
+  }
+}
+
 /** Numbers between colons; NaN for what is none. */
 export function numbersOf(text: string): number[] {
   return text.split(':').map((part) => Number(part || Number.NaN))

@@ -1,6 +1,7 @@
 /** The search method and its settings, as the API describes them. */
 
 import type { OptimizerPreset } from '../api/types'
+import { Segmented } from '../components/segmented'
 import { capitalized, inWords, sentence } from '../format/words'
 import { ChoiceField, NumberField, Problems } from './number-field'
 import {
@@ -20,6 +21,7 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
   const { optimizer } = draft
   const method = methodNamed(optimizers, optimizer.name)
   const presets = presetsOf(optimizers, optimizer.name)
+  const settings = presets.map((preset) => [preset.name, withPreset(optimizer, preset)] as const)
   const fields = settingsOf(method)
   const choose = (name: string) => {
     const chosen = methodNamed(optimizers, name)
@@ -41,21 +43,15 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
           onChange={choose}
         />
         {presets.length > 1 && (
-          <fieldset class="segmented" aria-label="Preset of the optimizer">
-            {presets.map((preset) => {
-              const settings = withPreset(optimizer, preset)
-              return (
-                <button
-                  key={preset.name}
-                  type="button"
-                  aria-pressed={Object.keys(settings).every((k) => settings[k] === optimizer[k])}
-                  onClick={() => onChange({ optimizer: settings })}
-                >
-                  {preset.name}
-                </button>
-              )
-            })}
-          </fieldset>
+          <Segmented
+            roomy
+            label="Preset of the optimizer"
+            value={settings.flatMap(([name, each]) => (holds(each, optimizer) ? [name] : []))}
+            options={presets.map(({ name }) => [name, name] as const)}
+            onChoose={(chosen) => {
+              onChange({ optimizer: settings.find(([name]) => name === chosen)![1] })
+            }}
+          />
         )}
         <Problems messages={others} />
       </div>
@@ -73,6 +69,10 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
       </div>
     </section>
   )
+}
+
+function holds(settings: OptimizerDraft, optimizer: OptimizerDraft): boolean {
+  return Object.keys(settings).every((key) => settings[key] === optimizer[key])
 }
 
 function hintOf({ description, needs }: OptimizerPreset): string {

@@ -1,5 +1,6 @@
 /** How objectives are weighed: a published preference or one's own. */
 
+import { Segmented } from '../components/segmented'
 import { formatExact } from '../format/number'
 import { inWords } from '../format/words'
 import { weighed } from '../job/preference'
@@ -18,25 +19,18 @@ export function PreferenceSection({ draft, catalogue, errors, onChange }: Sectio
     <section class="card" aria-labelledby="part-preference">
       <h2 id="part-preference">Preference</h2>
       <div class="stack">
-        <fieldset class="segmented" aria-label="Preference">
-          {names.map((name) => (
-            <button
-              key={name}
-              type="button"
-              aria-pressed={preference.kind === name}
-              onClick={() => onChange({ preference: preferenceDraft(catalogue, name) })}
-            >
-              {name}
-            </button>
-          ))}
-          <button
-            type="button"
-            aria-pressed={preference.kind === 'own'}
-            onClick={() => onChange({ preference: { ...preference, kind: 'own' } })}
-          >
-            own
-          </button>
-        </fieldset>
+        <Segmented
+          roomy
+          label="Preference"
+          value={preference.kind}
+          options={[...names, 'own'].map((name) => [name, name] as const)}
+          onChoose={(kind) =>
+            onChange({
+              preference:
+                kind === 'own' ? { ...preference, kind } : preferenceDraft(catalogue, kind),
+            })
+          }
+        />
         <Problems messages={errors.has('preference') ? [errors.get('preference')!] : []} />
         <div class="table-scroll">
           <table class="variables">

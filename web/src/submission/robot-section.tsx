@@ -2,6 +2,7 @@
 
 import { useState } from 'preact/hooks'
 import { NOT_PUBLISHED } from '../api/robots'
+import { Segmented } from '../components/segmented'
 import { errorsUnder } from './build-spec'
 import { emptyDraft, type RobotDraft } from './draft'
 import { ChoiceField, NumberField, Problems } from './number-field'
@@ -26,18 +27,13 @@ export function RobotSection(props: SectionProps) {
     <section class="card" aria-labelledby="part-robot">
       <h2 id="part-robot">Robot</h2>
       <div class="stack">
-        <fieldset class="segmented" aria-label="Robot">
-          {KINDS.map(([kind, label]) => (
-            <button
-              key={kind}
-              type="button"
-              aria-pressed={robot.kind === kind}
-              onClick={() => onChange(ofKind(draft, kind, emptyDraft(catalogue)))}
-            >
-              {label}
-            </button>
-          ))}
-        </fieldset>
+        <Segmented
+          roomy
+          label="Robot"
+          value={robot.kind}
+          options={KINDS}
+          onChoose={(kind) => onChange(ofKind(draft, kind, emptyDraft(catalogue)))}
+        />
         {robot.kind !== 'files' && (
           <ChoiceField
             label="Robot that ships"

@@ -1,5 +1,6 @@
 /** Robust jobs: worlds that differ from the model, and what the walks in them come to. */
 
+import { Segmented } from '../components/segmented'
 import { formatCount } from '../format/number'
 import { capitalized, inWords, sentence } from '../format/words'
 import { errorsUnder } from './build-spec'
@@ -20,18 +21,16 @@ export function WorldsSection({ draft, catalogue, errors, onChange }: SectionPro
     <section class="card" aria-labelledby="part-worlds">
       <h2 id="part-worlds">Robustness</h2>
       <div class="stack">
-        <fieldset class="segmented" aria-label="Judged in">
-          {[false, true].map((robust) => (
-            <button
-              key={String(robust)}
-              type="button"
-              aria-pressed={worlds.robust === robust}
-              onClick={() => change({ robust })}
-            >
-              {robust ? 'many worlds' : 'the model alone'}
-            </button>
-          ))}
-        </fieldset>
+        <Segmented
+          roomy
+          label="Judged in"
+          value={worlds.robust ? 'many' : 'one'}
+          options={[
+            ['one', 'the model alone'],
+            ['many', 'many worlds'],
+          ]}
+          onChoose={(kind) => change({ robust: kind === 'many' })}
+        />
         <p class="muted small">
           A robust job lets every design walk in worlds that differ from the model in friction,
           masses, battery, gears, sensors and ground, and judges it by all of them.

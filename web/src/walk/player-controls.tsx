@@ -1,6 +1,7 @@
 /** Play, scrub, speed and view of a replay. */
 
 import { useId } from 'preact/hooks'
+import { Segmented } from '../components/segmented'
 import { formatExact } from '../format/number'
 import { type Playback, SPEEDS } from './playback'
 import type { ViewName } from './scene/camera-rig'
@@ -168,34 +169,5 @@ function Check({
       />
       {label}
     </label>
-  )
-}
-
-/** A choice of few, as buttons beside each other. */
-export function Segmented<K extends string>({
-  label,
-  value,
-  options,
-  onChoose,
-}: {
-  label: string
-  value: K
-  options: readonly (readonly [key: K, text: string])[]
-  onChoose: (key: K) => void
-}) {
-  return (
-    <fieldset class="segmented" aria-label={label}>
-      {options.map(([key, text]) => (
-        <button
-          key={key}
-          type="button"
-          class="compact"
-          aria-pressed={key === value}
-          onClick={() => onChoose(key)}
-        >
-          {text}
-        </button>
-      ))}
-    </fieldset>
   )
 }

@@ -1,7 +1,7 @@
 /** What the runs say of the parameters as a whole, and which of them are to be shown. */
 
-import type { ComponentChildren } from 'preact'
 import type { Identifiability } from '../../api/types'
+import { Segmented } from '../../components/segmented'
 import { formatCount } from '../../format/number'
 import { type Trust, verdicts } from './intervals'
 
@@ -65,36 +65,23 @@ export function Verdicts({
           />
         </label>
         {found.jobs.length > 1 && (
-          <fieldset class="segmented" aria-label="Verdict">
-            <Choice on={chosen === null} onClick={() => onChoose(null)}>
-              all {formatCount(count)}
-            </Choice>
-            {verdicts(found).map(({ trust, count }) => (
-              <Choice key={trust} on={chosen === trust} onClick={() => onChoose(trust)}>
-                {trust} {formatCount(count)}
-              </Choice>
-            ))}
-          </fieldset>
+          <Segmented<Trust | 'all'>
+            label="Verdict"
+            value={chosen ?? 'all'}
+            options={[
+              ['all', `all ${formatCount(count)}`],
+              ...verdicts(found).map(({ trust, count }) => words(trust, count)),
+            ]}
+            onChoose={(trust) => onChoose(trust === 'all' ? null : trust)}
+          />
         )}
       </search>
     </section>
   )
 }
 
-function Choice({
-  on,
-  onClick,
-  children,
-}: {
-  on: boolean
-  onClick: () => void
-  children: ComponentChildren
-}) {
-  return (
-    <button type="button" class="compact" aria-pressed={on} onClick={onClick}>
-      {children}
-    </button>
-  )
+function words(trust: Trust, count: number): readonly [Trust, string] {
+  return [trust, `${trust} ${formatCount(count)}`]
 }
 
 function OneRun() {

@@ -55,6 +55,10 @@ def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
     )
     page.get_by_label("mean rank by cell").check()
     expect(page).to_have_url(re.compile("as=ranks"))
+    # Of a few designs, four cells side by side are hardly to be had.
+    page.get_by_label("isolines").check()
+    expect(page).to_have_url(re.compile("isolines=yes"))
+    expect(page.locator("[data-isolines], .isolines-none")).to_be_visible()
     page.get_by_role("button", name=re.compile("^Show as table.*Two axes")).click()
     cells = page.get_by_role("table", name="Designs by cell").locator("tbody tr")
     expect(cells.first).to_contain_text(" to ")

@@ -3,6 +3,8 @@
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { describeCanvas } from '../export/canvas-source'
 import { themeColour, useTheme } from '../theme'
+import { IsolineLayer } from './isoline-layer'
+import { isolinesOf } from './isolines'
 import { CELLS, cellsOf, dragged, nearestRow, sampleOf } from './pair-model'
 import { themePalette } from './parallel-coordinates'
 import { type Brush, FAILED, type ParallelModel } from './parallel-model'
@@ -13,6 +15,8 @@ const HEIGHT_PX = 340
 const LEAST_STROKE = 0.015
 /** How near to a point a click has to be, as a share of the box. */
 const REACH = 0.05
+/** Of isolines, as buckets from 0. */
+const LEVELS = [1, 3, 5, 7, 9]
 
 type Place = readonly [x: number, y: number]
 
@@ -22,6 +26,7 @@ export function PairMap({
   x,
   y,
   asCells,
+  isolines,
   brushes,
   chosen,
   label,
@@ -36,6 +41,8 @@ export function PairMap({
   y: number
   /** Mean rank by cell, in place of points. */
   asCells: boolean
+  /** Lines of equal mean rank over the points or cells. */
+  isolines: boolean
   /** Stretches of the two axes that are selected; null for all. */
   brushes: readonly [Brush | null, Brush | null]
   /** Row that stands out. */
@@ -71,6 +78,11 @@ export function PairMap({
     draw(element.getContext('2d')!)
     describeCanvas(element, { draw })
   }, [model, rows, x, y, asCells, chosen, palette, width])
+
+  const lines = useMemo(
+    () => (isolines ? isolinesOf(cellsOf(model, rows, x, y), LEVELS) : []),
+    [model, rows, x, y, isolines],
+  )
 
   const place = (event: PointerEvent): Place => {
     const box = canvas.current!.getBoundingClientRect()
@@ -112,6 +124,7 @@ export function PairMap({
           setDrawn(null)
         }}
       />
+      {isolines && <IsolineLayer lines={lines} words={(level) => String(level + 1)} />}
       {(across || up) && <Selection across={across ?? [0, 1]} up={up ?? [0, 1]} />}
     </div>
   )

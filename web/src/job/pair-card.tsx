@@ -10,6 +10,7 @@ import { type Column, Table } from '../components/table'
 import { formatCount, formatExact, formatNumber, withUnit } from '../format/number'
 import { inWords } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
+import { flag, useQueryValue } from '../router/query-value'
 
 export function PairCard({
   model,
@@ -34,6 +35,7 @@ export function PairCard({
   // A slice: what designs are worth over one of their variables.
   const y = asked >= 0 && asked !== x ? asked : model.axes.length - 1
   const asCells = query.get('as') === 'ranks'
+  const [isolines, setIsolines] = useQueryValue('isolines', flag(false), false)
   const [across, up] = [model.axes[x], model.axes[y]]
   const sampled = selected.length > SAMPLE ? ` Of more, ${formatCount(SAMPLE)} are drawn.` : ''
   return (
@@ -52,6 +54,14 @@ export function PairCard({
             />
             mean rank by cell
           </label>
+          <label class="check small">
+            <input
+              type="checkbox"
+              checked={isolines}
+              onChange={(event) => setIsolines(event.currentTarget.checked)}
+            />
+            isolines
+          </label>
         </>
       }
       legend={
@@ -59,6 +69,7 @@ export function PairCard({
           <LegendEntry colour="--rank-best" label="best" area />
           <LegendEntry colour="--rank-middle" label="middle" area />
           <LegendEntry colour="--rank-worst" label="worst, by rank of fitness" area />
+          {isolines && <span>lines: mean rank by cell, in twelfths</span>}
           <span>
             {ends(across)} · {ends(up)}
           </span>
@@ -72,6 +83,7 @@ export function PairCard({
         x={x}
         y={y}
         asCells={asCells}
+        isolines={isolines}
         brushes={[brushes.get(x) ?? null, brushes.get(y) ?? null]}
         chosen={chosen}
         label={`${formatCount(selected.length)} designs by ${inWords(across.name)} and ${inWords(up.name)}`}

@@ -212,15 +212,15 @@ class _Lines:
             return
         self._next = now + _LINE_SECONDS
         note(
-            f"{self._place(index)}: best {number(best_so_far)},"
+            f"{self._spent(index)}: best {number(best_so_far)},"
             f" {rate:.1f} evaluations/s, {duration(left)} left"
         )
 
     def remark(self, text: str) -> None:
         note(text)
 
-    def _place(self, index: int) -> str:
+    def _spent(self, index: int) -> str:
         spent = self._pace.spent
         if spent.unit == "iterations":
-            return f"iteration {spent.done}/{spent.planned}"
-        return f"iteration {index + 1}, {spent.done}/{spent.planned} {spent.unit}"
+            return f"{spent.done}/{spent.planned} iterations"
+        return f"{index + 1} iterations, {spent.done}/{spent.planned} {spent.unit}"

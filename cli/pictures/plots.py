@@ -36,7 +36,7 @@ def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figu
         raise InvalidRequest("the job has committed no iteration yet, so there is nothing to draw")
     figure = Figure(figsize=(8.0, 4.5), layout="constrained")
     axes = figure.add_subplot()
-    index = [i.index + 1 for i in iterations]
+    index = [i.index for i in iterations]
     best, median, worst = (
         _floats([getattr(i, name) for i in iterations]) for name in ("best", "median", "worst")
     )

@@ -198,7 +198,7 @@ def test_a_certificate_that_is_killed_and_goes_on_has_the_same_numbers(files: Pa
     for number in (signal.SIGKILL, signal.SIGINT):
         process = ForkedCommand(*killed, start_new_session=True)
         for line in output(process.stderr):
-            if re.match(r"iteration \d", line):
+            if re.match(r"\d+(/\d+)? iterations", line):
                 break
         os.killpg(process.pid, number)
         _, rest = process.communicate(timeout=60)

@@ -61,7 +61,7 @@ def test_resuming_a_job_that_a_server_runs_follows_it_to_its_end(
     assert resumed.code == 0, resumed.err
     assert (resumed.json["state"], resumed.json["iterations"]) == ("succeeded", 120)
     assert "another process runs this job" in resumed.err
-    assert "iteration 120/120: best" in resumed.err
+    assert "120/120 iterations: best" in resumed.err
 
 
 def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
@@ -71,7 +71,7 @@ def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
     job_id = gaitswarm("submit", "--spec", spec, "--server", server).out.strip()
     eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > 0)
     process = ForkedCommand("optimize", "--resume", job_id, "--db", db)
-    line_with(process.stderr, r"^iteration \d+/")
+    line_with(process.stderr, r"^\d+/\d+ iterations")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
@@ -87,7 +87,7 @@ def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
     spec = write_json(SMALL_SPEC | {"iterations": 250})
     process = ForkedCommand("optimize", "--spec", spec, "--db", db, *IN_PROCESS, "--json")
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
-    line_with(process.stderr, r"^iteration \d+/250")
+    line_with(process.stderr, r"^\d+/250 iterations")
     process.send_signal(signal.SIGSTOP)
     before = _job(gaitswarm, job_id, db)["iterations"]
     eventually(lambda: _job(gaitswarm, job_id, db)["iterations"] > before + 1)

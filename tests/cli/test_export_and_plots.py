@@ -81,6 +81,7 @@ def test_the_convergence_is_drawn_with_named_axes(
     picture = path.read_text(encoding="utf-8")
     for label in ("best so far", "median of the iteration", "iteration", "fitness, minimized"):
         assert f"<!-- {label}" in picture
+    assert "<!-- 0 -->" in picture, "iterations are numbered from 0"
 
 
 @pytest.mark.slow

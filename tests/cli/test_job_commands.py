@@ -125,7 +125,7 @@ def test_watch_replays_what_is_committed_and_ends_with_the_job(
     assert [line[:20] for line in lines] == ['{"event":"iteration"'] * 2 + ['{"event":"state","da']
     told = gaitswarm("watch", finished.id, *where)
     assert told.code == 0
-    assert "iteration 2/2: best" in told.err
+    assert "2/2 iterations: best" in told.err
     assert told.out == ""
 
 

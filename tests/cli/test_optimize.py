@@ -147,7 +147,7 @@ def test_the_report_for_people_has_the_published_optimum_beside_the_best(
     assert "5837" in result.out
     assert "fitness of best: " in result.out
     assert "fitness of published A: " in result.out
-    assert "iteration 2/2: best" in result.err
+    assert "2/2 iterations: best" in result.err
     assert f"gaitswarm serve --db {db}" in result.err
 
 

@@ -70,7 +70,7 @@ def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_neve
     options = ("--spec", spec, "--evaluator", "in-process", "--json")
     process = ForkedCommand("optimize", *options, "--db", db)
     job_id = line_with(process.stderr, r"^job (\w+) in").group(1)
-    line_with(process.stderr, r"^iteration \d+/40")
+    line_with(process.stderr, r"^\d+/40 iterations")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -125,7 +125,7 @@ def test_an_optimization_whose_database_is_overwritten_with_garbage_does_not_end
     spec = write_json(SMALL_SPEC | {"iterations": 100})
     assert gaitswarm("submit", "--spec", spec, "--db", db).code == 0
     process = ForkedCommand("optimize", "--spec", spec, "--db", db, "--evaluator", "in-process")
-    line_with(process.stderr, r"^iteration \d+/100")
+    line_with(process.stderr, r"^\d+/100 iterations")
     db.write_bytes(os.urandom(db.stat().st_size))
     out, err = process.communicate(timeout=120)
     assert (process.returncode, out) == (5, "")

@@ -99,7 +99,7 @@ def test_progress_of_uneven_iterations_is_in_designs(
     with uneven_iterations():
         done = gaitswarm("optimize", "--spec", spec, "--db", db, "--evaluator", "in-process")
     assert done.code == 0, done.err
-    assert "iteration 6, 12/12 designs: best" in done.err
+    assert "6 iterations, 12/12 designs: best" in done.err
     job_id = gaitswarm("list", "--db", db, "--json").json[0]["id"]
     listed = gaitswarm("list", "--db", db).out.split()
     assert {"12/12", "designs"} <= set(listed)
@@ -107,7 +107,7 @@ def test_progress_of_uneven_iterations_is_in_designs(
     assert "6, of 3 designs at most" in status
     assert "12 of 12" in status
     watched = gaitswarm("watch", job_id, "--db", db)
-    assert (watched.code, "iteration 6, 12/12 designs" in watched.err) == (0, True)
+    assert (watched.code, "6 iterations, 12/12 designs" in watched.err) == (0, True)
     extended = gaitswarm("extend", job_id, "--iterations", 5, "--db", db)
     assert "with 12 of 15 designs" in extended.out
     image = db.with_name("convergence.svg")

@@ -36,8 +36,8 @@ describe('convergence of several jobs', () => {
     ])
   })
 
-  test('counts iterations that are done', () => {
-    expect(convergences([short, long], 'iterations').x).toEqual([1, 2, 3])
+  test('numbers iterations from 0, as everywhere', () => {
+    expect(convergences([short, long], 'iterations').x).toEqual([0, 1, 2])
   })
 })
 

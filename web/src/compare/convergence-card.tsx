@@ -9,7 +9,7 @@ import { setQuery, usePlace } from '../router/navigation'
 import { type Axis, type ComparedJob, colourOf, convergences, dashOf } from './series'
 
 const AXES: Readonly<Record<Axis, { label: string; unit?: string }>> = {
-  iterations: { label: 'iterations' },
+  iterations: { label: 'iteration' },
   evaluations: { label: 'evaluations' },
   seconds: { label: 'time of evaluation', unit: 's' },
 }

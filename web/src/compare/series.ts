@@ -19,10 +19,7 @@ export type Axis = 'iterations' | 'evaluations' | 'seconds'
 
 /** Best so far of every job where any has a point; null before its first and after its last. */
 export function convergences(jobs: readonly ComparedJob[], axis: Axis) {
-  const places = jobs.map(({ convergence }) =>
-    // Iterations are counted as the other two are: those that are done.
-    convergence[axis].map((at) => (axis === 'iterations' ? at + 1 : at)),
-  )
+  const places = jobs.map(({ convergence }) => convergence[axis])
   const x = union(places)
   const lines = jobs.map(({ convergence }, k) => held(x, places[k], convergence.best_so_far))
   return { x, lines }

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import sync_playwright
 
 from api.page import FOLDER, is_built
 from services.optimizer.service import JobService
@@ -18,6 +18,7 @@ from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import QUICK_EVENTS, Server, ServerProcess
 from tests.examples.walks import SHORT_WALK
 from tests.web.chromium import ARGUMENTS, find_chromium
+from tests.web.pages import Pages
 from tests.web.visit import Visit
 
 # Read here: the tests themselves see none of the user's settings.
@@ -56,26 +57,26 @@ _opened = ExitStack()
 
 
 @pytest.fixture(scope="session")
-def _open_browser(_chromium: str) -> Iterator[Callable[[], Browser]]:
-    """Start a browser, or give the one that is open."""
-    browsers: list[Browser] = []
+def _open_browser(_chromium: str) -> Iterator[Callable[[], Pages]]:
+    """Start a browser, or go on with the one that is open; its pages."""
+    opened: list[Pages] = []
 
-    def opened() -> Browser:
-        if not browsers:
+    def pages() -> Pages:
+        if not opened:
             playwright = _opened.enter_context(sync_playwright())
             browser = playwright.chromium.launch(executable_path=_chromium, args=ARGUMENTS)
-            browsers.append(browser)
-            _opened.callback(browsers.clear)
+            opened.append(Pages(browser))
+            _opened.callback(opened.clear)
             _opened.callback(browser.close)
-        return browsers[0]
+        return opened[0]
 
-    yield opened
+    yield pages
     _opened.close()
 
 
 @pytest.fixture
-def browser(_open_browser: Callable[[], Browser]) -> Browser:
-    """One for all tests of this folder that follow each other."""
+def pages(_open_browser: Callable[[], Pages]) -> Pages:
+    """Of one browser for all tests of this folder that follow each other."""
     return _open_browser()
 
 
@@ -118,15 +119,29 @@ def finished_job(server: ServerProcess) -> str:
     return job_id
 
 
-@pytest.fixture
-def start_server(store: SqlStore, _chromium: str) -> Iterator[Callable[..., Server]]:
-    """For a server of one test's own, which has no jobs and runs none; settings: of `Server`.
+@pytest.fixture(scope="session")
+def idle_server(_chromium: str) -> Iterator[Server]:
+    """One server for most tests of `start_server`, which tell it whose jobs it serves."""
+    server = Server(None, page_folder=FOLDER)
+    yield server
+    server.close()
 
-    To be asked for before `visit`, which ends first then.
+
+@pytest.fixture
+def start_server(
+    store: SqlStore, idle_server: Server, _chromium: str
+) -> Iterator[Callable[..., Server]]:
+    """For a server that has no jobs but the test's own, and runs none.
+
+    settings: of `Server`; with any it is one of the test's own. To be asked for before `visit`,
+    which ends first then.
     """
     with ExitStack() as stack:
 
         def start(**settings: Any) -> Server:
+            if not settings:
+                idle_server.serve(JobService(store))
+                return idle_server
             server = Server(JobService(store), page_folder=FOLDER, **settings)
             stack.callback(server.close)
             return server
@@ -135,11 +150,11 @@ def start_server(store: SqlStore, _chromium: str) -> Iterator[Callable[..., Serv
 
 
 @pytest.fixture
-def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
+def visit(pages: Pages) -> Iterator[Callable[..., Visit]]:
     """Open the page of a server; at the end nothing may have gone wrong in the browser."""
     with ExitStack() as stack:
 
         def start(url: str, **options: Any) -> Visit:
-            return stack.enter_context(Visit(browser, url, **options))
+            return stack.enter_context(Visit(pages, url, **options))
 
         yield start

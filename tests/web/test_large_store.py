@@ -128,7 +128,7 @@ def large_server(long_job: str, database: Path, _chromium: str) -> Iterator[Serv
 def test_the_first_view_of_the_list_is_small(
     large_server: Server, visit: Callable[..., Visit]
 ) -> None:
-    visited = visit(large_server.url)
+    visited = visit(large_server.url, fresh=True)
     page = visited.go("/")
     expect(page.locator("[data-job]").first).to_be_visible()
 
@@ -143,7 +143,7 @@ def test_the_first_view_of_the_list_is_small(
 def test_the_first_view_of_a_long_job_is_small_and_then_complete(
     large_server: Server, long_job: str, visit: Callable[..., Visit]
 ) -> None:
-    visited = visit(large_server.url)
+    visited = visit(large_server.url, fresh=True)
     page = visited.go(f"/jobs/{long_job}")
     wait_for_iteration(page, 1)
 

@@ -111,7 +111,7 @@ class Server(Served):
         """Stop it, and wait until it has."""
         self.stop()
         self.client.close()
-        self._thread.join(timeout=10.0)
+        self._thread.join(timeout=60.0)
         assert not self._thread.is_alive()
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from io import BytesIO
 
 import matplotlib.image
@@ -9,13 +11,38 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Locator
 
+from tests.web.pages import TIMEOUT_MS
 
-def pixels(element: Locator) -> NDArray[np.uint8]:
+Image = NDArray[np.uint8]
+
+
+def pixels(element: Locator) -> Image:
     """An element as it is painted: (height, width, 3)."""
     image = matplotlib.image.imread(BytesIO(element.screenshot()), format="png")
     return np.round(image[..., :3] * 255).astype(np.uint8)
 
 
-def colours(image: NDArray[np.uint8]) -> int:
+def painted(element: Locator, holds: Callable[[Image], bool]) -> Image:
+    """The element's picture once it is as it is to be: a canvas is painted after its element is
+    there, and after what it shows has changed.
+    """
+    ends = time.monotonic() + TIMEOUT_MS / 1000.0
+    while not holds(image := pixels(element)):
+        assert time.monotonic() < ends, f"not painted so: {colours(image)} colours"
+        element.page.wait_for_timeout(50)
+    return image
+
+
+def colourful(least: int) -> Callable[[Image], bool]:
+    """Whether a picture has more colours than that."""
+    return lambda image: colours(image) > least
+
+
+def other_than(before: Image) -> Callable[[Image], bool]:
+    """Whether a picture differs from another one."""
+    return lambda image: not np.array_equal(image, before)
+
+
+def colours(image: Image) -> int:
     """How many colours there are; a blank picture has a handful."""
     return len(np.unique(image.reshape(-1, 3), axis=0))

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.examples.servers import ServerProcess
-from tests.web.pixels import colours, pixels
+from tests.web.pixels import colourful, painted
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -32,21 +32,19 @@ def test_the_surface_is_drawn_and_its_numbers_are_the_apis(
     expect(drawn).to_have_attribute("data-cells", str(inference.size))
     for name, value in (("min", inference.min()), ("max", inference.max())):
         assert float(drawn.get_attribute(f"data-{name}") or "nan") == pytest.approx(value)
-    # The scene's chunk may draw a moment after its canvas is there.
-    page.wait_for_load_state("networkidle")
-    assert colours(pixels(drawn.locator("canvas"))) > 200
+    painted(drawn.locator("canvas"), colourful(200))
 
     heat = page.locator('canvas[data-layer="inference"]')
-    assert colours(pixels(heat)) > 50
+    painted(heat, colourful(50))
     box = page.get_by_role("application", name="Inference over error and current")
     before = heat.get_attribute("data-value")
     box.hover(position={"x": 80, "y": 60})
     expect(heat).not_to_have_attribute("data-value", before or "")
-    under_pointer = float(heat.get_attribute("data-value") or "nan")
-    assert np.isclose(inference, under_pointer).any()
+    under_pointer = heat.get_attribute("data-value") or "nan"
+    assert np.isclose(inference, float(under_pointer)).any()
     box.focus()
     page.keyboard.press("ArrowRight")
-    assert float(heat.get_attribute("data-value") or "nan") != under_pointer
+    expect(heat).not_to_have_attribute("data-value", under_pointer)
 
 
 def test_a_controller_without_rules_is_shown_by_its_gains(

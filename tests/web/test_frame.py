@@ -45,6 +45,10 @@ def test_titles_name_the_job_and_its_progress(
     expect(page).to_have_title("small · queued 0/6 · gaitswarm")
 
 
+FROM_ZERO = re.compile("^0 ")
+"""Range of an axis that begins with the first iteration."""
+
+
 def chart_range(page: Page) -> list[float]:
     """Of the horizontal axis of the first chart."""
     text = page.locator(".uplot").first.get_attribute("data-range")
@@ -72,13 +76,14 @@ def test_a_zoom_stays_while_iterations_arrive(
     page.mouse.down()
     page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
     page.mouse.up()
+    expect(page.locator(".uplot").first).not_to_have_attribute("data-range", FROM_ZERO)
     low, high = zoomed = chart_range(page)
     assert 0.0 < low < high
     last = int(page.locator("[data-stream]").get_attribute("data-iteration") or 0)
     wait_for_iteration(page, last + 5)
     assert chart_range(page) == zoomed
     page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
-    expect(page.locator(".uplot").first).to_have_attribute("data-range", re.compile("^0 "))
+    expect(page.locator(".uplot").first).to_have_attribute("data-range", FROM_ZERO)
 
 
 def test_a_new_order_begins_on_the_first_page(

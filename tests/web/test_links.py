@@ -15,6 +15,9 @@ from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
 
+SOME_OF_48 = re.compile(r"^([1-9]|[123]\d|4[0-7])$")
+"""How many of the finished job's designs are selected, if some are and some are not."""
+
 
 def test_a_link_shows_what_was_seen(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
@@ -22,15 +25,18 @@ def test_a_link_shows_what_was_seen(
     page = visit(server.url).go(f"/jobs/{finished_job}/variables?brush=FI1R:1500:3000,none:1:2")
     # An axis that is not there changes nothing, and is told.
     expect(page.get_by_text("is ignored")).to_contain_text("brush=none:1:2")
-    some = int(page.locator("[data-selected]").get_attribute("data-selected") or 0)
-    assert 0 < some < 48
+    selected = page.locator("[data-selected]")
+    # Neither none nor all.
+    expect(selected).to_have_attribute("data-selected", SOME_OF_48)
+    before = str(selected.get_attribute("data-selected"))
     page.get_by_text("Select by numbers").click()
     page.get_by_label("FI1R to").fill("2500")
     page.get_by_label("FI1R to").blur()
     expect(page).to_have_url(re.compile(r"brush=FI1R%3A1500%3A2500$"))
-    seen = page.locator("[data-selected]").get_attribute("data-selected")
+    expect(selected).not_to_have_attribute("data-selected", before)
+    seen = str(selected.get_attribute("data-selected"))
     page.reload()
-    expect(page.locator("[data-selected]")).to_have_attribute("data-selected", str(seen))
+    expect(selected).to_have_attribute("data-selected", seen)
     expect(page.get_by_text("is ignored")).to_have_count(0)
 
     crumbs = page.get_by_role("navigation", name="Breadcrumbs")
@@ -58,6 +64,9 @@ def test_keys_find_jobs_and_commands_and_can_be_switched_off(
     job = page.get_by_role("option", name=f"job {finished_job}")
     expect(job).to_have_attribute("aria-selected", "true")
     field.fill("new job")
+    first = page.get_by_role("option").first
+    expect(first).to_have_accessible_name(re.compile("^new job", re.IGNORECASE))
+    expect(first).to_have_attribute("aria-selected", "true")
     page.keyboard.press("Enter")
     expect(page).to_have_url(re.compile("/jobs/new$"))
     # Letters are a field's own.

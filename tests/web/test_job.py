@@ -107,9 +107,10 @@ def test_a_job_is_submitted_and_followed_by_keyboard_alone(
     expect(page.get_by_label("Name", exact=True)).to_be_visible()
     press_until_focused(page, "Name")
     page.keyboard.type("by keyboard")
-    press_until_focused(page, "Iterations")
-    page.keyboard.press("ControlOrMeta+a")
-    page.keyboard.type("2")
+    for field in ("Particles", "Iterations"):
+        press_until_focused(page, field)
+        page.keyboard.press("ControlOrMeta+a")
+        page.keyboard.type("2")
     page.keyboard.press("Enter")
     submitted(page)
     expect(page.get_by_role("heading", name="by keyboard")).to_be_visible()

@@ -136,12 +136,12 @@ def test_what_is_not_there_yet_or_at_all_says_so(
     raced: Raced, visit: Callable[..., Visit], start_server: Callable[..., Server]
 ) -> None:
     refused = "status of 4(04|09|22)"
-    page = opened(visit(raced.server.url, allowed=refused), f"/tournaments/{raced.waiting}")
+    visited = visit(raced.server.url, allowed=refused)
+    page = opened(visited, f"/tournaments/{raced.waiting}")
     expect(page.get_by_role("heading", name="No run has ended yet")).to_be_visible()
-    page = opened(visit(raced.server.url, allowed=refused), "/tournaments/nosuchjob")
+    page = opened(visited, "/tournaments/nosuchjob")
     expect(page.get_by_role("alert")).to_contain_text("nosuchjob")
-    path = f"/tournaments/{raced.id}?compare={raced.waiting}"
-    page = opened(visit(raced.server.url, allowed=refused), path)
+    page = opened(visited, f"/tournaments/{raced.id}?compare={raced.waiting}")
     expect(page.get_by_role("alert")).to_contain_text("has ended yet")
     page = opened(visit(start_server().url), "/tournaments")
     expect(page.get_by_role("heading", name="No tournaments yet")).to_be_visible()

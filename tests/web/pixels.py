@@ -45,4 +45,6 @@ def other_than(before: Image) -> Callable[[Image], bool]:
 
 def colours(image: Image) -> int:
     """How many colours there are; a blank picture has a handful."""
-    return len(np.unique(image.reshape(-1, 3), axis=0))
+    red, green, blue = (image[..., k].astype(np.uint32) for k in range(3))
+    # As numbers: to sort triples takes fifty times as long.
+    return len(np.unique(red << 16 | green << 8 | blue))

@@ -12,6 +12,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 
 from api.access import AccessMiddleware
+from api.answers import LEAST_COMPRESSED
 from api.dependencies import Component, lifespan
 from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
 from api.manual import FOLDER as MANUAL
@@ -144,7 +145,10 @@ def create_app(
     add_problem_handlers(app)
     app.add_middleware(BodyLimitMiddleware, max_bytes=settings.api_max_body_bytes)
     app.add_middleware(
-        GZipMiddleware, minimum_size=1024, compresslevel=6, exclude_content_types=_UNCOMPRESSED
+        GZipMiddleware,
+        minimum_size=LEAST_COMPRESSED,
+        compresslevel=6,
+        exclude_content_types=_UNCOMPRESSED,
     )
     app.add_middleware(
         AccessMiddleware,

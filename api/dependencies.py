@@ -13,6 +13,7 @@ from anyio.to_thread import run_sync
 from fastapi import Depends, FastAPI, Path, Query, Request
 from pydantic import Field
 
+from api.answers import Answers
 from api.rates import OpenStreams
 from api.topics import Topics
 from gaitswarm.settings import Settings
@@ -104,6 +105,7 @@ class State(TypedDict):
     set when it begins to stop; event streams end then. topics: jobs that these streams follow.
     streams: that are open, by asker. components: parts of the process beside the database.
     metrics: of this process. activity: what happens to the jobs that it runs, if it runs any.
+    answers: that are remembered.
     """
 
     service: JobService
@@ -118,6 +120,7 @@ class State(TypedDict):
     components: Sequence[Component]
     metrics: Metrics
     activity: Activity | None
+    answers: Answers
 
 
 def lifespan(
@@ -159,6 +162,7 @@ def lifespan(
             streams=OpenStreams(settings.api_max_streams),
             metrics=metrics,
             activity=activity,
+            answers=Answers(),
         )
         waking.cancel()
 
@@ -254,6 +258,15 @@ async def metrics(request: Request) -> Metrics:
     return cast(Metrics, request.state.metrics)
 
 
+async def answers(request: Request) -> Answers:
+    """Answers that are remembered.
+
+    Args:
+        request: under way.
+    """
+    return cast(Answers, request.state.answers)
+
+
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, Depends(settings)]
 Slots = Annotated[ComputingSlots, Depends(slots)]
@@ -261,6 +274,7 @@ JobActivities = Annotated[Activity | None, Depends(activity)]
 Stopping = Annotated[asyncio.Event, Depends(stopping)]
 FollowedJobs = Annotated[Topics, Depends(topics)]
 ServerMetrics = Annotated[Metrics, Depends(metrics)]
+Remembered = Annotated[Answers, Depends(answers)]
 
 LARGEST_INDEX: Final = 2**31 - 1
 """Of an iteration, as the database's integers have it."""

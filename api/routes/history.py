@@ -5,15 +5,17 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
+from api.answers import page_of
 from api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
     Analysing,
     ExistingJob,
     JobId,
+    Remembered,
     ServerSettings,
     Service,
     Slots,
@@ -30,7 +32,8 @@ from gaitswarm.views import (
     EvaluationView,
     IterationView,
     PageView,
-    evaluation_views,
+    encoded_evaluations,
+    encoded_iterations,
 )
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
@@ -43,59 +46,85 @@ router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
     "/iterations",
     operation_id="list_iterations",
     summary="List committed iterations",
+    response_model=PageView[IterationView],
     responses=problems(404, 422),
 )
 def list_iterations(
+    request: Request,
     job_id: JobId,
     service: Service,
+    remembered: Remembered,
     after: AfterIteration = None,
     limit: Annotated[int, Query(ge=1, le=1000, description="Most iterations on a page.")] = 100,
-) -> PageView[IterationView]:
+) -> Response:
     """Fitness of the designs, iteration by iteration, in pages; the data of a convergence plot."""
-    page = service.iterations(job_id, after=after, limit=limit)
-    return PageView(items=[IterationView.from_iteration(i) for i in page.items], next=page.next)
+    job = service.job(job_id)
+
+    def encoded() -> bytes:
+        page = service.iterations(job.id, after=after, limit=limit)
+        return page_of(encoded_iterations(page.items), page.next)
+
+    # A page that others follow never changes; the last one is as long as the job is by now.
+    committed = job.progress.iterations
+    end = limit if after is None else after + 1 + limit
+    if end < committed:
+        key = ("iterations", job.id, after, limit)
+        return remembered.of_history(key, encoded).answer(request)
+    return remembered.same(encoded()).answer(request)
 
 
 @router.get(
     "/iterations/{iteration}/evaluations",
     operation_id="list_evaluations",
     summary="List an iteration's evaluations",
+    response_model=CatalogueView[EvaluationView],
     responses=problems(404, 409, 422),
 )
 def list_evaluations(
+    request: Request,
     job_id: JobId,
     service: Service,
+    remembered: Remembered,
     iteration: Annotated[
         int, Path(ge=0, le=LARGEST_INDEX, description="Index of a committed iteration, from 0.")
     ],
-) -> CatalogueView[EvaluationView]:
+) -> Response:
     """Every design: its values, its fitness, and status, utility and raw objectives by scenario.
 
     Raw objectives are as simulated; utilities follow from them and the job's preference.
     """
     job = service.job(job_id)
-    return CatalogueView(items=evaluation_views(service.evaluations(job_id, iteration), job.spec))
+
+    def encoded() -> bytes:
+        return encoded_evaluations(service.evaluations(job.id, iteration), job.spec)
+
+    return remembered.of_history(("evaluations", job.id, iteration), encoded).answer(request)
 
 
 @router.get(
     "/best",
     operation_id="get_best",
     summary="Take the best design",
+    response_model=BestView,
     responses=problems(404, 409, 422),
 )
-def get_best(job_id: JobId, service: Service) -> BestView:
+def get_best(request: Request, job_id: JobId, service: Service, remembered: Remembered) -> Response:
     """The design of least fitness so far, with its results in every scenario.
 
     404 while no design has walked in every scenario.
     """
     job = service.job(job_id)
-    best = service.best(job_id)
-    if best is None:
-        raise NotFound(
-            f"job {job_id} has no design yet that walks in every scenario; ask again after its"
-            " next iteration, or see why designs fail in its evaluations"
-        )
-    return BestView.from_evaluation(best, job.spec)
+
+    def encoded() -> bytes:
+        best = service.best(job.id)
+        if best is None:
+            raise NotFound(
+                f"job {job.id} has no design yet that walks in every scenario; ask again after its"
+                " next iteration, or see why designs fail in its evaluations"
+            )
+        return BestView.from_evaluation(best, job.spec).model_dump_json(by_alias=True).encode()
+
+    return remembered.of_job("best", job, encoded).answer(request)
 
 
 @router.get(

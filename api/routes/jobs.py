@@ -8,8 +8,17 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
 from api.access import NewPriority, Owner, OwnersQuota
+from api.answers import page_of
 from api.bodies import validated
-from api.dependencies import Analysing, JobId, JobIdText, ServerSettings, Service, Slots
+from api.dependencies import (
+    Analysing,
+    JobId,
+    JobIdText,
+    Remembered,
+    ServerSettings,
+    Service,
+    Slots,
+)
 from api.documentation import problems
 from gaitswarm.views import (
     PREFIX,
@@ -189,9 +198,17 @@ async def estimate_job(spec: SpecBody, service: Service, slots: Slots) -> Estima
     return EstimateView.from_estimate(await slots.run(partial(service.estimate, spec)))
 
 
-@router.get("/jobs", operation_id="list_jobs", summary="List jobs", responses=problems(422))
+@router.get(
+    "/jobs",
+    operation_id="list_jobs",
+    summary="List jobs",
+    response_model=PageView[JobSummaryView],
+    responses=problems(422),
+)
 def list_jobs(
+    request: Request,
     service: Service,
+    remembered: Remembered,
     state: Annotated[JobState | None, Query(description="Only jobs in this state.")] = None,
     kind: Annotated[JobKind | None, Query(description="Only jobs of this kind.")] = None,
     parent: Annotated[
@@ -241,7 +258,7 @@ def list_jobs(
         str | None, Query(max_length=200, description="`next` of the page before.")
     ] = None,
     limit: Annotated[int, Query(ge=1, le=200, description="Most jobs on a page.")] = 50,
-) -> PageView[JobSummaryView]:
+) -> Response:
     """Jobs with their progress, in pages. Jobs submitted meanwhile do not shift later pages."""
     where = JobFilter(
         archived=archived, robot=robot, controller=controller, preference=preference, tag=tag
@@ -257,15 +274,30 @@ def list_jobs(
         after=after,
         limit=limit,
     )
-    return PageView(items=[JobSummaryView.from_job(job) for job in page.items], next=page.next)
+    items = [remembered.of_job("summary", job, partial(_summary, job)) for job in page.items]
+    text = page_of((item.plain for item in items), page.next)
+    return remembered.same(text).answer(request)
+
+
+def _summary(job: Job) -> bytes:
+    return JobSummaryView.from_job(job).model_dump_json(by_alias=True).encode()
 
 
 @router.get(
-    "/jobs/{job_id}", operation_id="get_job", summary="Look at a job", responses=problems(404, 422)
+    "/jobs/{job_id}",
+    operation_id="get_job",
+    summary="Look at a job",
+    response_model=JobView,
+    responses=problems(404, 422),
 )
-def get_job(job_id: JobId, service: Service) -> JobView:
+def get_job(request: Request, job_id: JobId, service: Service, remembered: Remembered) -> Response:
     """State, progress, rates, estimated time left, best design so far, and why it failed if so."""
-    return job_in_full(service, service.job(job_id))
+    job = service.job(job_id)
+
+    def in_full() -> bytes:
+        return job_in_full(service, job).model_dump_json(by_alias=True).encode()
+
+    return remembered.of_job("in full", job, in_full).answer(request)
 
 
 def job_in_full(service: JobService, job: Job) -> JobView:

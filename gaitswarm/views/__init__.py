@@ -37,9 +37,10 @@ from gaitswarm.views.evaluation import (
     EvaluationView,
     ObjectiveView,
     ScenarioResultView,
+    encoded_evaluations,
     evaluation_views,
 )
-from gaitswarm.views.iteration import HistoryIterationView, IterationView
+from gaitswarm.views.iteration import HistoryIterationView, IterationView, encoded_iterations
 from gaitswarm.views.job import (
     JobSummaryView,
     JobView,
@@ -96,6 +97,8 @@ __all__ = [
     "WalkLogView",
     "case_views",
     "controller_views",
+    "encoded_evaluations",
+    "encoded_iterations",
     "encoded_particles",
     "evaluation_views",
     "field_errors",

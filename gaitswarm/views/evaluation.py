@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
+from pydantic_core import to_json
 
 from gaitswarm.views.base import View, finite
 from services.optimizer.jobs.iteration import Evaluation
@@ -167,6 +168,25 @@ def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[Eval
     Returns:
         n views, in the same order.
     """
+    # Validated at once: a call for each result takes longer than all else.
+    return _EVALUATIONS.validate_python(_documents(evaluations, spec))
+
+
+def encoded_evaluations(evaluations: Sequence[Evaluation], spec: Spec) -> bytes:
+    """Encode views of evaluations of one job, of which none is made.
+
+    Args:
+        evaluations: n of them.
+        spec: of their job.
+
+    Returns:
+        The JSON of a `CatalogueView` of `evaluation_views`, byte for byte.
+    """
+    return to_json({"items": _documents(evaluations, spec)})
+
+
+def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, object]]:
+    """Fields of `EvaluationView`, in its order."""
     if not evaluations:
         return []
     space = spec.design_space()
@@ -174,22 +194,19 @@ def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[Eval
     statuses = np.stack([evaluation.statuses for evaluation in evaluations])
     logs = spec.judge(objectives, statuses != Status.OK).log_utilities
     names, columns = spec.case_names, [objective.name for objective in spec.objectives]
-    # Validated at once: a call for each result takes longer than all else.
-    return _EVALUATIONS.validate_python(
-        [
-            {
-                "iteration": evaluation.iteration,
-                "particle": evaluation.particle,
-                "fitness": finite(evaluation.fitness),
-                "figure_of_merit": spec.figure_of_merit(evaluation.fitness),
-                "design": space.shown(evaluation.design.tolist()),
-                "scenarios": _results(
-                    names, columns, evaluation.statuses, evaluation.objectives, log_utilities
-                ),
-            }
-            for evaluation, log_utilities in zip(evaluations, logs, strict=True)
-        ]
-    )
+    return [
+        {
+            "iteration": evaluation.iteration,
+            "particle": evaluation.particle,
+            "fitness": finite(evaluation.fitness),
+            "figure_of_merit": spec.figure_of_merit(evaluation.fitness),
+            "design": space.shown(evaluation.design.tolist()),
+            "scenarios": _results(
+                names, columns, evaluation.statuses, evaluation.objectives, log_utilities
+            ),
+        }
+        for evaluation, log_utilities in zip(evaluations, logs, strict=True)
+    ]
 
 
 def case_results(

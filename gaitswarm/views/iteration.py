@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 
 from pydantic import Field
+from pydantic_core import to_json
 
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import EvaluationView, evaluation_views
@@ -74,7 +76,20 @@ class HistoryIterationView(IterationView):
         return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
 
 
+def encoded_iterations(iterations: Sequence[Iteration]) -> Iterator[bytes]:
+    """Encode views of iterations, of which none is made.
+
+    Args:
+        iterations: as the store lists them.
+
+    Yields:
+        The JSON of each one's `IterationView`, byte for byte.
+    """
+    return (to_json(_at_a_glance(iteration)) for iteration in iterations)
+
+
 def _at_a_glance(iteration: Iteration) -> dict[str, object]:
+    """Fields of `IterationView`, in its order."""
     return {
         "index": iteration.index,
         "designs": iteration.designs,

@@ -12,7 +12,7 @@ from sqlalchemy import Engine, event, text
 from services.optimizer.jobs.job import JobOrder, JobState
 from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.rows.job_rows import JobDocuments
-from services.optimizer.store.rows.job_views import DocumentMemory
+from services.optimizer.store.rows.job_views import RowMemory
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import completed, spec
 from tests.store.test_job_list import with_fitness
@@ -99,9 +99,9 @@ def test_what_is_remembered_of_a_job_has_its_state_budget_and_progress_anew(
     assert after.progress.evaluations == len(completed(0, (2.0, 3.0)).fitness)
 
 
-def test_documents_that_were_asked_for_longest_ago_are_forgotten_first() -> None:
+def test_rows_that_were_asked_for_longest_ago_are_forgotten_first() -> None:
     documents = JobDocuments(spec().resolved(), (), None)
-    memory = DocumentMemory(250)
+    memory = RowMemory[JobDocuments](500)
     for name in "abcd":
         memory.add((name * 100, None, None), documents)
         assert memory.find(("a" * 100, None, None)) is documents

@@ -40,7 +40,6 @@ from services.optimizer.store.connections.engine import (
 from services.optimizer.store.connections.file_system import check_file_system
 from services.optimizer.store.port.reading import Page, Queue
 from services.optimizer.store.rows.job_rows import request_digest, to_job
-from services.optimizer.store.rows.job_views import shown_job
 from services.optimizer.store.rows.tables import jobs
 from services.optimizer.store.schema.in_use import admit
 from services.optimizer.store.schema.migrate import create
@@ -54,7 +53,7 @@ from services.optimizer.store.statements.job_cursors import cursor_of
 from services.optimizer.store.statements.job_list import (
     among_jobs,
     fittest_jobs,
-    job_rows,
+    jobs_of,
     newest_jobs,
 )
 from services.optimizer.store.statements.job_orders import sort_jobs
@@ -68,8 +67,8 @@ from services.optimizer.store.statements.recordings import (
 from services.optimizer.store.statements.records import (
     entering,
     job_row,
+    job_to_show,
     require_readable,
-    shown_row,
     update_job,
 )
 from services.optimizer.store.statements.submissions import (
@@ -200,7 +199,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
     def job(self, job_id: str) -> Job:
         """Read a job with its progress."""
         with self._database.transaction(write=False) as connection:
-            return shown_job(shown_row(connection, job_id))
+            return job_to_show(connection, job_id)
 
     def jobs(
         self,
@@ -235,9 +234,8 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
                 reverse=reverse,
             )
             ids, more = found[:limit], len(found) > limit
-            rows = job_rows(connection, ids)
-        following = cursor_of(rows[-1], order, reverse=reverse) if more else None
-        return Page(tuple(map(shown_job, rows)), following)
+            items = jobs_of(connection, ids)
+        return Page(items, cursor_of(items[-1], order, reverse=reverse) if more else None)
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
         """Count jobs by what they are found by."""

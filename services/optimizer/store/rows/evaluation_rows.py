@@ -41,8 +41,10 @@ _DESIGNS: Final = (
 )
 """How many designs an iteration has; particles are counted from 0, and the index has the last."""
 
+_UNLISTED: Final = ("job_id", "positions", "optimizer_state", "asked_at", "ask_digest")
+
 LISTED: Final = (
-    *(c for c in iterations.c if c.name not in ("positions", "optimizer_state", "ask_digest")),
+    *(c for c in iterations.c if c.name not in _UNLISTED),
     _DESIGNS,
 )
 """Columns of an iteration as it is listed: an ask is a hundred times as long as all others."""

@@ -1,105 +1,200 @@
-"""Jobs as they are shown: their documents, which never change, are read once and not every time."""
+"""Jobs as they are shown: what has not changed since it was last read is not read anew."""
 
 from __future__ import annotations
 
 import json
 import threading
 from collections import OrderedDict
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any, Final, Generic, TypeVar
 
-from sqlalchemy import Text, cast
+from sqlalchemy import Column, Dialect, Row, Text, cast, type_coerce
+from sqlalchemy.sql.elements import Label
+from sqlalchemy.types import NullType
 
 from services.optimizer.jobs.job import Job
-from services.optimizer.store.rows.evaluation_rows import Row
 from services.optimizer.store.rows.job_rows import JobDocuments, read_documents, to_job
-from services.optimizer.store.rows.tables import UnparsedText, jobs
+from services.optimizer.store.rows.tables import Document, UnparsedText, UtcDateTime, jobs
+
+V = TypeVar("V")
 
 _DOCUMENTS: Final = ("spec", "provenance", "lineage")
 
-SHOWN: Final = (
-    *(column for column in jobs.c if column.name not in _DOCUMENTS),
-    # As text: both databases keep the JSON as it was written.
-    *(cast(jobs.c[name], Text).label(f"{name}_text") for name in _DOCUMENTS),
+_UNSHOWN: Final = frozenset(
+    {
+        "idempotency_key",
+        "request_digest",
+        "lease_owner",
+        "lease_token",
+        "lease_expires_at",
+        "parent_id",
+        "crashes",
+        "notify_url",
+        "deleted_at",
+        "simulated_seconds",
+    }
 )
-"""Columns of a job that is shown and not changed."""
-
-_LARGEST: Final = 8 << 20
-"""Characters of all documents that are remembered; what they are read to takes some times that."""
-
-Texts = tuple[str | None, ...]
-"""Of a job's spec, provenance and lineage."""
+"""Columns of which a job that is shown has nothing."""
 
 
-class DocumentMemory:
-    """Documents by their texts; of too many, those that were asked for longest ago go. Thread-safe.
+def as_stored(column: Column[Any]) -> Label[Any]:
+    """Select a column as the driver gives it; JSON as text, which databases keep as written.
 
-    A text that another program puts in a row's place is another key: nothing has to be told.
+    Most rows are known, and need not be read from what they are stored as.
 
     Args:
-        largest: Characters of all texts together.
+        column: Of `jobs`.
+
+    Returns:
+        What to select, by the column's name.
+    """
+    found = cast(column, Text) if isinstance(column.type, Document) else column
+    return type_coerce(found, NullType()).label(column.name)
+
+
+_COLUMNS: Final = tuple(column for column in jobs.c if column.name not in _UNSHOWN)
+
+_NAMES: Final = tuple(column.name for column in _COLUMNS)
+
+SHOWN: Final = tuple(map(as_stored, _COLUMNS))
+"""Columns of a job that is shown and not changed, as they are stored."""
+
+LARGEST: Final = 8 << 20
+"""Characters of all texts that a memory has; what they are read to takes some times that."""
+
+_ENTRY: Final = 100
+"""Characters that what is not text counts for, in every row."""
+
+Values = tuple[Any, ...]
+"""Of some columns of a row, as they are stored."""
+
+
+class RowMemory(Generic[V]):
+    """What rows were read to; of too many, those asked for longest ago go. Thread-safe.
+
+    The row itself is the key: what any program puts in its place is another key, and nobody has to
+    be told.
+
+    Args:
+        largest: Characters of all rows together; each counts for at least a hundred.
     """
 
     def __init__(self, largest: int) -> None:
         self._largest = largest
         self._size = 0
-        self._known: OrderedDict[Texts, JobDocuments] = OrderedDict()
+        self._known: OrderedDict[Values, V] = OrderedDict()
         self._lock = threading.Lock()
 
-    def find(self, texts: Texts) -> JobDocuments | None:
-        """Look for what documents say.
+    def find(self, values: Values) -> V | None:
+        """Look for what a row was read to.
 
         Args:
-            texts: Of a job's documents.
+            values: Of the row.
 
         Returns:
-            What they say; None if it is not remembered.
+            The same object as before; None if it is not remembered.
         """
         with self._lock:
-            found = self._known.get(texts)
+            found = self._known.get(values)
             if found is not None:
-                self._known.move_to_end(texts)
+                self._known.move_to_end(values)
             return found
 
-    def add(self, texts: Texts, documents: JobDocuments) -> None:
-        """Remember what documents say.
+    def find_all(self, rows: Sequence[Values]) -> list[V | None]:
+        """Look for what many rows were read to.
 
         Args:
-            texts: Of a job's documents.
-            documents: What they say.
+            rows: Values of each.
+
+        Returns:
+            As `find`, for each.
         """
         with self._lock:
-            if texts not in self._known:
-                self._known[texts] = documents
-                self._size += _length(texts)
+            found = [self._known.get(values) for values in rows]
+            for values, read in zip(rows, found, strict=True):
+                if read is not None:
+                    self._known.move_to_end(values)
+            return found
+
+    def add(self, values: Values, read: V) -> V:
+        """Remember what a row was read to.
+
+        Args:
+            values: Of the row.
+            read: What it was read to.
+
+        Returns:
+            The same; what another thread has added meanwhile, if one has.
+        """
+        with self._lock:
+            first = self._known.setdefault(values, read)
+            if first is read:
+                self._size += _length(values)
             while self._size > self._largest:
                 oldest, _ = self._known.popitem(last=False)
                 self._size -= _length(oldest)
+            return first
 
 
-def _length(texts: Texts) -> int:
-    return sum(len(text) for text in texts if text is not None)
+def _length(values: Values) -> int:
+    return _ENTRY + sum(len(value) for value in values if isinstance(value, str))
 
 
-_memory: Final = DocumentMemory(_LARGEST)
+_documents: Final = RowMemory[JobDocuments](LARGEST)
+_jobs: Final = RowMemory[Job](LARGEST)
 
 
-def shown_job(row: Row) -> Job:
+def shown_job(row: Row[Any], dialect: Dialect) -> Job:
     """A job from its row, as `to_job` has it.
 
     Args:
         row: The columns `SHOWN`.
+        dialect: Of the database.
 
     Returns:
-        The job; one of the same documents may share its spec.
+        The job; the same object for a row that has not changed, as far as it is remembered. Jobs of
+        the same documents may share their spec.
     """
-    texts = tuple(row[f"{name}_text"] for name in _DOCUMENTS)
-    documents = _memory.find(texts)
-    if documents is None:
-        documents = read_documents(dict(zip(_DOCUMENTS, map(_parsed, texts), strict=True)))
+    values = tuple(row)
+    found = _jobs.find(values)
+    if found is not None:
+        return found
+    columns = dict(zip(_NAMES, values, strict=True))
+    documents = _read_documents(tuple(columns[name] for name in _DOCUMENTS))
+    for column in _COLUMNS:
+        if column.name not in _DOCUMENTS:
+            columns[column.name] = from_stored(column, columns[column.name], dialect)
+    job = to_job(columns, documents)
+    return _jobs.add(values, job) if documents.readable else job
+
+
+def from_stored(column: Column[Any], value: Any, dialect: Dialect) -> Any:
+    """Read what `as_stored` selects.
+
+    Args:
+        column: Of `jobs`.
+        value: As the driver gave it.
+        dialect: Of the database.
+
+    Returns:
+        The value, as the column itself gives it.
+    """
+    if isinstance(column.type, Document):
+        return _parsed(value)
+    if isinstance(column.type, UtcDateTime):
+        read = column.type.dialect_impl(dialect).result_processor(dialect, None)
+        return value if read is None else read(value)
+    return value
+
+
+def _read_documents(texts: tuple[str | None, ...]) -> JobDocuments:
+    found = _documents.find(texts)
+    if found is None:
+        found = read_documents(dict(zip(_DOCUMENTS, map(_parsed, texts), strict=True)))
         # What cannot be read may be so for a reason that passes.
-        if documents.readable:
-            _memory.add(texts, documents)
-    return to_job(row, documents)
+        if found.readable:
+            found = _documents.add(texts, found)
+    return found
 
 
 def _parsed(text: str | None) -> Any:

@@ -7,8 +7,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Final
 
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import JobOrder
-from services.optimizer.store.rows.evaluation_rows import Row
+from services.optimizer.jobs.job import Job, JobOrder
 from services.optimizer.store.statements.records import ID_ALPHABET
 
 _CURSOR: Final = re.compile(rf"([0-9]{{1,18}})\.([{ID_ALPHABET}]{{12}})", re.ASCII)
@@ -127,11 +126,11 @@ def no_cursor() -> InvalidRequest:
     )
 
 
-def cursor_of(row: Row, order: JobOrder, *, reverse: bool = False) -> str:
+def cursor_of(job: Job, order: JobOrder, *, reverse: bool = False) -> str:
     """Place of a job in the list.
 
     Args:
-        row: The job's row.
+        job: As it is shown.
         order: By what the list is sorted.
         reverse: Whether the list is in the reverse order.
 
@@ -139,7 +138,7 @@ def cursor_of(row: Row, order: JobOrder, *, reverse: bool = False) -> str:
         What a page that ends with this job ends with.
     """
     if not reverse and order is JobOrder.CREATED:
-        return to_cursor(row["created_at"], row["id"])
+        return to_cursor(job.created_at, job.id)
     if not reverse and order is JobOrder.FITNESS:
-        return to_fitness_cursor(row["best_fitness"], row["id"])
-    return to_place_cursor(order, row["id"], reverse=reverse)
+        return to_fitness_cursor(job.progress.best_fitness, job.id)
+    return to_place_cursor(order, job.id, reverse=reverse)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, Final
 
-from sqlalchemy import ColumnElement, Connection, false, func, select, tuple_
+from sqlalchemy import ColumnElement, Connection, Row, bindparam, false, func, select, tuple_
 
 from services.optimizer.jobs.job import Job, JobOrder, JobState
 from services.optimizer.store.port.reading import Page
-from services.optimizer.store.rows.evaluation_rows import Row
 from services.optimizer.store.rows.job_views import SHOWN, shown_job
 from services.optimizer.store.rows.tables import EXISTING, jobs
 from services.optimizer.store.statements.job_cursors import (
     cursor_of,
     from_cursor,
     from_fitness_cursor,
-    to_cursor,
 )
 from services.optimizer.store.statements.records import is_job_id
+
+_OF_IDS: Final = select(*SHOWN).where(jobs.c.id.in_(bindparam("ids", expanding=True)))
 
 Among = tuple[ColumnElement[bool], ...]
 """Conditions on jobs, all of which hold for those that are wanted."""
@@ -67,10 +68,7 @@ def newest_jobs(connection: Connection, among: Among, after: str | None, limit: 
         types = (jobs.c.created_at.type, jobs.c.id.type)
         place = tuple_(created_at, job_id, types=types)
         query = query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
-    rows = connection.execute(query).mappings().all()
-    found = tuple(shown_job(row) for row in rows[:limit])
-    more = len(rows) > limit
-    return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
+    return _page(connection, connection.execute(query).all(), limit, JobOrder.CREATED)
 
 
 def fittest_jobs(connection: Connection, among: Among, after: str | None, limit: int) -> Page[Job]:
@@ -90,33 +88,40 @@ def fittest_jobs(connection: Connection, among: Among, after: str | None, limit:
     """
     fitness, job_id = (None, "") if after is None else from_fitness_cursor(after)
     columns = (jobs.c.best_fitness, jobs.c.id)
-    rows: list[Row] = []
+    rows: list[Row[Any]] = []
     # Apart, for an index has those without a fitness at its other end.
     if after is None or fitness is not None:
         query = select(*SHOWN).where(*among, columns[0].is_not(None))
         if after is not None:
             place = tuple_(fitness, job_id, types=tuple(column.type for column in columns))
             query = query.where(tuple_(*columns) > place)
-        rows += connection.execute(query.order_by(*columns).limit(limit + 1)).mappings()
+        rows += connection.execute(query.order_by(*columns).limit(limit + 1))
     if len(rows) <= limit:
         last = job_id if fitness is None else ""
         query = select(*SHOWN).where(*among, columns[0].is_(None), columns[1] > last)
         query = query.order_by(*columns).limit(limit + 1 - len(rows))
-        rows += connection.execute(query).mappings()
-    following = cursor_of(rows[limit - 1], JobOrder.FITNESS) if len(rows) > limit else None
-    return Page(tuple(shown_job(row) for row in rows[:limit]), following)
+        rows += connection.execute(query)
+    return _page(connection, rows, limit, JobOrder.FITNESS)
 
 
-def job_rows(connection: Connection, ids: Sequence[str]) -> list[Row]:
-    """Read the rows of jobs.
+def _page(
+    connection: Connection, rows: Sequence[Row[Any]], limit: int, order: JobOrder
+) -> Page[Job]:
+    """A page of rows, of which one more than the page has tells that others follow."""
+    found = tuple(shown_job(row, connection.dialect) for row in rows[:limit])
+    return Page(found, cursor_of(found[-1], order) if len(rows) > limit else None)
+
+
+def jobs_of(connection: Connection, ids: Sequence[str]) -> tuple[Job, ...]:
+    """Read jobs to show them.
 
     Args:
         connection: An open transaction.
         ids: Of the jobs.
 
     Returns:
-        The columns `SHOWN`, in the order of the ids.
+        The jobs, in the order of the ids.
     """
-    query = select(*SHOWN).where(jobs.c.id.in_(ids))
-    rows = {row["id"]: row for row in connection.execute(query).mappings()}
-    return [rows[job_id] for job_id in ids]
+    rows = connection.execute(_OF_IDS, {"ids": list(ids)})
+    found = {job.id: job for job in (shown_job(row, connection.dialect) for row in rows)}
+    return tuple(found[job_id] for job_id in ids)

@@ -1,24 +1,31 @@
 """The job list in its other orders, and its search.
 
 Names are compared in Python: case folding is then the same on every database, and right for more
-than ASCII. Of every job only what is compared is read, some microseconds each.
+than ASCII. Of every job only what is compared is read, and remembered.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
+from functools import cached_property
 from typing import Any, Final
 
-from sqlalchemy import Connection, Select, Text, cast, select
+from sqlalchemy import Connection, Dialect, Select, select
 
 from services.optimizer.jobs.job import JobOrder, JobState
 from services.optimizer.jobs.labels import JobFilter
 from services.optimizer.jobs.time_left import time_left
 from services.optimizer.store.rows.job_rows import reference_of
-from services.optimizer.store.rows.job_views import SHOWN, shown_job
+from services.optimizer.store.rows.job_views import (
+    LARGEST,
+    SHOWN,
+    RowMemory,
+    as_stored,
+    from_stored,
+    shown_job,
+)
 from services.optimizer.store.rows.tables import EXISTING, jobs
 from services.optimizer.store.statements.job_cursors import (
     from_cursor,
@@ -32,13 +39,12 @@ from services.optimizer.store.statements.labels import facet_columns, spec_field
 _STATES: Final = tuple(JobState)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Entry:
-    """What a job is found and sorted by; `lineage` as JSON text."""
+    """What a job is found and sorted by."""
 
     id: str
     created_at: datetime
-    spec_name: str = ""
     best_fitness: float | None = None
     evaluations: int = 0
     state: str = ""
@@ -47,18 +53,19 @@ class _Entry:
     priority: int = 0
     compute_seconds: float = 0.0
     reference: Any = None
-    lineage: str | None = None
+    lineage: Any = None
+    spec_name: str = ""
 
-    @property
+    @cached_property
     def name(self) -> str:
-        """As it is shown: its user's, or else its spec's."""
-        return str(self._label("name") or self.spec_name)
+        """As it is shown, its user's or else its spec's, in one case."""
+        return self._shown_name.casefold()
 
-    @property
+    @cached_property
     def words(self) -> str:
         """All that a search looks through, in one case."""
-        written = (self.name, self.id, self._label("note") or "", *(self._label("tags") or ()))
-        return "\n".join(written).casefold()
+        note, tags = self._label("note") or "", self._label("tags") or ()
+        return "\n".join((self._shown_name, self.id, note, *tags)).casefold()
 
     @property
     def gain(self) -> float | None:
@@ -72,12 +79,25 @@ class _Entry:
         own = self.evaluations - _taken_over(self.lineage)
         return own / self.compute_seconds if own > 0 and self.compute_seconds > 0.0 else None
 
+    @property
+    def _shown_name(self) -> str:
+        return str(self._label("name") or self.spec_name)
+
     def _label(self, name: str) -> Any:
         return self.labels.get(name) if isinstance(self.labels, dict) else None
 
 
-_N_COLUMNS: Final = 12
-"""Of `_Entry`, as `_entries` selects them."""
+_COLUMNS: Final = tuple(
+    jobs.c[column.name] for column in fields(_Entry) if column.name != "spec_name"
+)
+
+_ENTRIES: Final = select(*map(as_stored, _COLUMNS))
+
+_known: Final = RowMemory[_Entry](LARGEST)
+"""By their rows, without the names in their specs, which never change."""
+
+_AT_ONCE: Final = 500
+"""Jobs whose names are read by one statement."""
 
 
 def sort_jobs(
@@ -109,19 +129,17 @@ def sort_jobs(
     Raises:
         InvalidRequest: The cursor is none of this order; names the field `after`.
     """
-    query = _entries(connection).where(*among)
+    query = _ENTRIES.where(*among)
     if kind is not None:
         query = query.where(spec_field(connection, "kind") == kind)
+    found = _entries(connection, query)
     if where.needs_specs:
-        query = query.add_columns(*facet_columns(connection))
+        columns = connection.execute(select(jobs.c.id, *facet_columns(connection)).where(*among))
+        admitted = {row[0] for row in columns if where.admits(to_facets(row[1:]))}
+        found = [entry for entry in found if entry.id in admitted]
     wanted = search.casefold()
-    found = []
-    for row in connection.execute(query):
-        entry = _Entry(*row[:_N_COLUMNS])
-        if where.needs_specs and not where.admits(to_facets(row[_N_COLUMNS:])):
-            continue
-        if not wanted or wanted in entry.words:
-            found.append(entry)
+    if wanted:
+        found = [entry for entry in found if wanted in entry.words]
     place = _Places(order, reverse, _ends(connection) if order is JobOrder.TIME_LEFT else {})
     if after is None:
         return [entry.id for entry in place.sorted(found)]
@@ -130,31 +148,41 @@ def sort_jobs(
     return [entry.id for entry in place.after(last, [e for e in found if e.id != last.id])]
 
 
-def _entries(connection: Connection) -> Select[Any]:
-    """A row of what `_Entry` holds for every job."""
-    return select(
-        jobs.c.id,
-        jobs.c.created_at,
-        spec_field(connection, "name"),
-        jobs.c.best_fitness,
-        jobs.c.evaluations,
-        jobs.c.state,
-        jobs.c.labels,
-        jobs.c.iterations,
-        jobs.c.priority,
-        jobs.c.compute_seconds,
-        jobs.c.reference,
-        cast(jobs.c.lineage, Text),
-    )
+def _entries(connection: Connection, query: Select[Any]) -> list[_Entry]:
+    """Entries of jobs that are selected from `_ENTRIES`; those that have not changed are known."""
+    rows = [tuple(row) for row in connection.execute(query).all()]
+    found = _known.find_all(rows)
+    new = [row[0] for row, entry in zip(rows, found, strict=True) if entry is None]
+    names = _spec_names(connection, new)
+    return [
+        _read(row, names.get(row[0], ""), connection.dialect) if entry is None else entry
+        for row, entry in zip(rows, found, strict=True)
+    ]
 
 
-def _taken_over(lineage: str | None) -> int:
+def _read(row: tuple[Any, ...], name: str, dialect: Dialect) -> _Entry:
+    values = {
+        column.name: from_stored(column, value, dialect)
+        for column, value in zip(_COLUMNS, row, strict=True)
+    }
+    return _known.add(row, _Entry(**values, spec_name=name))
+
+
+def _spec_names(connection: Connection, ids: Sequence[str]) -> dict[str, str]:
+    """Names of jobs in their specs, by id."""
+    names = select(jobs.c.id, spec_field(connection, "name"))
+    found: dict[str, str] = {}
+    for begin in range(0, len(ids), _AT_ONCE):
+        some = names.where(jobs.c.id.in_(ids[begin : begin + _AT_ONCE]))
+        found.update((row[0], row[1]) for row in connection.execute(some))
+    return found
+
+
+def _taken_over(lineage: Any) -> int:
     """Evaluations that a fork has of its parent."""
-    if lineage is None:
-        return 0
     try:
-        return int(json.loads(lineage)["evaluations"])
-    except (ValueError, TypeError, LookupError, RecursionError):
+        return 0 if lineage is None else int(lineage["evaluations"])
+    except (ValueError, TypeError, LookupError):
         return 0
 
 
@@ -162,7 +190,7 @@ def _ends(connection: Connection) -> Mapping[str, float | None]:
     """Time to the end of each job that runs [s]."""
     running = select(*SHOWN).where(EXISTING, jobs.c.state == JobState.RUNNING)
     now = datetime.now(UTC)
-    found = map(shown_job, connection.execute(running).mappings())
+    found = (shown_job(row, connection.dialect) for row in connection.execute(running))
     return {job.id: time_left(job, now).eta_seconds for job in found}
 
 
@@ -208,7 +236,7 @@ def _negative(value: float | None) -> float | None:
 _KEYS: Final[Mapping[JobOrder, Callable[[_Entry], Any]]] = {
     JobOrder.CREATED: lambda entry: entry.created_at,
     JobOrder.FITNESS: lambda entry: entry.best_fitness,
-    JobOrder.NAME: lambda entry: entry.name.casefold() or None,
+    JobOrder.NAME: lambda entry: entry.name or None,
     JobOrder.STATE: lambda entry: _STATES.index(JobState(entry.state)),
     JobOrder.EVALUATIONS: lambda entry: -entry.evaluations,
     JobOrder.GAIN: lambda entry: _negative(entry.gain),
@@ -227,7 +255,7 @@ def _entry_before(connection: Connection, cursor: str, order: JobOrder, *, rever
         fitness, job_id = from_fitness_cursor(cursor)
         return _Entry(job_id, datetime.max.replace(tzinfo=UTC), best_fitness=fitness)
     job_id = from_place_cursor(order, cursor, reverse=reverse)
-    row = connection.execute(_entries(connection).where(jobs.c.id == job_id)).first()
-    if row is None:
+    entries = _entries(connection, _ENTRIES.where(jobs.c.id == job_id))
+    if not entries:
         raise no_cursor()
-    return _Entry(*row)
+    return entries[0]

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, Final
 
-from sqlalchemy import Connection, Select, insert, select, update
+from sqlalchemy import Connection, Select, bindparam, insert, select, update
+from sqlalchemy import Row as SqlRow
 
 from services.optimizer.errors import Conflict, NotFound
 from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
-from services.optimizer.jobs.job import JobState
+from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.jobs.provenance import JobProvenance, with_record
 from services.optimizer.jobs.time_left import recent_pace
 from services.optimizer.store.connections.changes import announce
@@ -26,7 +27,7 @@ from services.optimizer.store.rows.evaluation_rows import (
     to_ask,
 )
 from services.optimizer.store.rows.job_rows import provenance_document, provenance_records, to_job
-from services.optimizer.store.rows.job_views import SHOWN
+from services.optimizer.store.rows.job_views import SHOWN, shown_job
 from services.optimizer.store.rows.tables import (
     EXISTING,
     evaluations,
@@ -40,6 +41,13 @@ from services.optimizer.store.statements.notifications import note_end
 # No vowels, no look-alikes: an id is read aloud, and it spells no word.
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
 _ID: Final = re.compile(rf"[{ID_ALPHABET}]{{12}}")
+
+# Made once: to put a statement together takes longer than to run it.
+_OF_JOB: Final = (jobs.c.id == bindparam("job"), EXISTING)
+_WHOLE: Final = select(jobs).where(*_OF_JOB)
+_LOCKED: Final = _WHOLE.with_for_update()
+_SHOWN: Final = select(*SHOWN).where(*_OF_JOB)
+_ID_ALONE: Final = select(jobs.c.id).where(*_OF_JOB)
 
 
 def new_job_id() -> str:
@@ -75,24 +83,24 @@ def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
     Raises:
         NotFound: There is no such job.
     """
-    query = select(jobs)
-    return _row_of(connection, job_id, query.with_for_update() if lock else query)
+    row = _row_of(connection, job_id, _LOCKED if lock else _WHOLE)
+    return row._mapping  # noqa: SLF001 - as SQLAlchemy documents it
 
 
-def shown_row(connection: Connection, job_id: str) -> Row:
-    """Read a job's row to show it.
+def job_to_show(connection: Connection, job_id: str) -> Job:
+    """Read a job to show it.
 
     Args:
         connection: An open transaction.
         job_id: Of the job.
 
     Returns:
-        The columns `SHOWN`.
+        The job; one that has not changed need not be read from its row anew.
 
     Raises:
         NotFound: There is no such job.
     """
-    return _row_of(connection, job_id, select(*SHOWN))
+    return shown_job(_row_of(connection, job_id, _SHOWN), connection.dialect)
 
 
 def require_job(connection: Connection, job_id: str) -> None:
@@ -105,12 +113,12 @@ def require_job(connection: Connection, job_id: str) -> None:
     Raises:
         NotFound: There is no such job.
     """
-    _row_of(connection, job_id, select(jobs.c.id))
+    _row_of(connection, job_id, _ID_ALONE)
 
 
-def _row_of(connection: Connection, job_id: str, query: Select[Any]) -> Row:
+def _row_of(connection: Connection, job_id: str, query: Select[Any]) -> SqlRow[Any]:
     if is_job_id(job_id):
-        row = connection.execute(query.where(jobs.c.id == job_id, EXISTING)).mappings().first()
+        row = connection.execute(query, {"job": job_id}).first()
         if row is not None:
             return row
     raise NotFound(f"there is no job {job_id!r}")

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Select, Table, select
+from sqlalchemy import Integer, Select, Table, bindparam, select
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.chain import ChainDocuments
@@ -18,7 +18,6 @@ from services.optimizer.store.port.reading import Page, StoredLink
 from services.optimizer.store.rows.columns import select_columns, select_known
 from services.optimizer.store.rows.evaluation_rows import (
     LISTED,
-    Row,
     to_evaluation,
     to_iteration,
     to_reevaluation,
@@ -26,10 +25,43 @@ from services.optimizer.store.rows.evaluation_rows import (
 from services.optimizer.store.rows.job_rows import chain_documents
 from services.optimizer.store.rows.tables import evaluations, iterations, reevaluations
 from services.optimizer.store.statements.chain import select_links, select_reevaluations
-from services.optimizer.store.statements.records import job_row, require_job, shown_row
+from services.optimizer.store.statements.records import job_row, job_to_show, require_job
 
 _LARGEST_INDEX: Final = 2**31 - 1
 _LARGEST_PAGE: Final = 10_000
+
+
+def _particle(table: Table) -> Select[Any]:
+    """One design in a table of them."""
+    return select(table).where(
+        table.c.job_id == bindparam("job"),
+        table.c.iteration == bindparam("iteration"),
+        table.c.particle == bindparam("particle"),
+    )
+
+
+# Made once: to put a statement together takes longer than to run it.
+_BEST: Final = _particle(evaluations)
+_BEST_ANEW: Final = _particle(reevaluations)
+_ITERATIONS: Final = (
+    select(*LISTED)
+    .where(
+        iterations.c.job_id == bindparam("job"),
+        iterations.c.iteration > bindparam("after"),
+        iterations.c.committed_at.is_not(None),
+    )
+    .order_by(iterations.c.iteration)
+    .limit(bindparam("limit", type_=Integer))
+)
+_EVALUATIONS: Final = (
+    select(evaluations)
+    .where(
+        evaluations.c.job_id == bindparam("job"),
+        evaluations.c.iteration >= bindparam("first"),
+        evaluations.c.iteration < bindparam("last"),
+    )
+    .order_by(evaluations.c.iteration, evaluations.c.particle)
+)
 
 
 class SqlHistory:
@@ -47,17 +79,10 @@ class SqlHistory:
     ) -> Page[Iteration]:
         """Read a page of committed iterations."""
         limit = checked_limit(limit)
-        query = (
-            select(*LISTED)
-            .where(iterations.c.job_id == job_id, iterations.c.committed_at.is_not(None))
-            .order_by(iterations.c.iteration)
-            .limit(limit + 1)
-        )
-        if after is not None:
-            query = query.where(iterations.c.iteration > _bounded(after))
+        place = {"job": job_id, "after": -1 if after is None else _bounded(after)}
         with self._database.transaction(write=False) as connection:
             require_job(connection, job_id)
-            rows = connection.execute(query).mappings().all()
+            rows = connection.execute(_ITERATIONS, place | {"limit": limit + 1}).mappings().all()
         found = tuple(to_iteration(row) for row in rows[:limit])
         return Page(found, str(found[-1].index) if len(rows) > limit else None)
 
@@ -70,18 +95,10 @@ class SqlHistory:
 
     def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
         """Read the designs of a range of committed iterations."""
-        query = (
-            select(evaluations)
-            .where(
-                evaluations.c.job_id == job_id,
-                evaluations.c.iteration >= _bounded(first),
-                evaluations.c.iteration < _bounded(last),
-            )
-            .order_by(evaluations.c.iteration, evaluations.c.particle)
-        )
+        between = {"job": job_id, "first": _bounded(first), "last": _bounded(last)}
         with self._database.transaction(write=False) as connection:
             require_job(connection, job_id)
-            rows = connection.execute(query).mappings().all()
+            rows = connection.execute(_EVALUATIONS, between).mappings().all()
         return tuple(to_evaluation(row) for row in rows)
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
@@ -137,21 +154,17 @@ class SqlHistory:
     def best(self, job_id: str) -> Evaluation | None:
         """Read the design of least fitness."""
         with self._database.transaction(write=False) as connection:
-            job = shown_row(connection, job_id)
-            if job["best_iteration"] is None:
+            job = job_to_show(connection, job_id)
+            if job.progress.best_iteration is None:
                 return None
-            row = connection.execute(_particle(evaluations, job)).mappings().one()
-            anew = connection.execute(_particle(reevaluations, job)).mappings().first()
+            place = {
+                "job": job.id,
+                "iteration": job.progress.best_iteration,
+                "particle": job.progress.best_particle,
+            }
+            row = connection.execute(_BEST, place).mappings().one()
+            anew = connection.execute(_BEST_ANEW, place).mappings().first()
             return to_evaluation(row, None if anew is None else to_reevaluation(anew))
-
-
-def _particle(table: Table, job: Row) -> Select[Any]:
-    """The row of a job's best design in a table of them."""
-    return select(table).where(
-        table.c.job_id == job["id"],
-        table.c.iteration == job["best_iteration"],
-        table.c.particle == job["best_particle"],
-    )
 
 
 def checked_limit(limit: int) -> int:

@@ -1,0 +1,172 @@
+"""Answers in JSON that are encoded and compressed once for all who ask the same.
+
+Everybody who may ask at all is answered the same: who may is checked before, for every request.
+"""
+
+from __future__ import annotations
+
+import threading
+import zlib
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterable
+from hashlib import blake2b
+from typing import Final
+
+from fastapi import Request, Response
+from pydantic_core import to_json
+
+from services.optimizer.jobs.job import Job, JobState
+
+LEAST_COMPRESSED: Final = 1024
+"""Bytes of the shortest answer that is compressed."""
+
+_LEVEL: Final = 1
+"""Of compression: the usual 6 takes three times as long, and saves a tenth of the answer."""
+
+_LARGEST: Final = 32 << 20
+"""Bytes of all answers and parts of answers that are remembered."""
+
+_ENTRY: Final = 500
+"""Bytes that each takes beside its own."""
+
+
+class Encoded:
+    """JSON as it is sent. Thread-safe.
+
+    Attributes:
+        plain: The text, in UTF-8.
+    """
+
+    __slots__ = ("_compressed", "_job", "plain")
+
+    def __init__(self, plain: bytes, job: Job | None = None) -> None:
+        """Take on a text.
+
+        Args:
+            plain: The text, in UTF-8.
+            job: That it tells of; kept, so that no other object is taken for it.
+        """
+        self.plain = plain
+        self._job = job
+        self._compressed: bytes | None = None
+
+    @property
+    def compressed(self) -> bytes:
+        """The same by gzip."""
+        if self._compressed is None:
+            compressor = zlib.compressobj(_LEVEL, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
+            self._compressed = compressor.compress(self.plain) + compressor.flush()
+        return self._compressed
+
+    def answer(self, request: Request) -> Response:
+        """Answer with it.
+
+        Args:
+            request: That asks.
+
+        Returns:
+            What it accepts: the text, or the text by gzip.
+        """
+        if len(self.plain) < LEAST_COMPRESSED or not _accepts_gzip(request):
+            return Response(self.plain, media_type="application/json")
+        headers = {"Content-Encoding": "gzip", "Vary": "Accept-Encoding"}
+        return Response(self.compressed, media_type="application/json", headers=headers)
+
+
+def _accepts_gzip(request: Request) -> bool:
+    """As for the answers of all other routes."""
+    return "gzip" in request.headers.get("accept-encoding", "")
+
+
+class Answers:
+    """Answers, and parts of them; of too many, those asked for longest ago go. Thread-safe.
+
+    Args:
+        largest: Bytes of all of them.
+    """
+
+    def __init__(self, largest: int = _LARGEST) -> None:
+        self._largest = largest
+        self._size = 0
+        self._known: OrderedDict[Hashable, Encoded] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @property
+    def size(self) -> int:
+        """Bytes of all that is remembered."""
+        return self._size
+
+    def of_job(self, what: str, job: Job, make: Callable[[], bytes]) -> Encoded:
+        """Encode what follows from a job alone.
+
+        The store gives the same object for a job of which nothing has changed. What is told of a
+        job that runs depends on the time as well, and is not remembered.
+
+        Args:
+            what: Is told of the job.
+            job: As it was read.
+            make: Gives the JSON.
+
+        Returns:
+            The JSON, as it was encoded for this job or an earlier reading of it.
+        """
+        if job.state is JobState.RUNNING:
+            return Encoded(make())
+        key = (what, id(job))
+        return self._find(key) or self._add(key, Encoded(make(), job))
+
+    def of_history(self, key: Hashable, make: Callable[[], bytes]) -> Encoded:
+        """Encode what never changes: whole iterations that are committed.
+
+        Args:
+            key: What is told, and of which job; whether the job is there still has been asked.
+            make: Gives the JSON.
+
+        Returns:
+            The JSON.
+        """
+        return self._find(key) or self._add(key, Encoded(make()))
+
+    def same(self, plain: bytes) -> Encoded:
+        """Find an answer by its text, so that it is compressed once.
+
+        Args:
+            plain: JSON.
+
+        Returns:
+            The JSON.
+        """
+        if len(plain) < LEAST_COMPRESSED:
+            return Encoded(plain)
+        key = blake2b(plain, digest_size=16).digest()
+        return self._find(key) or self._add(key, Encoded(plain))
+
+    def _find(self, key: Hashable) -> Encoded | None:
+        with self._lock:
+            found = self._known.get(key)
+            if found is not None:
+                self._known.move_to_end(key)
+            return found
+
+    def _add(self, key: Hashable, encoded: Encoded) -> Encoded:
+        with self._lock:
+            first = self._known.setdefault(key, encoded)
+            if first is encoded:
+                self._size += len(encoded.plain) + _ENTRY
+            while self._size > self._largest:
+                _, oldest = self._known.popitem(last=False)
+                self._size -= len(oldest.plain) + _ENTRY
+            return first
+
+
+def page_of(items: Iterable[bytes], following: str | None) -> bytes:
+    """Put a page together.
+
+    Args:
+        items: JSON of each.
+        following: Place of the next page; None on the last.
+
+    Returns:
+        JSON of a `PageView`.
+    """
+    return b'{"items":[' + b",".join(items) + b'],"next":' + to_json(following) + b"}"

@@ -241,17 +241,23 @@ def _results(
     log_utilities: NDArray[np.float64],
 ) -> dict[str, dict[str, object]]:
     """As `case_results`, not yet validated."""
+    # Hardly any design lacks a number; to look at each takes longer than all else.
+    framed = list if np.isfinite(values).all() else _finite_all
     return {
         name: {
             "status": (ended := Status(status)).label,
             "explanation": ended.phrase,
             "utility": utility(log),
-            "objectives": dict(zip(columns, map(finite, row), strict=True)),
+            "objectives": dict(zip(columns, framed(row), strict=True)),
         }
         for name, status, row, log in zip(
             names, statuses.tolist(), values.tolist(), log_utilities.tolist(), strict=True
         )
     }
+
+
+def _finite_all(row: Sequence[float]) -> list[float | None]:
+    return list(map(finite, row))
 
 
 def utility(log_utility: float) -> float | None:

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from sqlalchemy import Engine, event, text
 
-from services.optimizer.jobs.job import JobOrder, JobState
+from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.labels import LabelsChange
 from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.rows.job_rows import JobDocuments
 from services.optimizer.store.rows.job_views import RowMemory
@@ -109,3 +110,37 @@ def test_rows_that_were_asked_for_longest_ago_are_forgotten_first() -> None:
     assert known == ["a", "d"]
     memory.add(("e" * 1000, None, None), documents)
     assert memory.find(("e" * 1000, None, None)) is None
+
+
+def test_the_list_is_sorted_anew_once_another_process_or_this_one_has_changed_a_job(
+    store: SqlStore, database_url: str
+) -> None:
+    jobs = [store.create_job(spec(name=name))[0].id for name in "ab"]
+
+    def by_name() -> list[str]:
+        return [job.id for job in store.jobs(order=JobOrder.NAME).items]
+
+    other = open_store(database_url)
+    assert by_name() == by_name() == jobs
+    other.label(jobs[0], LabelsChange(name="c"))
+    assert by_name() == by_name() == jobs[::-1]
+    store.label(jobs[1], LabelsChange(name="d"))
+    assert by_name() == by_name() == jobs
+    third = other.create_job(spec(name="a"))[0].id
+    assert by_name() == by_name() == [third, *jobs]
+    store.command(third, Command.CANCEL)
+    other.delete_job(third)
+    assert by_name() == by_name() == jobs
+    other.close()
+
+
+def test_while_nothing_is_committed_sqlite_reads_the_jobs_that_are_sorted_once(
+    migrated_sqlite: Any,
+) -> None:
+    store = open_store(f"sqlite:///{migrated_sqlite}")
+    with statements() as sent:
+        for _ in range(3):
+            store.jobs(order=JobOrder.NAME, search="a", limit=1)
+    store.close()
+    whole = [s for s, _ in sent if s.startswith("SELECT") and "labels" in s and " IN " not in s]
+    assert len(whole) == 1, sent

@@ -101,7 +101,7 @@ class RowMemory(Generic[V]):
             return found
 
     def find_all(self, rows: Sequence[Values]) -> list[V | None]:
-        """Look for what many rows were read to.
+        """Look for what all rows of a table were read to; none counts as asked for by that.
 
         Args:
             rows: Values of each.
@@ -110,11 +110,7 @@ class RowMemory(Generic[V]):
             As `find`, for each.
         """
         with self._lock:
-            found = [self._known.get(values) for values in rows]
-            for values, read in zip(rows, found, strict=True):
-                if read is not None:
-                    self._known.move_to_end(values)
-            return found
+            return list(map(self._known.get, rows))
 
     def add(self, values: Values, read: V) -> V:
         """Remember what a row was read to.

@@ -3,9 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, Final
 
-from sqlalchemy import ColumnElement, Connection, Row, bindparam, false, func, select, tuple_
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Integer,
+    Row,
+    Select,
+    bindparam,
+    false,
+    func,
+    select,
+    tuple_,
+)
 
 from services.optimizer.jobs.job import Job, JobOrder, JobState
 from services.optimizer.store.port.reading import Page
@@ -18,12 +30,18 @@ from services.optimizer.store.statements.job_cursors import (
 )
 from services.optimizer.store.statements.records import is_job_id
 
+_KEPT: Final = 64
+"""Statements of a kind: to put one together takes longer than to run it."""
+
+_MOST: Final = bindparam("most", type_=Integer)
+
 _OF_IDS: Final = select(*SHOWN).where(jobs.c.id.in_(bindparam("ids", expanding=True)))
 
 Among = tuple[ColumnElement[bool], ...]
 """Conditions on jobs, all of which hold for those that are wanted."""
 
 
+@lru_cache(maxsize=_KEPT)
 def among_jobs(state: JobState | None, parent: str | None, archived: bool | None = None) -> Among:
     """Conditions on jobs that the database itself can tell.
 
@@ -61,14 +79,21 @@ def newest_jobs(connection: Connection, among: Among, after: str | None, limit: 
     Raises:
         InvalidRequest: `after` is no cursor of this order.
     """
-    newest = select(*SHOWN).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
-    query = newest.where(*among).limit(limit + 1)
+    values: dict[str, Any] = {"most": limit + 1}
     if after is not None:
-        created_at, job_id = from_cursor(after)
-        types = (jobs.c.created_at.type, jobs.c.id.type)
-        place = tuple_(created_at, job_id, types=types)
-        query = query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
-    return _page(connection, connection.execute(query).all(), limit, JobOrder.CREATED)
+        values["created_at"], values["job"] = from_cursor(after)
+    rows = connection.execute(_newest(among, after is not None), values).all()
+    return _page(connection, rows, limit, JobOrder.CREATED)
+
+
+@lru_cache(maxsize=_KEPT)
+def _newest(among: Among, paged: bool) -> Select[Any]:
+    newest = select(*SHOWN).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
+    query = newest.where(*among).limit(_MOST)
+    if not paged:
+        return query
+    place = tuple_(bindparam("created_at", type_=jobs.c.created_at.type), bindparam("job"))
+    return query.where(tuple_(jobs.c.created_at, jobs.c.id) < place)
 
 
 def fittest_jobs(connection: Connection, among: Among, after: str | None, limit: int) -> Page[Job]:
@@ -87,21 +112,32 @@ def fittest_jobs(connection: Connection, among: Among, after: str | None, limit:
         InvalidRequest: `after` is no cursor of this order.
     """
     fitness, job_id = (None, "") if after is None else from_fitness_cursor(after)
-    columns = (jobs.c.best_fitness, jobs.c.id)
+    values = {"fitness": fitness, "job": job_id, "most": limit + 1}
     rows: list[Row[Any]] = []
     # Apart, for an index has those without a fitness at its other end.
     if after is None or fitness is not None:
-        query = select(*SHOWN).where(*among, columns[0].is_not(None))
-        if after is not None:
-            place = tuple_(fitness, job_id, types=tuple(column.type for column in columns))
-            query = query.where(tuple_(*columns) > place)
-        rows += connection.execute(query.order_by(*columns).limit(limit + 1))
+        rows += connection.execute(_fittest(among, after is not None), values)
     if len(rows) <= limit:
-        last = job_id if fitness is None else ""
-        query = select(*SHOWN).where(*among, columns[0].is_(None), columns[1] > last)
-        query = query.order_by(*columns).limit(limit + 1 - len(rows))
-        rows += connection.execute(query)
+        last = {"job": job_id if fitness is None else "", "most": limit + 1 - len(rows)}
+        rows += connection.execute(_without_fitness(among), last)
     return _page(connection, rows, limit, JobOrder.FITNESS)
+
+
+@lru_cache(maxsize=_KEPT)
+def _fittest(among: Among, paged: bool) -> Select[Any]:
+    columns = (jobs.c.best_fitness, jobs.c.id)
+    query = select(*SHOWN).where(*among, columns[0].is_not(None)).order_by(*columns).limit(_MOST)
+    if not paged:
+        return query
+    place = tuple_(bindparam("fitness", type_=columns[0].type), bindparam("job"))
+    return query.where(tuple_(*columns) > place)
+
+
+@lru_cache(maxsize=_KEPT)
+def _without_fitness(among: Among) -> Select[Any]:
+    columns = (jobs.c.best_fitness, jobs.c.id)
+    query = select(*SHOWN).where(*among, columns[0].is_(None), columns[1] > bindparam("job"))
+    return query.order_by(*columns).limit(_MOST)
 
 
 def _page(

@@ -1,0 +1,196 @@
+"""What jobs are found and sorted by, of all jobs at once; what has not changed is not read anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from datetime import datetime
+from functools import cached_property
+from typing import Any, Final
+from weakref import WeakKeyDictionary
+
+from sqlalchemy import Connection, Dialect, Engine, Select, select
+
+from services.optimizer.store.rows.job_rows import reference_of
+from services.optimizer.store.rows.job_views import LARGEST, RowMemory, as_stored, from_stored
+from services.optimizer.store.rows.tables import jobs
+from services.optimizer.store.statements.job_list import Among
+from services.optimizer.store.statements.labels import spec_field
+
+
+@dataclass(frozen=True)
+class JobEntry:
+    """What a job is found and sorted by.
+
+    Attributes:
+        id: Of the job.
+        created_at: When it was submitted.
+        best_fitness: Of its best design.
+        evaluations: Committed.
+        state: As it is stored.
+        labels: The document.
+        iterations: Committed.
+        priority: The higher, the sooner it is claimed.
+        compute_seconds: Of the committed iterations [s].
+        reference: The document.
+        lineage: The document.
+        spec_name: In its spec.
+    """
+
+    id: str
+    created_at: datetime
+    best_fitness: float | None = None
+    evaluations: int = 0
+    state: str = ""
+    labels: Any = None
+    iterations: int = 0
+    priority: int = 0
+    compute_seconds: float = 0.0
+    reference: Any = None
+    lineage: Any = None
+    spec_name: str = ""
+
+    @cached_property
+    def name(self) -> str:
+        """As it is shown, its user's or else its spec's, in one case."""
+        return self._shown_name.casefold()
+
+    @cached_property
+    def words(self) -> str:
+        """All that a search looks through, in one case."""
+        note, tags = self._label("note") or "", self._label("tags") or ()
+        return "\n".join((self._shown_name, self.id, note, *tags)).casefold()
+
+    @property
+    def gain(self) -> float | None:
+        """Over the published design [1]."""
+        known = reference_of(self.reference)
+        return None if known is None else known.gain(self.best_fitness)
+
+    @property
+    def rate(self) -> float | None:
+        """Evaluations of its own a second [1/s]."""
+        own = self.evaluations - _taken_over(self.lineage)
+        return own / self.compute_seconds if own > 0 and self.compute_seconds > 0.0 else None
+
+    @property
+    def _shown_name(self) -> str:
+        return str(self._label("name") or self.spec_name)
+
+    def _label(self, name: str) -> Any:
+        return self.labels.get(name) if isinstance(self.labels, dict) else None
+
+
+_COLUMNS: Final = tuple(
+    jobs.c[column.name] for column in fields(JobEntry) if column.name != "spec_name"
+)
+
+_ENTRIES: Final = select(*map(as_stored, _COLUMNS))
+
+_known: Final = WeakKeyDictionary[Engine, RowMemory["JobEntry"]]()
+"""By their rows, without the names in their specs, which never change in a database."""
+
+_AT_ONCE: Final = 500
+"""Jobs whose names are read by one statement."""
+
+_REMEMBERED: Final = "gaitswarm_job_entries"
+
+_QUESTIONS: Final = 8
+"""Conditions on jobs for which a connection remembers the entries."""
+
+
+def job_entries(connection: Connection, among: Among, kind: str | None) -> Sequence[JobEntry]:
+    """Read what jobs are found and sorted by.
+
+    Of SQLite a connection remembers it while nothing is committed to the file.
+
+    Args:
+        connection: An open transaction that only reads.
+        among: Only jobs for which these hold.
+        kind: Only jobs whose specs say that they are of this kind; None for any.
+
+    Returns:
+        The entries, in no order.
+    """
+    query = _ENTRIES.where(*among)
+    if kind is not None:
+        query = query.where(spec_field(connection, "kind") == kind)
+    version = _version(connection)
+    if version is None:
+        return _read_all(connection, query)
+    before, known = connection.info.get(_REMEMBERED, (None, {}))
+    if before != version:
+        known = {}
+        connection.info[_REMEMBERED] = (version, known)
+    key = (among, kind)
+    if key not in known:
+        if len(known) >= _QUESTIONS:
+            known.clear()
+        known[key] = _read_all(connection, query)
+    found: Sequence[JobEntry] = known[key]
+    return found
+
+
+def _version(connection: Connection) -> tuple[int, int] | None:
+    """What is another after any commit to an SQLite file; None for other databases."""
+    if connection.dialect.name != "sqlite":
+        return None
+    # The first counts what others have committed, the second what this connection has changed.
+    others = connection.exec_driver_sql("PRAGMA data_version").scalar_one()
+    driver: Any = connection.connection.driver_connection
+    return others, driver.total_changes
+
+
+def job_entry(connection: Connection, job_id: str) -> JobEntry | None:
+    """Read what a job is found and sorted by.
+
+    Args:
+        connection: An open transaction.
+        job_id: Of the job.
+
+    Returns:
+        The entry; None if there is no such job.
+    """
+    found = _read_all(connection, _ENTRIES.where(jobs.c.id == job_id))
+    return found[0] if found else None
+
+
+def _read_all(connection: Connection, query: Select[Any]) -> list[JobEntry]:
+    """Entries of jobs that are selected from `_ENTRIES`; those that have not changed are known."""
+    rows = list(map(tuple, connection.execute(query).all()))
+    memory = _known.setdefault(connection.engine, RowMemory(LARGEST))
+    found = memory.find_all(rows)
+    new = [row[0] for row, entry in zip(rows, found, strict=True) if entry is None]
+    names = _spec_names(connection, new)
+    return [
+        memory.add(row, _read(row, names.get(row[0], ""), connection.dialect))
+        if entry is None
+        else entry
+        for row, entry in zip(rows, found, strict=True)
+    ]
+
+
+def _read(row: tuple[Any, ...], name: str, dialect: Dialect) -> JobEntry:
+    values = {
+        column.name: from_stored(column, value, dialect)
+        for column, value in zip(_COLUMNS, row, strict=True)
+    }
+    return JobEntry(**values, spec_name=name)
+
+
+def _spec_names(connection: Connection, ids: Sequence[str]) -> dict[str, str]:
+    """Names of jobs in their specs, by id."""
+    names = select(jobs.c.id, spec_field(connection, "name"))
+    found: dict[str, str] = {}
+    for begin in range(0, len(ids), _AT_ONCE):
+        some = names.where(jobs.c.id.in_(ids[begin : begin + _AT_ONCE]))
+        found.update((row[0], row[1]) for row in connection.execute(some))
+    return found
+
+
+def _taken_over(lineage: Any) -> int:
+    """Evaluations that a fork has of its parent."""
+    try:
+        return 0 if lineage is None else int(lineage["evaluations"])
+    except (ValueError, TypeError, LookupError):
+        return 0

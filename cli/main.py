@@ -9,12 +9,14 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
+from copy import copy
 from functools import cache
 from typing import Annotated, Any, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
-from typer.main import get_command
+from typer.main import get_command, get_command_name
+from typer.models import CommandInfo
 
 from cli.commands.database import db
 from cli.commands.designs import (
@@ -180,16 +182,32 @@ def main() -> None:
 
 
 @cache
-def _commands() -> Callable[..., object]:
-    """All commands with their options: making them takes longer than most of them do."""
-    return get_command(app)
+def commands(only: str | None = None) -> Callable[..., object]:
+    """Make commands with their options, which takes longer than most of them do.
+
+    Args:
+        only: The one that is wanted; None, or what is no command's name, for all.
+
+    Returns:
+        What runs them, given arguments.
+    """
+    chosen = copy(app)
+    chosen.registered_commands = [c for c in app.registered_commands if _name(c) == only]
+    chosen.registered_groups = [g for g in app.registered_groups if g.name == only]
+    found = chosen.registered_commands or chosen.registered_groups
+    return get_command(chosen if found else app)
+
+
+def _name(command: CommandInfo) -> str:
+    return command.name or get_command_name(cast(Any, command.callback).__name__)
 
 
 def run(arguments: Sequence[str]) -> int:
     """One command; returns its exit code. Messages about what went wrong are on stderr."""
     stdout = Stdout(sys.stdout)
     with redirect_stdout(cast(TextIO, stdout)):
-        code = _exit_code_of(lambda: _commands()(list(arguments), prog_name="gaitswarm"))
+        chosen = commands(*arguments[:1])
+        code = _exit_code_of(lambda: chosen(list(arguments), prog_name="gaitswarm"))
         # Not left to the interpreter, which could only complain.
         flushed = _exit_code_of(stdout.flush)
     return code or flushed

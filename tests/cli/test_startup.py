@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 from functools import cache, partial
+from typing import Any
 
 import pytest
+from typer import Context
 
 from cli.exit_codes import ExitCode
+from cli.main import commands
 from services.profile import profile_job
 from sim.assembly import PHYSICS_RATE
 from sim.kernel.compiled.native import native_kernel
@@ -37,6 +40,21 @@ def test_help_is_that_of_the_innermost_command_wherever_it_is_asked_for(
         shown = gaitswarm(*words.split())
         assert (shown.code, shown.err) == (0, "")
         assert shown.out.startswith(f"Usage: gaitswarm {words.partition(' -')[0]} ")
+
+
+def test_a_command_made_alone_is_the_one_among_all() -> None:
+    every: Any = commands()
+    for name, command in every.commands.items():
+        alone: Any = commands(name)
+        assert list(alone.commands) == [name]
+        assert _help(alone, name, alone.commands[name]) == _help(every, name, command)
+    mistaken: Any = commands("fly")
+    assert list(mistaken.commands) == list(every.commands)
+
+
+def _help(root: Any, name: str, command: Any) -> str:
+    context = Context(root, info_name="gaitswarm")
+    return str(command.get_help(Context(command, context, info_name=name)))
 
 
 def test_help_after_two_dashes_is_an_argument(gaitswarm: Gaitswarm) -> None:

@@ -38,7 +38,7 @@ def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> C
     if "scenarios" in options:
         # A job's scenarios have names there, whether they are presets or its own.
         known = {scenario.name: scenario for scenario in document.get("scenarios", ())}
-        chosen = scenario_data(options["scenarios"])
+        chosen = scenario_data(options["scenarios"], options.get("robot"))
         document["scenarios"] = [
             known.get(entry, entry) if isinstance(entry, str) else entry for entry in chosen
         ]
@@ -70,7 +70,9 @@ def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[st
 
 
 def _new(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
-    found = given_design(design, options.get("controller"), server=None, db=db)
+    found = given_design(
+        design, options.get("controller"), robot=options.get("robot"), server=None, db=db
+    )
     document: dict[str, Any] = {
         "kind": "certificate",
         "name": f"certificate of {found.label}",

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from cli.inputs.job_ids import full_id
+from cli.inputs.robots import folder_defaults
 from cli.inputs.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
@@ -45,6 +46,7 @@ def given_design(
     controller: str | None,
     trajectory: Path | None = None,
     *,
+    robot: str | None = None,
     server: str | None,
     db: str | None,
 ) -> GivenDesign:
@@ -53,8 +55,10 @@ def given_design(
     Args:
         given: a JSON object, `published:NAME`, a file, `-` for standard input, or the id of a job
             that tunes a drive; `job:ID` is always a job, whatever files there are.
-        controller: of the design; None for the job's, or for fuzzy-pi.
+        controller: of the design; None for the job's, else that of the robot's folder, else
+            fuzzy-pi.
         trajectory: as for `read_design`.
+        robot: as the option names it.
         server: URL of the server to ask for the job, or None.
         db: database to look for it, or None.
 
@@ -73,7 +77,8 @@ def given_design(
         label = f"published {given.removeprefix(_PUBLISHED)}"
     else:
         label = "design" if _is_json(given) else Path(given).stem
-    chosen = _controller_name(controller or _DEFAULT_CONTROLLER)
+    named = controller or ({} if robot is None else folder_defaults(robot)).get("controller")
+    chosen = _controller_name(named or _DEFAULT_CONTROLLER)
     return GivenDesign(label, chosen, read_design(given, chosen, trajectory))
 
 

@@ -78,7 +78,7 @@ def read_walk(
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and -_HUGE < value < _HUGE):
             raise InvalidRequest("must be a finite number", field=f"design.{name}")
-    scenarios = chosen_scenarios(scenario)
+    scenarios = chosen_scenarios(scenario, robot)
     if len(scenarios) != 1:
         raise InvalidRequest("name one scenario: a log is of one walk", field="scenario")
     (chosen,) = scenarios

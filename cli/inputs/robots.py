@@ -81,26 +81,36 @@ def folder_defaults(text: str, controller: object = None) -> dict[str, Any]:
     return {k: value for k, value in defaults.items() if k not in ("variables", "fixed")}
 
 
-def scenario_data(text: str) -> list[str | dict[str, Any]]:
+def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, Any]]:
     """What a spec would hold under `scenarios`: names and numbers, and the contents of files.
 
-    text: `all`, or entries separated by commas, FILE.json for a scenario of one's own. Raises
-    InvalidRequest for a file that is not JSON.
+    Where a robot's folder has scenarios of its own, `all` and numbers are of these, and their names
+    come before those of presets.
+
+    text: `all`, or entries separated by commas, FILE.json for a scenario of one's own. robot: as
+    the option names it. Raises InvalidRequest for a file that is not JSON.
     """
     from sim.scenario import SCENARIOS
 
+    own = {} if robot is None else _named(folder_defaults(robot).get("scenarios", []))
     if text == "all":
-        return [scenario.name for scenario in SCENARIOS]
-    return [_scenario_entry(entry.strip()) for entry in text.split(",")]
+        return list(own.values()) or [scenario.name for scenario in SCENARIOS]
+    numbers = {str(number): entry for number, entry in enumerate(own.values(), start=1)}
+    entries = [entry.strip() for entry in text.split(",")]
+    return [own.get(e) or numbers.get(e) or _scenario_entry(e) for e in entries]
 
 
-def chosen_scenarios(text: str) -> tuple[Scenario, ...]:
+def _named(scenarios: list[str | dict[str, Any]]) -> dict[str, str | dict[str, Any]]:
+    return {e if isinstance(e, str) else str(e.get("name")): e for e in scenarios}
+
+
+def chosen_scenarios(text: str, robot: str | None = None) -> tuple[Scenario, ...]:
     """The scenarios of `scenario_data`. Raises SimulationInputError, InvalidRequest."""
     from sim.scenario import find_scenario
 
     return tuple(
         find_scenario(entry) if isinstance(entry, str) else _own_scenario(entry)
-        for entry in scenario_data(text)
+        for entry in scenario_data(text, robot)
     )
 
 

@@ -82,7 +82,7 @@ def build_spec(options: SpecOptions) -> AnySpec:
         data = folder_defaults(options.robot, controller) | data
     chosen = {name: value for name, value in options.given.items() if name != "spec"}
     if options.scenarios is not None:
-        chosen["scenarios"] = scenario_data(options.scenarios)
+        chosen["scenarios"] = scenario_data(options.scenarios, options.robot)
     if options.robot is not None:
         chosen["robot"] = chosen_robot(options.robot)
     case = options.case

@@ -153,6 +153,24 @@ def test_jobs_of_the_robot_have_its_controller_and_walks_unless_they_say_otherwi
     assert json.loads(capsys.readouterr().out)["controller"] == "pi"
 
 
+def test_a_design_walks_in_the_robots_own_scenarios_by_its_controller(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    design = json.dumps({"Kp": 40.0, "Kd": 1.0, "feed_forward": 0.5})
+
+    def walked(*options: str) -> list[str]:
+        command = ["simulate", "--robot", str(folder), "--design", design, *options, "--json"]
+        assert run(command) == 0
+        return list(json.loads(capsys.readouterr().out)["scenarios"])
+
+    assert walked() == walked("--scenario", "all") == ["slow", "fast"]
+    assert walked("--scenario", "fast") == walked("--scenario", "2") == ["fast"]
+    # Presets have their names there too.
+    assert walked("--scenario", "slow,normal-slow") == ["slow", "normal-slow"]
+    assert run(["gaits", "--robot", str(folder), "--scenario", "fast", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["scenario"] == "fast"
+
+
 def test_init_overwrites_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = (folder / "robot.toml").read_text(encoding="utf-8")
     urdf = folder / "robot.urdf"

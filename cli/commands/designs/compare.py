@@ -47,7 +47,7 @@ def compare(
     from sim.studies.drives import compare as compare_drives
 
     chosen = [_drive(name, server, db) for name in drives or DRIVES]
-    figures = compare_drives(chosen, chosen_scenarios(scenario), robot=chosen_robot(robot))
+    figures = compare_drives(chosen, chosen_scenarios(scenario, robot), robot=chosen_robot(robot))
     if as_json:
         print_text(json.dumps([_row(f) for f in figures], indent=2))
     else:

@@ -58,15 +58,17 @@ def firmware(
     from cli.inputs.robots import chosen_robot, chosen_scenarios
     from cli.output import print_json
     from gaitswarm.firmware import write_firmware
-    from sim.scenario import SCENARIOS
 
-    given = given_design(design, controller, server=server, db=db)
-    walks = SCENARIOS if given.spec is None else given.spec.resolved_scenarios()
+    given = given_design(design, controller, robot=robot, server=server, db=db)
+    if given.spec is None or scenarios is not None:
+        walks = chosen_scenarios(scenarios or "all", robot)
+    else:
+        walks = given.spec.resolved_scenarios()
     chosen = None if given.spec is None else given.spec.robot
     view = write_firmware(
         given.values,
         output,
-        scenarios=walks if scenarios is None else chosen_scenarios(scenarios),
+        scenarios=walks,
         controller=given.controller,
         robot=chosen_robot(robot) if robot is not None or chosen is None else chosen,
         label=given.label,

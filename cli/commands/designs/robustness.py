@@ -68,7 +68,7 @@ def robustness(
     from cli.inputs.design_file import given_design
     from cli.output import print_json
 
-    given = given_design(design, controller, server=server, db=db)
+    given = given_design(design, controller, robot=robot, server=server, db=db)
     request = robustness_request(
         given,
         samples=samples,
@@ -112,7 +112,7 @@ def robustness_request(
         "radius": radius,
         "seed": seed,
         "precision": precision or "double",
-        "scenarios": scenario_data(scenarios or "all"),
+        "scenarios": scenario_data(scenarios or "all", robot),
         "robot": chosen_robot(robot),
     }
     if given.spec is not None:

@@ -31,14 +31,15 @@ def simulate(
     controller: Annotated[
         str | None,
         typer.Option(
-            help="fuzzy-pi, fuzzy-pi-3, p, pi or pid [default: the job's, else fuzzy-pi]."
+            help="fuzzy-pi, fuzzy-pi-3, p, pi or pid [default: the job's, else that of the robot's"
+            " folder, else fuzzy-pi]."
         ),
     ] = None,
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Name, number or FILE.json, several separated by commas, or all [default: the"
-            " job's, else all]."
+            help="Name, number or FILE.json, several separated by commas, or all; of the robot's"
+            " folder, if it has some, else of the six of table 4.2 [default: the job's, else all]."
         ),
     ] = None,
     trajectory: Annotated[
@@ -80,12 +81,12 @@ def simulate(
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
-    given = given_design(design, controller, trajectory, server=server, db=db)
+    given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
     data: dict[str, Any] = {
         "robot": chosen_robot(robot),
         "controller": given.controller,
         "design": given.values,
-        "scenarios": scenario_data(scenario or "all"),
+        "scenarios": scenario_data(scenario or "all", robot),
         "preference": preference or "A",
         "precision": precision or "double",
         "log": log is not None,

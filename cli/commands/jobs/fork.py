@@ -89,7 +89,7 @@ def fork(
         "preference": None if preference is None else preference_choice(preference),
         "optimizer": optimizer_choice(optimizer, optimizer_settings),
         "particles": particles,
-        "scenarios": None if scenarios is None else scenario_data(scenarios),
+        "scenarios": None if scenarios is None else scenario_data(scenarios, robot),
         "robot": None if robot is None else chosen_robot(robot),
         "iterations": iterations,
         "start_count": start_count,

@@ -55,16 +55,9 @@ def gaits(
 def _scenario(given: str | None, robot: str | None) -> Scenario:
     from cli.inputs.robots import chosen_scenarios, folder_defaults
     from services.optimizer.errors import InvalidRequest
-    from sim.scenario import Scenario, find_scenario
 
-    own = [
-        find_scenario(entry) if isinstance(entry, str) else Scenario.model_validate(entry)
-        for entry in ({} if robot is None else folder_defaults(robot)).get("scenarios", [])
-    ]
-    if given is None:
-        return own[0] if own else find_scenario("normal-slow")
-    named = [scenario for scenario in own if scenario.name == given]
-    chosen = named or chosen_scenarios(given)
+    own = robot is not None and "scenarios" in folder_defaults(robot)
+    chosen = chosen_scenarios(given or ("1" if own else "normal-slow"), robot)
     if len(chosen) != 1:
         raise InvalidRequest("one scenario, not several", field="scenario")
     return chosen[0]

@@ -43,7 +43,7 @@ def mjcf(
     from sim.robot import load_robot
 
     machine = load_robot(chosen_robot(robot))
-    chosen = chosen_scenarios(scenario)
+    chosen = chosen_scenarios(scenario, robot)
     if len(chosen) != 1:
         raise InvalidRequest("one scenario, not several", field="scenario")
     check_installed()

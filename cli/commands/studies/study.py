@@ -53,7 +53,9 @@ def tables(
 
     values = read_design(design, "fuzzy-pi")
     _show(
-        tables_against_inference(values, chosen_scenarios(scenario), robot=chosen_robot(robot)),
+        tables_against_inference(
+            values, chosen_scenarios(scenario, robot), robot=chosen_robot(robot)
+        ),
         as_json=as_json,
     )
 
@@ -71,7 +73,7 @@ def steps(
     from sim.studies.accuracy import step_halving
 
     values = read_design(design, controller)
-    chosen = chosen_scenarios(scenario)
+    chosen = chosen_scenarios(scenario, robot)
     _show(step_halving(controller, values, chosen, robot=chosen_robot(robot)), as_json=as_json)
 
 
@@ -97,7 +99,7 @@ def noise(
     from sim.studies.accuracy import noise_on_links
 
     values = read_design(design, controller)
-    chosen = chosen_scenarios(scenario)
+    chosen = chosen_scenarios(scenario, robot)
     machine = chosen_robot(robot)
     found = noise_on_links(
         controller, values, chosen, robot=machine, kind=kind, deviation=deviation

@@ -16,9 +16,9 @@ from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from tests.examples.forked import ForkedCommand
-from tests.examples.processes import line_with
+from tests.examples.processes import eventually, line_with
 from tests.examples.servers import Server
-from tests.monitoring.scraped import parsed, scraped
+from tests.monitoring.scraped import Scrape, parsed, scraped
 
 
 def test_metrics_are_for_every_token_where_tokens_are_asked_for(store: SqlStore) -> None:
@@ -142,9 +142,16 @@ def test_a_runner_serves_its_own_metrics_but_not_the_databases(database: Path) -
     process = ForkedCommand(*options, environment={"GAITSWARM_METRICS_PORT": "0"}, stdout=None)
     try:
         url = line_with(process.stderr, r"metrics: (http://\S+)")[1]
-        scrape = parsed(httpx2.get(url).text)
+        seen: list[Scrape] = []
+
+        def has_asked_the_database() -> bool:
+            seen.append(parsed(httpx2.get(url, timeout=60.0).text))
+            return bool(seen[-1].labels("gaitswarm_database_operation_duration_seconds_count"))
+
+        # It is ready before it looks for a job.
+        eventually(has_asked_the_database)
+        scrape = seen[-1]
         assert scrape.value("gaitswarm_worker_slots", workers="threads") == 2
-        assert scrape.labels("gaitswarm_database_operation_duration_seconds_count")
         assert not scrape.labels("gaitswarm_jobs") and not scrape.labels("gaitswarm_queue_jobs")
     finally:
         process.terminate()

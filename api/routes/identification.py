@@ -16,6 +16,10 @@ from sim.identification.recorded_walk import RecordedWalk
 
 RecordingBody = Annotated[RecordedWalk, Depends(validated(RecordedWalk, "walk"))]
 
+RecordingId = Annotated[
+    str, Path(pattern=r"^[0-9a-f]{32}$", description="Id, as POST /v1/recordings answered it.")
+]
+
 router = APIRouter(prefix=PREFIX)
 
 
@@ -48,15 +52,21 @@ def add_recording(
     summary="Look at a recorded walk",
     responses=problems(404, 409, 422),
 )
-def get_recording(
-    recording_id: Annotated[
-        str,
-        Path(pattern=r"^[0-9a-f]{32}$", description="Id, as POST /v1/recordings answered it."),
-    ],
-    service: Service,
-) -> RecordedWalk:
+def get_recording(recording_id: RecordingId, service: Service) -> RecordedWalk:
     """The whole recording, as it was given."""
     return service.recording(recording_id)
+
+
+@router.get(
+    "/recordings/{recording_id}/summary",
+    tags=["recordings"],
+    operation_id="get_recording_summary",
+    summary="Look at a recorded walk without its numbers",
+    responses=problems(404, 409, 422),
+)
+def get_recording_summary(recording_id: RecordingId, service: Service) -> RecordingView:
+    """What was walked, how long, and the mean current; the answer that the recording got."""
+    return RecordingView.from_walk(recording_id, service.recording(recording_id))
 
 
 @router.get(

@@ -70,6 +70,7 @@ def test_the_routes_are_these(document: Document) -> None:
         "post /v1/estimates",
         "post /v1/recordings",
         "get /v1/recordings/{recording_id}",
+        "get /v1/recordings/{recording_id}/summary",
         "post /v1/simulations",
         "post /v1/replays",
         "post /v1/robustness",

@@ -30,6 +30,7 @@ def test_a_recording_is_kept_and_can_be_looked_at(client: httpx2.Client) -> None
     assert (glance["rows"], glance["joints"], glance["mean_current"]) == (10, 18, 0.125)
     again = client.get(answer.headers["Location"]).json()
     assert again["current"] == WALK["current"]
+    assert client.get(f"{answer.headers['Location']}/summary").json() == glance
 
 
 def test_the_same_recording_again_is_the_same(client: httpx2.Client) -> None:

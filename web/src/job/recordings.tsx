@@ -2,26 +2,16 @@
 
 import { get } from '../api/client'
 import { type Resource, useResource } from '../api/resource'
-import type { Job, RecordedWalk } from '../api/types'
+import type { Job, RecordingView } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { Table } from '../components/table'
 import { formatNumber } from '../format/number'
 
-/** A recording in short; its currents are many. */
-export interface RecordingSummary {
+/** A recording without its numbers, which are many. */
+export interface RecordingSummary extends RecordingView {
   /** As results name it: the beginning of its id. */
   readonly caseName: string
-  readonly scenario: string
-  readonly controller: string
-  /** Time that is compared [s]. */
-  readonly seconds: number
-  /** Mean absolute motor current [A]. */
-  readonly current: number
-  readonly synthetic: boolean
 }
-
-/** Rows of a recording in a second. */
-const RATE = 500
 
 /** Those of the job, in its order; of other jobs none are asked for. */
 export function useRecordings(job: Job): Resource<readonly RecordingSummary[]> {
@@ -30,9 +20,10 @@ export function useRecordings(job: Job): Resource<readonly RecordingSummary[]> {
   return useResource(ids.length === 0 ? null : ids.join(), (signal) =>
     Promise.all(
       ids.map((id, k) =>
-        get('/v1/recordings/{recording_id}', { path: { recording_id: id }, signal }).then((walk) =>
-          summaryOf(job.scenarios[k], walk),
-        ),
+        get('/v1/recordings/{recording_id}/summary', {
+          path: { recording_id: id },
+          signal,
+        }).then((recording) => ({ ...recording, caseName: job.scenarios[k] })),
       ),
     ),
   )
@@ -45,18 +36,6 @@ export function caseLabel(
 ): string {
   const found = recordings?.find((recording) => recording.caseName === caseName)
   return found ? `${found.scenario} (${caseName})` : caseName
-}
-
-function summaryOf(caseName: string, { scenario, controller, current, synthetic }: RecordedWalk) {
-  const numbers = current.flat()
-  return {
-    caseName,
-    scenario: scenario.name,
-    controller,
-    seconds: current.length / RATE,
-    current: numbers.reduce((sum, value) => sum + Math.abs(value), 0) / numbers.length,
-    synthetic,
-  }
 }
 
 export function RecordingsCard({
@@ -103,8 +82,8 @@ export function RecordingsCard({
               label: 'Mean current',
               unit: 'A',
               numeric: true,
-              value: (r) => r.current,
-              cell: (r) => formatNumber(r.current, 3),
+              value: (r) => r.mean_current,
+              cell: (r) => formatNumber(r.mean_current, 3),
             },
           ]}
         />

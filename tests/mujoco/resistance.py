@@ -6,6 +6,7 @@ The step is ours alone, and so are these derivatives; MuJoCo's own steps do with
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import mujoco
 import numpy as np
@@ -109,6 +110,7 @@ _DRAGS: Mapping[type[Ground], Callable[..., Drag]] = {
 }
 
 
+@lru_cache(maxsize=4)
 def mobility(robot: Robot) -> Floats:
     """Acceleration per force of every foot against the rotors' inertia, the leg stretched and the
     body held, (L,) [1/kg]; so much or less a force accelerates it."""
@@ -123,7 +125,9 @@ def mobility(robot: Robot) -> Floats:
             body = exported.jnt_bodyid[exported.joint(name).id]
             reach += float(np.linalg.norm(exported.body_pos[body]))
         found.append(total)
-    return np.array(found)
+    result = np.array(found)
+    result.flags.writeable = False
+    return result
 
 
 def feet_of(d: mujoco.MjData) -> tuple[Floats, Floats]:

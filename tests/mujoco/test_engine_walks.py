@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import cycle
 
 import numpy as np
@@ -33,14 +33,19 @@ DRIVES: Mapping[str, tuple[str, Mapping[str, float], type[Coded]]] = {
 ENERGY, RECIPROCAL_SPEED = 3, 4
 
 
-def one_cycle(scenario: Scenario) -> Scenario:
-    """A third of the walk, in which every foot has been lifted and set down."""
-    return scenario.model_copy(update={"cycles": 1.0})
+def cycles(number: float, scenario: Scenario) -> Scenario:
+    """So much of the walk."""
+    return scenario.model_copy(update={"cycles": number})
 
 
-def into_the_second_cycle(scenario: Scenario) -> Scenario:
-    """One and a half cycles: the second begins where the first one ended."""
-    return scenario.model_copy(update={"cycles": 1.5})
+one_cycle = partial(cycles, 1.0)
+"""A third of the walk, in which every foot has been lifted and set down."""
+
+into_the_second_cycle = partial(cycles, 1.5)
+"""One and a half cycles: the second begins where the first one ended."""
+
+half_a_cycle = partial(cycles, 0.5)
+"""Half of the feet have been lifted and set down: enough to see how they stand and slip."""
 
 
 def named(value: object) -> str:
@@ -86,11 +91,11 @@ def deviations(trace: Trace | WalkLog, log: WalkLog, seconds: float = np.inf) ->
         (PLAIN, "stiff PI", one_cycle(NORMAL_FAST)),
         (DEFAULT, "stiff PI", one_cycle(SLOPE_FAST)),
         (PLAIN, "published optimum A", one_cycle(LOADED_FAST)),
-        (KARNOPP, "stiff PI", one_cycle(NORMAL_FAST)),
-        (DEAD_ZONE, "stiff PI", one_cycle(NORMAL_FAST)),
-        (STICK, "published optimum A", one_cycle(SLOPE_FAST)),
+        (KARNOPP, "stiff PI", half_a_cycle(NORMAL_FAST)),
+        (DEAD_ZONE, "stiff PI", half_a_cycle(NORMAL_FAST)),
+        (STICK, "published optimum A", half_a_cycle(SLOPE_FAST)),
         # Impacts in the gears amplify rounding: a longer walk would not stay as near.
-        (LOOSE, "published optimum A", SLOPE_FAST.model_copy(update={"cycles": 0.25})),
+        (LOOSE, "published optimum A", cycles(0.15, SLOPE_FAST)),
     ],
     ids=named,
 )

@@ -94,9 +94,11 @@ def list_evaluations(
     Raw objectives are as simulated; utilities follow from them and the job's preference.
     """
     job = service.job(job_id)
+    # Nothing is told of a job whose spec can no longer be read, be it remembered or not.
+    spec = job.spec
 
     def encoded() -> bytes:
-        return encoded_evaluations(service.evaluations(job.id, iteration), job.spec)
+        return encoded_evaluations(service.evaluations(job.id, iteration), spec)
 
     return remembered.of_history(("evaluations", job.id, iteration), encoded).answer(request)
 

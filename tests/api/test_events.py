@@ -202,7 +202,8 @@ def test_a_waiting_stream_holds_no_transaction(serve: Serve, database: Path, job
     server = serve(api_event_poll_seconds=30.0)
 
     with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
-        next(parsed(answer.iter_lines()))
+        stream = parsed(answer.iter_lines())
+        next(stream)
         with closing(sqlite3.connect(database)) as connection:
             # SQLite can empty its write-ahead log only while nobody reads or writes.
             busy, _, _ = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()

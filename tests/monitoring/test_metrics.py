@@ -101,9 +101,12 @@ def test_streams_count_as_long_as_somebody_listens(service: JobService, store: S
     server = Server(service, metrics=metrics)
     try:
         with server.client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
+            # The stream ends with the last reference to its lines.
+            lines = answer.iter_lines()
             # Before its first event, a stream may send a comment.
-            assert any(line.startswith("event:") for line in answer.iter_lines())
+            assert any(line.startswith("event:") for line in lines)
             assert of(metrics).value("gaitswarm_event_streams") == 1
+            del lines
         eventually(lambda: of(metrics).value("gaitswarm_event_streams") == 0)
     finally:
         server.close()

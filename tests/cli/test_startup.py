@@ -53,7 +53,7 @@ def test_a_command_made_alone_is_the_one_among_all() -> None:
 
 
 def _help(root: Any, name: str, command: Any) -> str:
-    context = Context(root, info_name="gaitswarm")
+    context = Context(root, info_name="gaitswarm", **root.context_settings)
     return str(command.get_help(Context(command, context, info_name=name)))
 
 

@@ -92,7 +92,7 @@ def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, A
     """
     from sim.scenario import SCENARIOS
 
-    own = {} if robot is None else _named(folder_defaults(robot).get("scenarios", []))
+    own = {} if robot is None else _own_scenarios(robot)
     if text == "all":
         return list(own.values()) or [scenario.name for scenario in SCENARIOS]
     numbers = {str(number): entry for number, entry in enumerate(own.values(), start=1)}
@@ -100,8 +100,16 @@ def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, A
     return [own.get(e) or numbers.get(e) or _scenario_entry(e) for e in entries]
 
 
-def _named(scenarios: list[str | dict[str, Any]]) -> dict[str, str | dict[str, Any]]:
-    return {e if isinstance(e, str) else str(e.get("name")): e for e in scenarios}
+def _own_scenarios(robot: str) -> dict[str, str | dict[str, Any]]:
+    """Those of a robot's folder by name, which may be a preset's number. Raises InvalidRequest."""
+    found = folder_defaults(robot).get("scenarios", [])
+    if not isinstance(found, list) or not all(isinstance(e, str | int | dict) for e in found):
+        raise InvalidRequest(
+            "its job.json must have a list under scenarios, of names, numbers or objects",
+            field="robot",
+        )
+    entries = [str(e) if isinstance(e, int) else e for e in found]
+    return {e if isinstance(e, str) else str(e.get("name")): e for e in entries}
 
 
 def chosen_scenarios(text: str, robot: str | None = None) -> tuple[Scenario, ...]:

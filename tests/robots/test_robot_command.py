@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -154,7 +155,7 @@ def test_jobs_of_the_robot_have_its_controller_and_walks_unless_they_say_otherwi
 
 
 def test_a_design_walks_in_the_robots_own_scenarios_by_its_controller(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     design = json.dumps({"Kp": 40.0, "Kd": 1.0, "feed_forward": 0.5})
 
@@ -167,6 +168,14 @@ def test_a_design_walks_in_the_robots_own_scenarios_by_its_controller(
     assert walked("--scenario", "fast") == walked("--scenario", "2") == ["fast"]
     # Presets have their names there too.
     assert walked("--scenario", "slow,normal-slow") == ["slow", "normal-slow"]
+    copy = Path(shutil.copytree(folder, tmp_path / "dog"))
+    job = json.loads((copy / "job.json").read_text(encoding="utf-8"))
+    for scenarios, code in (([2], 0), ("slow", 2), ([None], 2)):
+        (copy / "job.json").write_text(json.dumps({**job, "scenarios": scenarios}))
+        assert run(["simulate", "--robot", str(copy), "--design", design, "--json"]) == code
+    said = capsys.readouterr()
+    assert list(json.loads(said.out)["scenarios"]) == ["normal-slow"]
+    assert "robot: its job.json must have a list under scenarios" in said.err
     assert run(["gaits", "--robot", str(folder), "--scenario", "fast", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["scenario"] == "fast"
 

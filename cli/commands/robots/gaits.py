@@ -56,7 +56,7 @@ def _scenario(given: str | None, robot: str | None) -> Scenario:
     from cli.inputs.robots import chosen_scenarios, folder_defaults
     from services.optimizer.errors import InvalidRequest
 
-    own = robot is not None and "scenarios" in folder_defaults(robot)
+    own = None if robot is None else folder_defaults(robot).get("scenarios")
     chosen = chosen_scenarios(given or ("1" if own else "normal-slow"), robot)
     if len(chosen) != 1:
         raise InvalidRequest("one scenario, not several", field="scenario")

@@ -30,8 +30,15 @@ def test_a_link_shows_what_was_seen(
     expect(selected).to_have_attribute("data-selected", SOME_OF_48)
     before = str(selected.get_attribute("data-selected"))
     page.get_by_text("Select by numbers").click()
-    page.get_by_label("FI1R to").fill("2500")
-    page.get_by_label("FI1R to").blur()
+    field = page.get_by_label("FI1R to")
+    field.fill("2500")
+    # What is typed outlasts what is drawn anew meanwhile, as by the news of a running job.
+    redrawn = page.get_by_label("objectives too")
+    for shown in (True, False):
+        redrawn.evaluate("box => box.click()")
+        expect(redrawn).to_be_checked(checked=shown)
+        expect(field).to_have_value("2500")
+    field.blur()
     expect(page).to_have_url(re.compile(r"brush=FI1R%3A1500%3A2500$"))
     expect(selected).not_to_have_attribute("data-selected", before)
     seen = str(selected.get_attribute("data-selected"))

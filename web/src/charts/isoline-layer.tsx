@@ -1,6 +1,7 @@
 /** Isolines over a map, with the level that each stands for. */
 
 import type { Isoline } from './isolines'
+import './isolines.css'
 
 /** Thousandths of the map's width and height. */
 const SIDE = 1000

@@ -166,8 +166,13 @@ def test_sequences_along_the_links_of_the_document_are_answered_as_documented() 
     """The short version of `python -m tests.api.conformance`."""
     found = Found()
     with served() as (server, ids):
-        sequences(schema_of(server, ids), server.url, found, 60)
+        schema = schema_of(server, ids)
+        # Others every time: among 60 requests, now and then none submits a good job.
+        for _ in range(10):
+            sequences(schema, server.url, found, 60)
+            seen = {status for _, status in found.answers}
+            # Some have followed a job that they had submitted, or found.
+            if {200, 202, 409} <= seen:
+                break
     assert found.failures == {}
-    assert found.cases >= 60
-    # Some have followed a job that they had submitted, or found.
-    assert {200, 202, 409} <= {status for _, status in found.answers}
+    assert {200, 202, 409} <= seen

@@ -114,7 +114,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
     friction = np.array([contact.friction for contact in robot.contacts()])
     rng = np.random.default_rng(7)
     held, slid, worst = 0, 0, 0.0
-    for _ in range(300):
+    for _ in range(150):
         q, v = random_state(rng, robot.n_joints)
         v *= 10.0 ** rng.uniform(-4.0, 0.0)
         gears = own_gears(robot, q[7:])
@@ -138,7 +138,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
         twist = attitude.T @ d.qacc[:3] - np.cross(v[3:6], v[:3])
         expected = np.concatenate([twist, d.qacc[3:]])
         worst = max(worst, float(np.abs(found - expected).max() / np.abs(expected).max()))
-    assert min(held, slid) > 20
+    assert min(held, slid) > 8
     assert worst < 1e-9
 
 
@@ -156,7 +156,7 @@ def test_a_kick_changes_velocities_and_what_is_carried_alike(variant: str, times
     d = mujoco.MjData(exported)
     rng = np.random.default_rng(11)
     landings, carried, damped, worst = 0, 0.0, 0.0, 0.0
-    for _ in range(200):
+    for _ in range(100):
         q, v = random_state(rng, robot.n_joints)
         v *= 10.0 ** rng.uniform(-4.0, 0.0)
         into(d, q, v)
@@ -189,7 +189,7 @@ def test_a_kick_changes_velocities_and_what_is_carried_alike(variant: str, times
     assert worst < 1e-9
     assert damped > 1e-3
     assert carried > 0.0 or remembered.size == 0
-    assert 10 < landings < 190
+    assert 5 < landings < 95
 
 
 def remember_anything(

@@ -88,9 +88,7 @@ def deviations(trace: Trace | WalkLog, log: WalkLog, seconds: float = np.inf) ->
     ("variant", "drive", "scenario"),
     [
         (DEFAULT, "published optimum A", into_the_second_cycle(LOADED_FAST)),
-        (PLAIN, "stiff PI", one_cycle(NORMAL_FAST)),
-        (DEFAULT, "stiff PI", one_cycle(SLOPE_FAST)),
-        (PLAIN, "published optimum A", one_cycle(LOADED_FAST)),
+        (PLAIN, "stiff PI", half_a_cycle(SLOPE_FAST)),
         (KARNOPP, "stiff PI", half_a_cycle(NORMAL_FAST)),
         (DEAD_ZONE, "stiff PI", half_a_cycle(NORMAL_FAST)),
         (STICK, "published optimum A", half_a_cycle(SLOPE_FAST)),
@@ -131,8 +129,8 @@ def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
 @pytest.mark.parametrize(
     ("variant", "drive"),
     [
-        *((DEFAULT, drive) for drive in DRIVES),
-        *((PLAIN, drive) for drive in DRIVES),
+        (DEFAULT, "published optimum A"),
+        (PLAIN, "stiff PI"),
         (KARNOPP, "published optimum A"),
         (STICK, "stiff PI"),
         (LOOSE, "stiff PI"),

@@ -11,8 +11,8 @@ import pytest
 
 from sim.errors import RobotFileError
 from sim.kernel.compiled.native import native_kernel
+from sim.kernel.dynamics.kinds import robot_constants
 from sim.kernel.dynamics.tree import leaves
-from sim.kernel.emitted.kinds import robot_constants
 from sim.kernel.emitted.source import kernel_identity, kernel_source
 from sim.outcome import Status
 from sim.robot import SHIPPED, Robot, RobotFiles, load_robot

@@ -16,7 +16,7 @@ from sim.compiler.compilation import build_library, load_library, vector_header
 from sim.compiler.toolchain import COMPILER_MEMORY
 from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.compiled.native import NativeKernel, native_kernel, text_size
-from sim.kernel.emitted.kinds import robot_constants
+from sim.kernel.dynamics.kinds import robot_constants
 from sim.kernel.parameters import Layout
 from sim.robot import DEFAULT_ROBOT, Robot, RobotFiles, load_robot
 from sim.simulate import prepare
@@ -184,7 +184,7 @@ def test_a_compiler_has_limits_of_memory_and_of_a_processors_time(tmp_path: Path
 LOAD_QUADRUPED = """
 import os
 from pathlib import Path
-from sim.kernel.emitted.kinds import robot_constants
+from sim.kernel.dynamics.kinds import robot_constants
 from sim.kernel.compiled.native import native_kernel
 from sim.robot import RobotFiles, load_robot
 files = Path(os.environ["FILES"])
@@ -195,7 +195,7 @@ COMPILE_ANOTHER = """
 import os, threading
 from pathlib import Path
 from sim.errors import KernelBuildError, SimulationInputError
-from sim.kernel.emitted.kinds import robot_constants
+from sim.kernel.dynamics.kinds import robot_constants
 from sim.kernel.compiled.native import native_kernel
 from sim.robot import load_robot
 def compile_another():

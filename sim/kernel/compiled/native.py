@@ -21,7 +21,7 @@ from sim.errors import KernelBuildError, SimulationInputError
 from sim.kernel.compiled.derivation import derived_source
 from sim.kernel.compiled.lanes import plan_lanes
 from sim.kernel.compiled.sharing import STRUCTURES, Pool
-from sim.kernel.emitted.kinds import robot_constants
+from sim.kernel.dynamics.kinds import robot_constants
 from sim.kernel.emitted.source import kernel_identity
 from sim.kernel.gains import check_gains
 from sim.kernel.parameters import Layout, internal_state_size

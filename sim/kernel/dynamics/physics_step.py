@@ -7,20 +7,23 @@ the tests hold against Pinocchio and MuJoCo. The compiled kernel has the same fo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, reduce
-from typing import Any
+from functools import cached_property, lru_cache, reduce
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 
+from sim.kernel.dynamics.articulated_body import LinkState
 from sim.kernel.dynamics.body import body_integrands, body_of, body_state, drifted, pushed, solved
 from sim.kernel.dynamics.drives import battery_voltage
 from sim.kernel.dynamics.inertia import Force
-from sim.kernel.dynamics.limb import After, Before, Environment, LimbState, after, before
+from sim.kernel.dynamics.kinds import LimbKind, limb_kinds
+from sim.kernel.dynamics.limb import After, Before, Environment, LimbState, Scalars, after, before
 from sim.kernel.dynamics.spatial import Scalar, add
+from sim.kernel.dynamics.tree import Traced
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.robot import Robot
 from sim.robot.chain import Placement
@@ -28,10 +31,12 @@ from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.inertia import BodyInertia
 from sim.robot.limbs import Limb, electrical_constants, limb_of, limbs_of
 
+P = ParamSpec("P")
+T = TypeVar("T")
 
-@dataclass(frozen=True, slots=True, eq=False)
+
 class PhysicsModel:
-    """CasADi functions of one robot.
+    """CasADi functions of one robot, each derived when it is first asked for.
 
     Their inputs are q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its
     own frame, joint rates; internal_state (I), as `parameters.internal_state_size` says; duty (J):
@@ -40,30 +45,78 @@ class PhysicsModel:
     further; parameters (P), as `parameters.Layout` says.
 
     Attributes:
-        kick: to v and internal state after a step at these positions, current (J), integrands (8)
-            and largest absolute current (1) at its middle; landing (1), 1 if a foot may come down
-            within `limb.LANDING_HORIZON`.
-        drift: from q, v, internal state and time (1) [s] to q and internal state then.
-        observe: to current (J), voltage (J), load torque (J), foot force in the world (3 L), supply
-            (1) and acceleration (6+J) as `pinocchio.aba` gives it, all at this instant.
         layout: of the parameters.
     """
 
-    kick: Any
-    drift: Any
-    observe: Any
-    layout: Layout
+    def __init__(self, robot: Robot) -> None:
+        """Read a robot's URDF; `physics_model` keeps what was made of it.
 
+        Args:
+            robot: The robot.
 
-@dataclass(frozen=True, slots=True)
-class _Symbols:
-    q: list[Scalar]
-    v: list[Scalar]
-    internal_state: list[Scalar]
-    duty: list[Scalar]
-    disturbance: list[Scalar]
-    p: dict[str, list[Scalar]]
-    inputs: tuple[Any, ...]
+        Raises:
+            RobotFileError: The tree is not one that can be simulated.
+        """
+        self.layout = Layout(robot)
+        self._robot = robot
+        self._limbs = _limbs_by_pinocchio(robot)
+        self._symbols = _symbols(robot, self.layout)
+
+    @cached_property
+    def kick(self) -> Any:
+        """To v and internal state after a step at these positions, current (J), integrands (8) and
+        largest absolute current (1) at its middle; landing (1), 1 if a foot may come down within
+        `limb.LANDING_HORIZON`.
+        """
+        step = self._step(self._symbols.p["timestep"][0])
+        return _function(
+            "kick",
+            self._symbols.inputs,
+            [
+                step.velocity,
+                step.internal_state,
+                step.by_joint("currents"),
+                step.integrands(),
+                [step.tallies()[-2]],
+                [step.tallies()[-1]],
+            ],
+        )
+
+    @cached_property
+    def drift(self) -> Any:
+        """From q, v, internal state and time (1) [s] to q and internal state then."""
+        s, n = self._symbols, self._robot.n_joints
+        time = ca.SX.sym("time")
+        motors = s.internal_state[: 2 * n] if self._robot.has_backlash else []
+        angles = [angle + time * rate for angle, rate in zip(motors[:n], motors[n:], strict=True)]
+        return _function(
+            "drift",
+            (*s.inputs[:3], time),
+            [drifted(s.q, s.v, time), [*angles, *s.internal_state[len(angles) :]]],
+        )
+
+    @cached_property
+    def observe(self) -> Any:
+        """To current (J), voltage (J), load torque (J), foot force in the world (3 L), supply (1)
+        and acceleration (6+J) as `pinocchio.aba` gives it, all at this instant.
+        """
+        # Forces that depend on velocity are those of the velocities given.
+        still = self._step(0.0)
+        return _function(
+            "observe",
+            self._symbols.inputs,
+            [
+                still.by_joint("currents"),
+                [drive.voltage for limb in still.before for drive in limb.held.drives],
+                still.by_joint("loads"),
+                [component for limb in still.before for component in limb.foot_force],
+                [still.supply],
+                [*still.acceleration, *still.by_joint("accelerations")],
+            ],
+        )
+
+    def _step(self, timestep: Scalar) -> _Step:
+        return _step(self._robot, self._limbs, self.layout, self._symbols, timestep)
 
 
 @lru_cache(maxsize=8)
@@ -79,48 +132,18 @@ def physics_model(robot: Robot) -> PhysicsModel:
     Raises:
         RobotFileError: The tree is not one that can be simulated.
     """
-    limbs = _limbs_by_pinocchio(robot)
-    layout = Layout(robot)
-    s = _symbols(robot, layout)
-    kick = _step(robot, limbs, layout, s, s.p["timestep"][0])
-    # At an instant: forces that depend on velocity are those of the velocities given.
-    still = _step(robot, limbs, layout, s, 0.0)
-    n = robot.n_joints
-    time = ca.SX.sym("time")
-    motors = s.internal_state[: 2 * n] if robot.has_backlash else []
-    angles = [angle + time * rate for angle, rate in zip(motors[:n], motors[n:], strict=True)]
-    return PhysicsModel(
-        kick=_function(
-            "kick",
-            s.inputs,
-            [
-                kick.velocity,
-                kick.internal_state,
-                kick.by_joint("currents"),
-                kick.integrands(),
-                [kick.tallies()[-2]],
-                [kick.tallies()[-1]],
-            ],
-        ),
-        drift=_function(
-            "drift",
-            (*s.inputs[:3], time),
-            [drifted(s.q, s.v, time), [*angles, *s.internal_state[len(angles) :]]],
-        ),
-        observe=_function(
-            "observe",
-            s.inputs,
-            [
-                still.by_joint("currents"),
-                [drive.voltage for limb in still.before for drive in limb.held.drives],
-                still.by_joint("loads"),
-                [component for limb in still.before for component in limb.foot_force],
-                [still.supply],
-                [*still.acceleration, *still.by_joint("accelerations")],
-            ],
-        ),
-        layout=layout,
-    )
+    return PhysicsModel(robot)
+
+
+@dataclass(frozen=True, slots=True)
+class _Symbols:
+    q: list[Scalar]
+    v: list[Scalar]
+    internal_state: list[Scalar]
+    duty: list[Scalar]
+    disturbance: list[Scalar]
+    p: dict[str, list[Scalar]]
+    inputs: tuple[Any, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,29 +197,23 @@ def _step(
     )
     environment = Environment(timestep, supply, *s.p["displaced"])
     body, own = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)
+
+    def limb_before(
+        limb: Limb, base: LinkState, state: LimbState, around: Environment, p: tuple[Scalars, ...]
+    ) -> Before:
+        return before(limb, law, base, state, around, dict(zip(layout.by_limb, p, strict=True)))
+
+    before_of, after_of = _ByKind(limbs, limb_before), _ByKind(limbs, after)
+    parts = s.q[7:], s.v[6:], s.duty, s.disturbance, motors[:n], motors[n:], carried
     befores = [
-        before(
-            limb,
-            law,
+        before_of(
+            k,
             body,
-            LimbState(
-                *(
-                    _of_limb(values, k, len(limbs))
-                    for values in (
-                        s.q[7:],
-                        s.v[6:],
-                        s.duty,
-                        s.disturbance,
-                        motors[:n],
-                        motors[n:],
-                        carried,
-                    )
-                )
-            ),
+            LimbState(*(_of_limb(values, k, len(limbs)) for values in parts)),
             environment,
-            {name: _of_limb(s.p[name], k, len(limbs)) for name in layout.by_limb},
+            tuple(_of_limb(s.p[name], k, len(limbs)) for name in layout.by_limb),
         )
-        for k, limb in enumerate(limbs)
+        for k in range(len(limbs))
     ]
     inertia, force = own.inertia(), body.force(own)
     force = Force(add(force.linear, pushed(body, s.p["push"])), force.angular)
@@ -204,8 +221,8 @@ def _step(
         inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
     falling, true = solved(body, inertia, force)
     afters = [
-        after(limb, found.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
-        for k, (limb, found) in enumerate(zip(limbs, befores, strict=True))
+        after_of(k, found.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
+        for k, found in enumerate(befores)
     ]
     twist = [*true.linear, *true.angular]
     faster = [old + timestep * rate for old, rate in zip(s.v[:6], twist, strict=True)]
@@ -222,6 +239,27 @@ def _step(
         ],
         of_body=body_integrands(body, true, timestep),
     )
+
+
+class _ByKind(Generic[P, T]):
+    """A function of limbs, traced once for all of a kind."""
+
+    def __init__(self, limbs: Sequence[Limb], function: Callable[Concatenate[Limb, P], T]) -> None:
+        self._limbs = list(zip(limbs, limb_kinds(limbs), strict=True))
+        self._function = function
+        self._traced: dict[LimbKind, Traced[..., T]] = {}
+
+    def __call__(self, number: int, *arguments: P.args, **named: P.kwargs) -> T:
+        limb, kind = self._limbs[number]
+        constants = tuple(kind.numbers_of(limb))
+        if kind not in self._traced:
+
+            def of_constants(symbols: Scalars, *rest: P.args, **more: P.kwargs) -> T:
+                return self._function(kind.symbolic(limb, symbols), *rest, **more)
+
+            examples = tuple(ca.SX.sym("constant") for _ in constants)
+            self._traced[kind] = Traced(of_constants, examples, *arguments, **named)
+        return self._traced[kind](constants, *arguments, **named)
 
 
 def _of_limb(values: Sequence[Scalar], k: int, n_limbs: int) -> tuple[Scalar, ...]:

@@ -17,11 +17,11 @@ from sim.kernel.dynamics.articulated_body import LinkState
 from sim.kernel.dynamics.body import body_integrands, body_of, body_state, pushed, solved
 from sim.kernel.dynamics.drives import battery_voltage
 from sim.kernel.dynamics.inertia import Force, Inertia, Motion
+from sim.kernel.dynamics.kinds import LimbKind, limb_kinds
 from sim.kernel.dynamics.limb import Environment, Held, LimbState, after, before
 from sim.kernel.dynamics.spatial import Scalar
 from sim.kernel.dynamics.tree import leaves, mapped
 from sim.kernel.emitted.emit_c import emit_c
-from sim.kernel.emitted.kinds import LimbKind, limb_kinds
 from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
 from sim.robot import Robot
 from sim.robot.description import JOINTS_PER_LEG

@@ -9,7 +9,7 @@ from importlib import metadata, resources
 from typing import TYPE_CHECKING, Final
 
 from sim.compiler.compilation import vector_header
-from sim.kernel.emitted.kinds import limb_kinds
+from sim.kernel.dynamics.kinds import limb_kinds
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.robot import Robot
 from sim.robot.actuators import CONTROL_RATE

@@ -25,16 +25,20 @@ from tests.examples.servers import Server
 
 
 def _document() -> dict[str, Any]:
-    """The server's own, but for estimates, whose specs are the document's examples.
+    """The server's own, but for most kinds of specs, of which there are the document's examples.
 
-    Making all cases of specs takes half a minute; they are read alike where jobs are submitted.
+    Making all cases of specs takes minutes. All kinds are read alike: cases are made of those that
+    tune a drive where jobs are submitted, and of all by `python -m tests.api.conformance`.
     """
     # The parameters of a test are needed before there is a server: the document is the same.
     document = create_app(cast(JobService, None), settings=Settings()).openapi()
-    body = document["paths"]["/v1/estimates"]["post"]["requestBody"]["content"]["application/json"]
     models = document["components"]["schemas"]
-    names = (kind["$ref"].rpartition("/")[2] for kind in body["schema"]["oneOf"])
-    body["schema"] = {"enum": [example for name in names for example in models[name]["examples"]]}
+    for path, made in (("/v1/jobs", "JobSpec"), ("/v1/estimates", "")):
+        content = document["paths"][path]["post"]["requestBody"]["content"]["application/json"]
+        kinds = {kind["$ref"].rpartition("/")[2]: kind for kind in content["schema"]["oneOf"]}
+        examples = [example for name in kinds for example in models[name]["examples"]]
+        whole = [kind for name, kind in kinds.items() if name == made]
+        content["schema"] = {"anyOf": [*whole, {"enum": examples}]}
     return document
 
 

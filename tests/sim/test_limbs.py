@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from importlib import resources
+from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from sim.errors import RobotFileError
 from sim.kernel.compiled.native import native_kernel
 from sim.kernel.dynamics.kinds import robot_constants
+from sim.kernel.dynamics.traced import Traced
 from sim.kernel.dynamics.tree import leaves
 from sim.kernel.emitted.source import kernel_identity, kernel_source
 from sim.outcome import Status
@@ -173,3 +176,26 @@ def test_legs_that_are_no_chains_of_hinges_to_their_feet_are_refused_by_name(
     other = replace(robot, urdf=parse_urdf(robot.urdf.text.replace(old, new)))
     with pytest.raises(RobotFileError, match=rf"^robot\.(urdf|toml): {re.escape(said)}"):
         limbs_of(other)
+
+
+def test_a_traced_function_comes_to_the_same_with_other_symbols_and_numbers() -> None:
+    runs = []
+
+    def lever(arm: tuple[Any, Any], force: tuple[Any, Any]) -> tuple[Any, tuple[Any, float]]:
+        runs.append(arm)
+        return arm[0] * force[1] - arm[1] * force[0], (arm[0] / arm[1], 2.0)
+
+    x, y, z = (ca.SX.sym(name) for name in "xyz")
+    traced = Traced(lever, (x, y), (z, 3.0))
+    for arm, force in (((y, z), (x, 3.0)), ((2.0, 4.0), (x, 3.0)), ((0.0, y), (0.0, 3.0))):
+        moment, (ratio, two) = traced(arm, force)
+        expected, (quotient, _) = lever(arm, force)
+        wanted, found = (
+            ca.Function("f", [x, y, z], [ca.vertcat(*values)])(0.3, 0.7, 1.1)
+            for values in ((expected, quotient), (moment, ratio))
+        )
+        np.testing.assert_array_equal(found, wanted)
+        assert two == 2.0
+    # Nothing times nothing is left of a moment.
+    assert traced((0.0, y), (0.0, 3.0))[0].is_zero()
+    assert len(runs) == 4

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
-from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
+from typing import Any, Generic, TypeVar, TypeVarTuple
 
 import casadi as ca
 import numpy as np
@@ -23,7 +23,7 @@ from sim.kernel.dynamics.inertia import Force
 from sim.kernel.dynamics.kinds import LimbKind, limb_kinds
 from sim.kernel.dynamics.limb import After, Before, Environment, LimbState, Scalars, after, before
 from sim.kernel.dynamics.spatial import Scalar, add
-from sim.kernel.dynamics.tree import Traced
+from sim.kernel.dynamics.traced import Traced
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.robot import Robot
 from sim.robot.chain import Placement
@@ -31,7 +31,7 @@ from sim.robot.description import JOINTS_PER_LEG
 from sim.robot.inertia import BodyInertia
 from sim.robot.limbs import Limb, electrical_constants, limb_of, limbs_of
 
-P = ParamSpec("P")
+Trees = TypeVarTuple("Trees")
 T = TypeVar("T")
 
 
@@ -241,25 +241,25 @@ def _step(
     )
 
 
-class _ByKind(Generic[P, T]):
+class _ByKind(Generic[*Trees, T]):
     """A function of limbs, traced once for all of a kind."""
 
-    def __init__(self, limbs: Sequence[Limb], function: Callable[Concatenate[Limb, P], T]) -> None:
+    def __init__(self, limbs: Sequence[Limb], function: Callable[[Limb, *Trees], T]) -> None:
         self._limbs = list(zip(limbs, limb_kinds(limbs), strict=True))
         self._function = function
-        self._traced: dict[LimbKind, Traced[..., T]] = {}
+        self._traced: dict[LimbKind, Traced[Scalars, *Trees, T]] = {}
 
-    def __call__(self, number: int, *arguments: P.args, **named: P.kwargs) -> T:
+    def __call__(self, number: int, *arguments: *Trees) -> T:
         limb, kind = self._limbs[number]
-        constants = tuple(kind.numbers_of(limb))
+        constants: Scalars = tuple(kind.numbers_of(limb))
         if kind not in self._traced:
 
-            def of_constants(symbols: Scalars, *rest: P.args, **more: P.kwargs) -> T:
-                return self._function(kind.symbolic(limb, symbols), *rest, **more)
+            def of_constants(symbols: Scalars, *rest: *Trees) -> T:
+                return self._function(kind.symbolic(limb, symbols), *rest)
 
-            examples = tuple(ca.SX.sym("constant") for _ in constants)
-            self._traced[kind] = Traced(of_constants, examples, *arguments, **named)
-        return self._traced[kind](constants, *arguments, **named)
+            examples: Scalars = tuple(ca.SX.sym("constant") for _ in constants)
+            self._traced[kind] = Traced(of_constants, examples, *arguments)
+        return self._traced[kind](constants, *arguments)
 
 
 def _of_limb(values: Sequence[Scalar], k: int, n_limbs: int) -> tuple[Scalar, ...]:

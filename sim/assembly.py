@@ -249,7 +249,7 @@ def judge(
         return result.status, objectives
     steps = setup.ticks * substeps
     objectives[:3] = np.sqrt(result.sums[:3] / steps)
-    objectives[5] = result.end[2] - (setup.start[2] - setup.drop)
+    objectives[5] = (setup.start[2] - setup.drop) - result.end[2]
     distance = setup.direction * result.sums[4] * timestep
     if distance < SHORTEST_WALK:
         return Status.STALLED, objectives

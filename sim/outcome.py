@@ -80,9 +80,17 @@ OBJECTIVES: Final[tuple[Objective, ...]] = (
     Objective("angular_acceleration", "rad/s2", "f3: rms of the body's angular acceleration"),
     Objective("energy", "J/m", "f4: electrical energy of the motors per metre walked"),
     Objective("reciprocal_speed", "s/m", "f5: one over the mean forward speed"),
-    Objective("height_loss", "m", "f6: height of the body at the end less that at the start"),
+    Objective(
+        "height_loss",
+        "m",
+        "f6: height of the body at the start less that at the end, positive when it sinks",
+    ),
 )
-"""Objectives of a walk (thesis table 4.1): columns of its objectives array, in order."""
+"""Objectives of a walk (thesis table 4.1): columns of its objectives array, in order.
+
+f6 has the opposite sign of table 4.1, whose loss of height is z(t_end) - z(0): here less is better
+of every column. Preferences weigh its absolute value (eq. 3.1), so no fitness depends on the sign.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +119,9 @@ MEASUREMENTS: Final[tuple[Measurement, ...]] = (
 
 MEASUREMENT_NAMES: Final = tuple(measurement.name for measurement in MEASUREMENTS)
 N_MEASUREMENTS: Final = len(MEASUREMENTS)
+
+OBJECTIVES_VERSION: Final = 2
+"""Of what `OBJECTIVES` mean, in provenances. Of 1, f6 was the height at the end less the first."""
 
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in OBJECTIVES)
 N_OBJECTIVES: Final = len(OBJECTIVES)

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from sim.assembly import has_native_kernel
 from sim.kernel.walk import Precision
+from sim.outcome import OBJECTIVES_VERSION
 from sim.plugins import MISSING, source_digest, version_of
 from sim.robot import RobotSource, load_robot
 
@@ -71,6 +72,13 @@ class Provenance(BaseModel):
         default="double",
         description="Of the physics' numbers. Numbers of one are never mixed with the other's.",
         examples=["double"],
+    )
+    objectives: int = Field(
+        default=1,
+        ge=1,
+        description="What objectives of walks mean: 2, `height_loss` is positive when the body"
+        " sinks; 1, or none in what was stored before, when it rises.",
+        examples=[OBJECTIVES_VERSION],
     )
 
     def changes(self, now: Provenance) -> tuple[str, ...]:
@@ -146,6 +154,7 @@ def provenance_of(
         libraries={name: version_of(name) for name in libraries},
         backend="native" if native else "reference",
         precision=precision,
+        objectives=OBJECTIVES_VERSION,
     )
 
 

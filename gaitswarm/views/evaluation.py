@@ -25,7 +25,7 @@ _EXAMPLE: Final = {
     "angular_acceleration": 16.09,
     "energy": 41.96,
     "reciprocal_speed": 6.41,
-    "height_loss": -0.0038,
+    "height_loss": 0.0038,
 }
 
 

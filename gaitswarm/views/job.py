@@ -23,7 +23,7 @@ from services.optimizer.jobs.job import (
 )
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.labels import preference_name, robot_name
-from services.optimizer.jobs.provenance import ProvenanceRecord
+from services.optimizer.jobs.provenance import ProvenanceRecord, as_stored
 from services.optimizer.jobs.time_left import time_left
 from sim.kernel.walk import Precision
 
@@ -275,7 +275,10 @@ class JobView(JobSummaryView):
         if job.readable:
             spec = job.spec
             view = None if best is None else BestView.from_evaluation(best, spec)
-            objectives = [ObjectiveView.from_objective(o) for o in spec.objectives]
+            objectives = [
+                ObjectiveView.from_objective(o)
+                for o in as_stored(spec.objectives, job.provenance, job.progress.iterations)
+            ]
         return cls.model_validate(
             {
                 **_summary(job),

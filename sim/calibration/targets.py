@@ -64,7 +64,7 @@ QUANTITIES: Final[dict[QuantityName, Quantity]] = {
     "acceleration": Quantity("m/s2", "f2, rms of the body's linear acceleration"),
     "angular_acceleration": Quantity("rad/s2", "f3, rms of the body's angular acceleration"),
     "energy": Quantity("J/m", "f4, electrical energy of the motors per metre walked"),
-    "height_loss": Quantity("m", "f6, height at the end less that at the start", positive=False),
+    "height_loss": Quantity("m", "f6, height at the start less that at the end", positive=False),
     "speed": Quantity("m/s", "mean forward speed"),
     "power": Quantity("W", "mean electrical power of all motors"),
     "peak_current": Quantity("A", "largest absolute current of any motor"),

@@ -28,7 +28,7 @@ def test_rows_of_a_walk_share_what_its_first_row_says(table: Path, tmp_path: Pat
         HEAD
         + "# measured on the table of the lab\n\n"
         + f"{PI}speed,0.152,0.05\n"
-        + "pi,,,,height_loss,-0.0077,0.002,,predict\n"
+        + "pi,,,,height_loss,0.0077,0.002,,predict\n"
         + "own,pi,own.json,normal-fast,speed,1.2,0.1,pi,\n"
         + "A,fuzzy-pi,published:A,1 2,fitness:A,20.87,0.1\n"
     )

@@ -24,7 +24,7 @@ from sim.outcome import Outcome, Status
 
 TABLE_3_6 = (8.71, 1.77, 16.09, 41.96)
 SPEED = 0.156
-HEIGHT_LOSS = -3.8e-3
+HEIGHT_LOSS = 3.8e-3
 
 
 def outcome(*rows: tuple[float, ...], statuses: tuple[int, ...] | None = None) -> Outcome:
@@ -92,7 +92,7 @@ def test_a_failed_or_impossible_fitness_has_no_figure_of_merit(fitness: float) -
 
 
 def test_a_loss_of_height_counts_by_its_size_whatever_its_sign() -> None:
-    rising, sinking = ((*TABLE_3_6, 6.4, sign * 0.01) for sign in (1.0, -1.0))
+    rising, sinking = ((*TABLE_3_6, 6.4, sign * 0.01) for sign in (-1.0, 1.0))
     level = (*TABLE_3_6, 6.4, 0.0)
     chapter_3 = PREFERENCES["chapter-3"]
     assert utility(rising, chapter_3) == utility(sinking, chapter_3)

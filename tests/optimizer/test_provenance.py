@@ -27,7 +27,13 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from services.optimizer.jobs.optimizer_choice import optimizer_settings
 from services.optimizer.jobs.preference import Preference
-from services.optimizer.jobs.provenance import JobProvenance, job_provenance, optimizer_files
+from services.optimizer.jobs.provenance import (
+    JobProvenance,
+    ProvenanceRecord,
+    as_stored,
+    job_provenance,
+    optimizer_files,
+)
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.jobs.start import EarlierJobs
 from services.optimizer.run.coordinator import Coordination, handle
@@ -38,6 +44,7 @@ from services.optimizer.service import JobService
 from services.optimizer.store.port.base import Store
 from services.optimizer.tournament.race import race
 from sim.errors import RobotFileError
+from sim.outcome import OBJECTIVES
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
 
 
@@ -280,3 +287,20 @@ def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     for room in (Path(inspect.getfile(thing)).parent for thing in (JobSpec, create_search, race)):
         files |= set(room.rglob("*.py"))
     assert files == set(optimizer_files())
+
+
+def test_a_job_says_which_of_its_losses_of_height_have_the_former_sign() -> None:
+    def since(iteration: int, version: int) -> ProvenanceRecord:
+        simulation = HERE.simulation.model_copy(update={"objectives": version})
+        now = HERE.model_copy(update={"simulation": simulation})
+        return ProvenanceRecord(from_iteration=iteration, provenance=now)
+
+    def said(*records: ProvenanceRecord, iterations: int = 5) -> str:
+        told = as_stored(OBJECTIVES, records, iterations)
+        assert told[:5] == OBJECTIVES[:5]
+        return told[5].description.removeprefix(OBJECTIVES[5].description)
+
+    assert HERE.simulation.objectives == 1  # a provenance that was stored without it
+    assert said(since(0, 2)) == said(iterations=0) == said(since(0, 1), iterations=0) == ""
+    assert "iterations 0 to 4," in said(since(0, 1)) == said()
+    assert "iterations 0 to 2," in said(since(0, 1), since(3, 2))

@@ -46,6 +46,14 @@ def test_a_drop_is_no_loss_of_height() -> None:
     assert abs(outcome.objectives[0, 5]) < 0.01
 
 
+def test_a_body_that_sinks_loses_height() -> None:
+    scenario = short_walk()
+    height = logged_walk(scenario, PI, "pi").base_position[:, 2]
+    assert height[-1] < height[0] - 5e-4
+    loss = walk(scenario, PI, "pi").outcome.objectives[0, 5]
+    assert loss == pytest.approx(height[0] - height[-1], abs=1e-4)
+
+
 def test_a_jammed_leg_stays_where_it_was_and_the_others_walk() -> None:
     log = logged_walk(short_walk(stuck_leg="right_middle"), PI, "pi")
     coxa, femur, tibia = np.ptp(log.joint_angle, axis=0).reshape(6, 3).T

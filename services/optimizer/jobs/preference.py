@@ -40,7 +40,8 @@ class Preference(BaseModel):
 
     A scenario's utility is prod_m (b_m + f_m) ** e_m, to be minimized: with five entries the
     bias-weighted product of chapter 4 (eq. 4.1), with six that of chapter 3 (eq. 3.8). The loss of
-    height f6 has a sign, and enters by its absolute value, as in eq. 3.1.
+    height f6 has a sign, and enters by its absolute value, as in eq. 3.1: a body that rises is
+    worth no more than one that sinks.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from services.optimizer.jobs.spec import Spec
+from sim.outcome import OBJECTIVES_VERSION, Objective
 from sim.plugins import source_digest
 from sim.provenance import LIBRARIES, Provenance, provenance_of, version_changes
 
@@ -128,6 +130,35 @@ def changes_since(
     if iterations:
         return ("it was stored before gaitswarm recorded what numbers depend on",)
     return ()
+
+
+def as_stored(
+    objectives: Sequence[Objective], records: Sequence[ProvenanceRecord], iterations: int
+) -> tuple[Objective, ...]:
+    """What a job's objectives mean in what is stored of it: earlier versions had f6's other sign.
+
+    Args:
+        objectives: of its cases, as they are today.
+        records: the job's.
+        iterations: how many it has committed.
+
+    Returns:
+        The objectives; the description of the loss of height says which iterations have the sign
+        of table 4.1, if there are any.
+    """
+    begins = (
+        r.from_iteration
+        for r in records
+        if r.provenance.simulation.objectives >= OBJECTIVES_VERSION
+    )
+    former = min(next(begins, iterations), iterations)
+    if not former:
+        return tuple(objectives)
+    said = f"; of the opposite sign in iterations 0 to {former - 1}, of an earlier version"
+    return tuple(
+        replace(o, description=o.description + said) if o.name == "height_loss" else o
+        for o in objectives
+    )
 
 
 def first_record(provenance: JobProvenance | None) -> ProvenanceRecords:

@@ -14,7 +14,7 @@ const MEANINGS: Readonly<Record<string, string>> = {
   angular_acceleration: "rms of the body's angular acceleration",
   energy: 'electrical energy per metre',
   reciprocal_speed: 'one over the mean speed',
-  height_loss: "body's height at the end less that at the start",
+  height_loss: "body's height at the start less that at the end",
 }
 
 /** A notice for every walk that did not get to its end. */

@@ -18,6 +18,16 @@ MeshFormat = Literal["stl", "obj", "dae"]
 LARGEST_MESH: Final = 32 * 1024 * 1024
 """Of a file that is given out [B]; a link of a well-known quadruped has 0.1 to 10 MB."""
 
+FORMS: Final[Mapping[str, MeshFormat]] = {".stl": "stl", ".obj": "obj", ".dae": "dae"}
+"""By a file's ending."""
+
+TOO_LARGE: Final = f"it has more than {LARGEST_MESH // 2**20} MiB; simplify it"
+"""Why a mesh is not given out."""
+
+NOT_A_MESH: Final = "it is none of STL, OBJ and DAE"
+
+NOT_FOUND: Final = "its file was not found"
+
 _MOST_ROBOTS: Final = 200
 """Folders that are looked at."""
 
@@ -106,7 +116,7 @@ class MeshLibrary:
         except OSError as error:
             raise NotFound(f"mesh {mesh.name[:200]}: {error.strerror}") from error
         if len(content) > LARGEST_MESH:
-            raise NotFound(f"mesh {mesh.name[:200]}: {_TOO_LARGE}")
+            raise NotFound(f"mesh {mesh.name[:200]}: {TOO_LARGE}")
         return content
 
     def _robots(self) -> Iterator[tuple[Path, str]]:
@@ -122,12 +132,6 @@ class MeshLibrary:
             yield folder, text
 
 
-_FORMS: Final[Mapping[str, MeshFormat]] = {".stl": "stl", ".obj": "obj", ".dae": "dae"}
-"""By a file's ending."""
-
-_TOO_LARGE: Final = f"it has more than {LARGEST_MESH // 2**20} MiB; simplify it"
-
-
 def _inside(folder: Path) -> list[Path]:
     try:
         return sorted(place for place in folder.iterdir() if place.is_dir())
@@ -136,22 +140,22 @@ def _inside(folder: Path) -> list[Path]:
 
 
 def _found(name: str, folder: Path) -> FoundMesh:
-    form = _FORMS.get(Path(name).suffix.lower())
+    form = FORMS.get(Path(name).suffix.lower())
     if form is None:
-        return FoundMesh(name, None, None, "it is none of STL, OBJ and DAE")
+        return FoundMesh(name, None, None, NOT_A_MESH)
     outside = False
     for root, path in mesh_places(name, folder):
         try:
             real = path.resolve(strict=True)
-            if not real.is_file() or _FORMS.get(real.suffix.lower()) != form:
+            if not real.is_file() or FORMS.get(real.suffix.lower()) != form:
                 continue
             if not real.is_relative_to(root.resolve(strict=True)):
                 outside = True
                 continue
             if real.stat().st_size > LARGEST_MESH:
-                return FoundMesh(name, None, form, _TOO_LARGE)
+                return FoundMesh(name, None, form, TOO_LARGE)
         except (OSError, ValueError, RuntimeError):  # not there, or a loop of links
             continue
         return FoundMesh(name, real, form, None)
-    said = "its file is outside of the robot's folder" if outside else "its file was not found"
+    said = "its file is outside of the robot's folder" if outside else NOT_FOUND
     return FoundMesh(name, None, form, said)

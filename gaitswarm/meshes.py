@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Final
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET
 
 _VARIABLE: Final = "ROS_PACKAGE_PATH"
+
+_PACKAGES: Final = ("package", "model")
+"""Schemes of names that begin with a package's."""
+
+_LEAST_IN_PACKAGE: Final = 2
+"""Parts of a path that one `..` does not lead out of its package."""
 
 
 def mesh_names(urdf: str) -> list[str]:
@@ -31,7 +37,7 @@ def find_mesh(name: str, folder: Path, packages: Sequence[Path] = ()) -> Path | 
 
     `package://NAME/PATH` is looked for in folders of that name: the URDF's own and those above it,
     those given, those of ROS_PACKAGE_PATH, and what lies in any of them. Another path is relative
-    to the URDF's folder.
+    to the URDF's folder. What is found nowhere may be a copy at its `own_place`.
 
     Args:
         name: As the URDF has it.
@@ -65,8 +71,41 @@ def mesh_places(
     scheme, separator, rest = name.partition("://")
     if not separator:
         yield folder, folder / name
-    if not separator or scheme not in ("package", "model"):
-        return
+    elif scheme in _PACKAGES:
+        yield from _in_packages(rest, folder, packages)
+    own = own_place(name)
+    if own is not None:
+        yield folder, folder / own
+
+
+def own_place(name: str) -> Path | None:
+    """Where a mesh lies in the folder of a robot that needs nothing outside of it.
+
+    Args:
+        name: As the URDF has it.
+
+    Returns:
+        Path in the folder: NAME/PATH of `package://NAME/PATH`, and a relative path without the
+        `..` that lead out of the folder; None for one that is absolute, or leads out of its
+        package.
+    """
+    scheme, separator, rest = name.partition("://")
+    path = PurePosixPath(rest if separator else name)
+    if path.is_absolute() or (separator and scheme not in _PACKAGES):
+        return None
+    kept: list[str] = []
+    for part in path.parts:
+        if part != "..":
+            kept.append(part)
+        elif separator and len(kept) < _LEAST_IN_PACKAGE:
+            return None
+        else:
+            del kept[-1:]
+    return Path(*kept) if kept else None
+
+
+def _in_packages(rest: str, folder: Path, packages: Sequence[Path]) -> Iterator[tuple[Path, Path]]:
+    """Places of what `package://` is before, as `mesh_places` has them."""
     package, _, path = rest.partition("/")
     if package in ("", ".", ".."):
         return

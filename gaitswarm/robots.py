@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from gaitswarm.errors import simulation_errors
+from gaitswarm.mesh_copies import MeshCopies, copy_meshes
 from gaitswarm.meshes import find_mesh, mesh_names
 from gaitswarm.views.robot_check import CheckedLegView, MeshView, RobotCheckView, StandingView
 from services.optimizer.errors import InvalidRequest
@@ -57,10 +58,12 @@ class MadeRobot:
     Attributes:
         name: of the robot.
         guesses: what to look at, one sentence each.
+        meshes: what became of the meshes that the URDF names.
     """
 
     name: str
     guesses: tuple[str, ...]
+    meshes: MeshCopies
 
 
 def init_robot(
@@ -69,8 +72,13 @@ def init_robot(
     *,
     name: str | None = None,
     actuator: ActuatorChoice = "auto",
+    meshes: bool = True,
+    packages: Sequence[str | os.PathLike[str]] = (),
 ) -> MadeRobot:
     """Make a robot's folder from a URDF: legs, stance, actuators and two walks are chosen.
+
+    The meshes that the URDF names are copied, so that the folder can be shown wherever it goes.
+    What is missing, no STL, OBJ or DAE, or too large is left out: no simulation needs them.
 
     Args:
         urdf: File of the robot.
@@ -78,6 +86,8 @@ def init_robot(
         name: Of the robot; default the file's.
         actuator: Kind of its actuators: DC motors, torque-controlled ones, or those that the limits
             of the URDF's joints speak for.
+        meshes: Whether to copy meshes.
+        packages: Folders in which `package://` is looked for, before those of ROS_PACKAGE_PATH.
 
     Returns:
         What was made.
@@ -106,8 +116,8 @@ def init_robot(
         said = str(error).replace("robot.urdf", source.name, 1)
         raise InvalidRequest(said, field="urdf") from error
     with simulation_errors("urdf"):
-        _write(folder, proposal)
-    return MadeRobot(chosen, proposal.guesses)
+        copies = _write(folder, proposal, source.parent if meshes else None, packages)
+    return MadeRobot(chosen, proposal.guesses, copies)
 
 
 def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
@@ -313,7 +323,14 @@ def _check_free(folder: Path) -> None:
         raise InvalidRequest(f"{folder} is there and not empty; name another", field="output")
 
 
-def _write(folder: Path, proposal: Proposal) -> None:
+def _write(
+    folder: Path,
+    proposal: Proposal,
+    source: Path | None,
+    packages: Sequence[str | os.PathLike[str]],
+) -> MeshCopies:
+    """With the meshes that are found from a source folder, if there is one."""
+    copies = MeshCopies()
     job = json.dumps(proposal.job, indent=2) + "\n"
     texts = {"robot.toml": proposal.toml, "robot.urdf": proposal.urdf, JOB_FILE: job}
     try:
@@ -322,12 +339,15 @@ def _write(folder: Path, proposal: Proposal) -> None:
         try:
             for file, text in texts.items():
                 (made / file).write_text(text, encoding="utf-8")
+            if source is not None:
+                copies = copy_meshes(proposal.urdf, source, made, [Path(p) for p in packages])
             made.chmod(0o755)
             if folder.exists():
                 folder.rmdir()
             made.rename(folder)
-        except OSError:
+        except BaseException:
             shutil.rmtree(made, ignore_errors=True)
             raise
     except OSError as error:
         raise InvalidRequest(f"cannot write {folder}: {error.strerror}", field="output") from error
+    return copies

@@ -10,6 +10,7 @@ import typer
 from cli.inputs.options import Json
 
 if TYPE_CHECKING:
+    from gaitswarm.mesh_copies import MeshCopies
     from gaitswarm.views.robot_check import RobotCheckView
     from sim.proposal.drive import ActuatorChoice
     from sim.robot import RobotFiles
@@ -19,6 +20,14 @@ _NAMED: Final = 5
 
 Folder = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="With robot.toml and robot.urdf.", exists=False)
+]
+
+PackagePath = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Where package:// of meshes is looked for, before ROS_PACKAGE_PATH; repeatable.",
+    ),
 ]
 
 
@@ -45,22 +54,47 @@ def init(
             " decides by the torques and rates of the URDF.",
         ),
     ] = "auto",
+    meshes: Annotated[
+        bool,
+        typer.Option(
+            "--meshes/--no-meshes",
+            help="Copy the meshes that the URDF names: the page shows them, no walk needs them.",
+        ),
+    ] = True,
+    package_path: PackagePath = None,
     as_json: Json = False,
 ) -> None:
     """Find legs, choose a stance, propose actuators, and write a robot's folder.
 
-    It holds robot.toml, with a comment on every guess; robot.urdf; and job.json, what jobs of this
-    robot have unless they say otherwise. Then --robot FOLDER works in every command.
+    It holds robot.toml, with a comment on every guess; robot.urdf and its meshes; and job.json,
+    what jobs of this robot have unless they say otherwise. Then --robot FOLDER works in every
+    command.
     """
     from cli.output import note, print_text
     from gaitswarm.robots import init_robot
 
-    made = init_robot(urdf, output, name=name, actuator=_kind(actuator))
+    made = init_robot(
+        urdf,
+        output,
+        name=name,
+        actuator=_kind(actuator),
+        meshes=meshes,
+        packages=package_path or [],
+    )
     if as_json:
-        _print({"folder": str(output), "name": made.name, "guesses": list(made.guesses)})
+        left_out = [{"name": name, "problem": problem} for name, problem in made.meshes.left_out]
+        _print(
+            {
+                "folder": str(output),
+                "name": made.name,
+                "guesses": list(made.guesses),
+                "meshes": {"copied": list(made.meshes.copied), "left_out": left_out},
+            }
+        )
         return
     for guess in made.guesses:
         print_text(f"{guess}\n")
+    print_text(_copied(made.meshes))
     note(
         f"robot {made.name!r} written to {output}; look at it with `gaitswarm robot check {output}`"
     )
@@ -73,13 +107,7 @@ def check(
         Path | None,
         typer.Option(metavar="FILE", help="Draw how it stands into FILE.png, .svg or .pdf."),
     ] = None,
-    package_path: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Where package:// of meshes is looked for, before ROS_PACKAGE_PATH; repeatable.",
-        ),
-    ] = None,
+    package_path: PackagePath = None,
     as_json: Json = False,
 ) -> None:
     """Load a robot, let it stand for a second, and say what there is to it."""
@@ -109,6 +137,17 @@ def _kind(text: str) -> ActuatorChoice:
         if kind == text:
             return kind
     raise InvalidRequest(f"{text!r} is none of {', '.join(ACTUATOR_CHOICES)}", field="actuator")
+
+
+def _copied(meshes: MeshCopies) -> str:
+    found, lost = len(meshes.copied), meshes.left_out
+    if not found and not lost:
+        return ""
+    lines = [f"meshes: {found} of {found + len(lost)} copied, {meshes.size / 1e6:.1f} MB"]
+    lines += [f"  left out: {name[:200]}: {problem}" for name, problem in lost[:_NAMED]]
+    if len(lost) > _NAMED:
+        lines.append(f"  and {len(lost) - _NAMED} more; --package-path names folders of packages")
+    return "\n".join(lines) + "\n"
 
 
 def _files(folder: Path) -> RobotFiles:

@@ -1,0 +1,99 @@
+"""Meshes that `gaitswarm robot init` copies beside the URDF."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli.main import run
+from gaitswarm import mesh_copies, mesh_library
+from gaitswarm.mesh_copies import copy_meshes
+from gaitswarm.mesh_library import MeshLibrary, urdf_digest
+from gaitswarm.meshes import own_place
+from tests.robots.test_proposal import dog
+
+
+def named(*names: str) -> str:
+    """A dog whose trunk has these meshes."""
+    shapes = "".join(f'<geometry><mesh filename="{name}"/></geometry>' for name in names)
+    return dog().replace('<link name="trunk">', f'<link name="trunk"><visual>{shapes}</visual>')
+
+
+def test_the_folder_shows_its_meshes_wherever_it_goes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    package = tmp_path / "ros" / "dog_description"
+    contents = {
+        "trunk.stl": package / "robots" / "trunk.stl",
+        "../meshes/hip.STL": package / "meshes" / "hip.STL",
+        "package://dog_description/meshes/x/../thigh.dae": package / "meshes" / "thigh.dae",
+        "package://dog_parts/calf.obj": tmp_path / "elsewhere" / "dog_parts" / "calf.obj",
+    }
+    for name, path in contents.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(name, encoding="utf-8")
+    (package / "meshes" / "x").mkdir()
+    (package / "robots" / "secret.txt").touch()
+    lost = {
+        "secret.txt": "none of STL",
+        "package://dog_parts/none.stl": "not found",
+        str(package / "robots" / "trunk.stl"): "absolute",
+    }
+    urdf = package / "robots" / "dog.urdf"
+    urdf.write_text(named(*contents, *lost), encoding="utf-8")
+    output = tmp_path / "dog"
+    command = ["robot", "init", str(urdf), "--package-path", str(tmp_path / "elsewhere"), "-o"]
+    assert run([*command, str(output), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["meshes"]
+    assert told["copied"] == list(contents)
+    for left, (name, why) in zip(told["left_out"], lost.items(), strict=True):
+        assert left["name"] == name and why in left["problem"]
+
+    moved = output.rename(tmp_path / "elsewhere" / "moved")
+    (tmp_path / "ros").rename(tmp_path / "gone")
+    digest = urdf_digest((moved / "robot.urdf").read_text(encoding="utf-8"))
+    library = MeshLibrary([moved])
+    assert [mesh.name for mesh in library.of(digest) if mesh.path] == list(contents)
+    assert [library.content(digest, n).decode() for n in range(4)] == list(contents)
+
+    urdf = tmp_path / "gone" / "dog_description" / "robots" / "dog.urdf"
+    assert run(["robot", "init", str(urdf), "--no-meshes", "-o", str(output)]) == 0
+    assert sorted(p.name for p in output.iterdir()) == ["job.json", "robot.toml", "robot.urdf"]
+    for file in ("robot.toml", "robot.urdf", "job.json"):
+        assert (output / file).read_bytes() == (moved / file).read_bytes()
+
+
+def test_what_is_too_large_or_in_anothers_place_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, output = tmp_path / "urdf", tmp_path / "made"
+    sizes = {"a.stl": 6, "b.stl": 11, "../a.stl": 6, "c.stl": 5, "d.stl": 4}
+    folder.mkdir()
+    for name, size in sizes.items():
+        (folder / name).write_bytes(b"x" * size)
+    monkeypatch.setattr(mesh_copies, "LARGEST_MESH", 10)
+    monkeypatch.setattr(mesh_copies, "LARGEST_COPY", 10)
+    made = copy_meshes(named(*sizes, "a.stl"), folder, output)
+    assert made.copied == ("a.stl", "d.stl") and made.size == 10
+    why = dict(made.left_out)
+    assert why["b.stl"] == mesh_library.TOO_LARGE
+    assert "a.stl in the folder" in why["../a.stl"]
+    assert why["c.stl"].startswith("all have more than")
+    assert sorted(p.name for p in output.iterdir()) == ["a.stl", "d.stl"]
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        ("m/../../x.stl", "x.stl"),
+        ("package://p/m/./x.stl", "p/m/x.stl"),
+        ("package://p/../q/x.stl", None),
+        ("package:///etc/x.stl", None),
+        ("file:///etc/x.stl", None),
+        ("/etc/x.stl", None),
+    ],
+)
+def test_a_copy_lies_inside_of_the_folder(name: str, place: str | None) -> None:
+    assert own_place(name) == (None if place is None else Path(place))

@@ -143,7 +143,11 @@ def create_app(
     add_page(app, page_folder)
     add_manual(app, manual_folder)
     add_problem_handlers(app)
-    app.add_middleware(BodyLimitMiddleware, max_bytes=settings.api_max_body_bytes)
+    app.add_middleware(
+        BodyLimitMiddleware,
+        max_bytes=settings.api_max_body_bytes,
+        larger={identification.MEASURED: settings.api_max_log_bytes},
+    )
     app.add_middleware(
         GZipMiddleware,
         minimum_size=LEAST_COMPRESSED,

@@ -16,6 +16,7 @@ _SOURCES: Final[dict[str, dict[str, str]]] = {
         "iteration": "$response.body#/items/0/index",
     },
     "add_recording": {"recording_id": "$response.body#/id"},
+    "record_measured_walk": {"recording_id": "$response.body#/recording/id"},
 }
 """What an answer tells, by parameter of the operations that it leads to."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import re
 import uuid
+from collections.abc import Mapping
 from typing import Final
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -98,21 +99,37 @@ class HeaderLimitMiddleware:
 
 
 class BodyLimitMiddleware:
-    """Refuses bodies over a limit with a problem, whether their length was declared or not."""
+    """Refuses bodies over a limit with a problem, whether their length was declared or not.
 
-    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+    Args:
+        app: answers the others.
+        max_bytes: that a body may have [B].
+        larger: the same of paths whose bodies may be larger [B].
+    """
+
+    def __init__(
+        self, app: ASGIApp, max_bytes: int, larger: Mapping[str, int] | None = None
+    ) -> None:
         self.app = app
         self.max_bytes = max_bytes
+        self.larger = larger or {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One ASGI exchange."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
+        path = scope["path"].removeprefix(scope.get("root_path", ""))
+        most = max(self.max_bytes, self.larger.get(path, 0))
         length = Headers(scope=scope).get("content-length", "")
-        if length.isdecimal() and int(length) > self.max_bytes:
-            await self._drain(receive, 0)
-            await self._refusal(scope["path"])(scope, receive, send)
+        if length.isdecimal() and int(length) > most:
+            await self._drain(receive, 0, most)
+            advice = "a job spec takes a few kilobytes"
+            if most > self.max_bytes:
+                advice = "leave out cycles, or raise GAITSWARM_API_MAX_LOG_BYTES on the server"
+            detail = f"the body is larger than {most} bytes; {advice}"
+            refusal = problem(scope["path"], 413, "body-too-large", detail)
+            await refusal(scope, receive, send)
             return
         received = 0
 
@@ -120,27 +137,19 @@ class BodyLimitMiddleware:
             nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
-            if received > self.max_bytes:
-                await self._drain(receive, received)
+            if received > most:
+                await self._drain(receive, received, most)
                 raise HTTPException(413)
             return message
 
         await self.app(scope, receive_limited, send)
 
-    async def _drain(self, receive: Receive, received: int) -> None:
+    async def _drain(self, receive: Receive, received: int, most: int) -> None:
         more = True
-        while more and received < _DRAINED * self.max_bytes:
+        while more and received < _DRAINED * most:
             message = await receive()
             received += len(message.get("body", b""))
             more = message.get("more_body", False)
-
-    def _refusal(self, path: str) -> ASGIApp:
-        return problem(
-            path,
-            413,
-            "body-too-large",
-            f"the body is larger than {self.max_bytes} bytes; a job spec takes a few kilobytes",
-        )
 
 
 def security_policy(*, script_src: str = "'self'", style_src: str = "'self'") -> str:

@@ -146,6 +146,12 @@ class Settings(BaseSettings):
     api_max_body_bytes: int = Field(
         default=1 << 20, ge=1, description="Largest request body that is read [B]."
     )
+    api_max_log_bytes: int = Field(
+        default=1 << 24,
+        ge=1,
+        description="The same of a body with a measured log, a second of which takes about a"
+        " megabyte [B].",
+    )
     api_event_poll_seconds: float = Field(
         default=0.5,
         gt=0.0,

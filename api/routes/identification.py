@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import partial
+from typing import Annotated, Final
 
+from anyio.to_thread import run_sync
 from fastapi import APIRouter, Depends, Path, Query, Response, status
 
 from api.access import Actor, may_submit
 from api.bodies import validated
-from api.dependencies import Analysing, ExistingJob, JobIdText, Service
+from api.dependencies import (
+    Analysing,
+    ExistingJob,
+    JobIdText,
+    ServerSettings,
+    Service,
+    Slots,
+    check_length,
+)
 from api.documentation import problems
+from gaitswarm.requests.measured_walk import MeasuredWalkRequest, read_measured_walk
 from gaitswarm.views import PREFIX
-from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.identification import IdentifiabilityView, MeasuredWalkView, RecordingView
+from services.optimizer.service import JobService
 from sim.identification.recorded_walk import RecordedWalk
 
 RecordingBody = Annotated[RecordedWalk, Depends(validated(RecordedWalk, "walk"))]
+
+MeasuredWalkBody = Annotated[
+    MeasuredWalkRequest, Depends(validated(MeasuredWalkRequest, "request"))
+]
+
+MEASURED: Final = f"{PREFIX}/recordings/measured"
+"""The path whose bodies hold a measured log, and may be as large as one."""
 
 RecordingId = Annotated[
     str, Path(pattern=r"^[0-9a-f]{32}$", description="Id, as POST /v1/recordings answered it.")
@@ -37,12 +56,40 @@ def add_recording(
 ) -> RecordingView:
     """Motor currents of a measured walk, for jobs of kind `identification`.
 
-    The id is the content's hash: the same walk again is the same recording. `gaitswarm record`
-    makes one of a measured log.
+    The id is the content's hash: the same walk again is the same recording. `gaitswarm record` and
+    POST /v1/recordings/measured make one of a measured log.
     """
-    recording_id = service.record(walk, actor=actor)
-    response.headers["Location"] = f"{PREFIX}/recordings/{recording_id}"
-    return RecordingView.from_walk(recording_id, walk)
+    return _kept(walk, service, response, actor)
+
+
+@router.post(
+    MEASURED.removeprefix(PREFIX),
+    tags=["recordings"],
+    operation_id="record_measured_walk",
+    summary="Read a measured log and keep its walk",
+    status_code=status.HTTP_201_CREATED,
+    dependencies=[Depends(may_submit)],
+    responses=problems(400, 403, 413, 422),
+)
+async def record_measured_walk(
+    request: MeasuredWalkBody,
+    service: Service,
+    settings: ServerSettings,
+    slots: Slots,
+    response: Response,
+    actor: Actor,
+) -> MeasuredWalkView:
+    """Read a log as the robot's instruments wrote it, and make a recording of it.
+
+    The walk that was measured is simulated, and the lag between the two found; the recording has
+    the measured currents of the whole cycles that they share. The log itself is not kept. Bodies
+    may be larger here than elsewhere (GAITSWARM_API_MAX_LOG_BYTES).
+    """
+    seconds = request.simulated_seconds([request.walk_scenario])
+    check_length(settings, seconds, logged=True, field="scenario")
+    read = await slots.run(partial(read_measured_walk, request))
+    kept = await run_sync(_kept, read.walk, service, response, actor)
+    return MeasuredWalkView.from_log(kept, read.log, read.pair)
 
 
 @router.get(
@@ -67,6 +114,13 @@ def get_recording(recording_id: RecordingId, service: Service) -> RecordedWalk:
 def get_recording_summary(recording_id: RecordingId, service: Service) -> RecordingView:
     """What was walked, how long, and the mean current; the answer that the recording got."""
     return RecordingView.from_walk(recording_id, service.recording(recording_id))
+
+
+def _kept(walk: RecordedWalk, service: JobService, response: Response, actor: str) -> RecordingView:
+    """Stored, with its path in the answer."""
+    recording_id = service.record(walk, actor=actor)
+    response.headers["Location"] = f"{PREFIX}/recordings/{recording_id}"
+    return RecordingView.from_walk(recording_id, walk)
 
 
 @router.get(

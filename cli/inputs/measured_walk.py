@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -13,8 +12,8 @@ from services.optimizer.errors import InvalidRequest
 if TYPE_CHECKING:
     from sim.measurement.measured_log import MeasuredLog
     from sim.measurement.synchronise import Synchronised
+    from sim.measurement.walk import MeasuredWalk
     from sim.robot import Robot
-    from sim.scenario import Scenario
 
 LARGEST_FILE: Final = 1 << 28
 """Largest log that is read [B]; a second takes about a megabyte."""
@@ -44,20 +43,6 @@ CyclesOption = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class Walk:
-    """One design in one scenario of one robot, within the reach of its legs.
-
-    cycle_time [s] is the design's, if it has one, else the scenario's.
-    """
-
-    robot: Robot
-    scenario: Scenario
-    controller: str
-    design: dict[str, float]
-    cycle_time: float
-
-
 def read_walk(
     scenario: str,
     controller: str,
@@ -65,13 +50,12 @@ def read_walk(
     trajectory: Path | None,
     cycles: int | None,
     robot: str | None,
-) -> Walk:
+) -> MeasuredWalk:
     """Raises InvalidRequest or SimulationInputError that names what is wrong."""
     from cli.inputs.design_file import read_design
     from cli.inputs.robots import chosen_robot, chosen_scenarios
-    from sim.gait_variables import GAIT_CATALOGUE, with_gait
+    from sim.measurement.walk import MeasuredWalk
     from sim.robot import load_robot
-    from sim.simulate import check_reach
 
     values = read_design(design, controller, trajectory)
     for name, value in values.items():
@@ -84,33 +68,12 @@ def read_walk(
     (chosen,) = scenarios
     if cycles is not None:
         chosen = chosen.model_copy(update={"cycles": float(cycles)})
-    gait = {name: value for name, value in values.items() if name in GAIT_CATALOGUE}
-    walked = with_gait(chosen, gait)
-    machine = load_robot(chosen_robot(robot))
-    check_reach(walked, [], [], robot=machine)
-    return Walk(machine, chosen, controller, values, walked.cycle_time)
+    return MeasuredWalk.of(load_robot(chosen_robot(robot)), chosen, controller, values)
 
 
-def simulated_walk(walk: Walk) -> MeasuredLog:
-    """What the robot's instruments would have logged of it. Raises SimulationInputError."""
-    import numpy as np
-
-    from sim.errors import SimulationInputError
-    from sim.measurement.measured_log import simulated_log
-    from sim.outcome import Status
-    from sim.simulate import simulate
-
-    designs = np.array([list(walk.design.values())], dtype=np.float64)
-    result = simulate(
-        walk.scenario, walk.controller, list(walk.design), designs, robot=walk.robot, log=True
-    )
-    status, log = Status(int(result.outcome.statuses[0])), result.logs[0]
-    if log is None or status not in (Status.OK, Status.STALLED):
-        raise SimulationInputError(f"the simulated walk cannot be compared: {status.phrase}")
-    return simulated_log(walk.robot, log)
-
-
-def synchronised(path: Path, log: MeasuredLog, simulated: MeasuredLog, walk: Walk) -> Synchronised:
+def synchronised(
+    path: Path, log: MeasuredLog, simulated: MeasuredLog, walk: MeasuredWalk
+) -> Synchronised:
     """A log beside the simulated walk. Raises InvalidRequest that names the file."""
     from sim.errors import MeasuredLogError
     from sim.measurement.synchronise import synchronise

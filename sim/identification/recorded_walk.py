@@ -8,16 +8,24 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    model_validator,
+)
 
 from sim.controllers import CONTROLLERS, ControllerName, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import SimulationInputError
+from sim.errors import MeasuredLogError, SimulationInputError
 from sim.gait_variables import GAIT_CATALOGUE
 from sim.robot import RobotSource, load_robot
 from sim.scenario import Scenario
 from sim.simulate import check_reach
 from sim.variables import VariableName
+from sim.wording import message_of
 
 if TYPE_CHECKING:
     from sim.measurement.synchronise import Synchronised
@@ -144,13 +152,23 @@ def record(
 
     Returns:
         What a fit needs of the measured walk.
+
+    Raises:
+        MeasuredLogError: The log is too long for a recording, or has currents that no motor draws.
     """
-    return RecordedWalk(
-        scenario=scenario,
-        controller=controller,
-        design=dict(design),
-        first_tick=round(float(pair.simulated.time[0]) / CONTROL_PERIOD),
-        joints=pair.measured.joints,
-        current=np.round(pair.measured.current, _DECIMALS).tolist(),
-        synthetic=pair.measured.synthetic,
-    )
+    try:
+        return RecordedWalk(
+            scenario=scenario,
+            controller=controller,
+            design=dict(design),
+            first_tick=round(float(pair.simulated.time[0]) / CONTROL_PERIOD),
+            joints=pair.measured.joints,
+            current=np.round(pair.measured.current, _DECIMALS).tolist(),
+            synthetic=pair.measured.synthetic,
+        )
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(map(str, first["loc"]))
+        raise MeasuredLogError(
+            f"the compared cycles make no recording: {field}: {message_of(first)}"
+        ) from error

@@ -159,8 +159,15 @@ def _head(lines: Iterator[tuple[int, str]]) -> tuple[dict[str, str], int, list[s
             if colon:
                 metadata[key.strip()] = value.strip()
         elif line.strip():
-            return metadata, number, [cell.strip() for cell in next(csv.reader([line]))]
+            return metadata, number, _cells(line, number)
     raise MeasuredLogError(f"no headings: a line like '{TIME},{Quantity.DESIRED_ANGLE}....' is due")
+
+
+def _cells(line: str, number: int) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line]))]
+    except csv.Error as error:
+        raise MeasuredLogError(f"no headings: {error}", line=number) from error
 
 
 def _expected(robot: Robot) -> dict[Quantity, tuple[str, ...]]:

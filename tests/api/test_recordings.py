@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import httpx2
 import numpy as np
+import pytest
 
+from sim.identification.recorded_walk import RecordedWalk
+from sim.measurement.measured_csv import format_measured_log
+from sim.measurement.measured_log import MeasuredLog
+from sim.measurement.walk import MeasuredWalk
 from sim.robot import load_robot
-from tests.examples.walks import PUBLISHED_A, SHORT_WALK
+from tests.api.conftest import Serve
+from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk
 
 WALK = {
     "scenario": SHORT_WALK,
@@ -83,3 +91,82 @@ def test_parameters_of_a_job_without_results_are_a_conflict(client: httpx2.Clien
     answer = client.get(f"/v1/jobs/{job_id}/parameters")
     assert answer.status_code == 409
     assert "no design yet" in answer.json()["detail"]
+
+
+@pytest.fixture(scope="module")
+def log() -> MeasuredLog:
+    """Of the short walk, ten rows after it began."""
+    walk = MeasuredWalk.of(load_robot("szabadka2"), short_walk(cycles=2), "fuzzy-pi", PUBLISHED_A)
+    return walk.simulated().rows(10, 1000)
+
+
+@pytest.fixture(scope="module")
+def measured(log: MeasuredLog) -> dict[str, Any]:
+    scenario = SHORT_WALK | {"cycles": 2}
+    return {"design": PUBLISHED_A, "scenario": scenario, "log": format_measured_log(log)}
+
+
+def test_a_measured_log_is_read_and_its_whole_cycles_are_recorded(
+    client: httpx2.Client, measured: dict[str, Any], log: MeasuredLog
+) -> None:
+    # Larger than other bodies may be: blank lines are left out.
+    answer = client.post(
+        "/v1/recordings/measured", json=measured | {"log": measured["log"] + "\n" * 600_000}
+    )
+    assert answer.status_code == 201, answer.text
+    read = answer.json()
+    glance = read["recording"]
+    assert (read["rows"], read["seconds"], read["cycles"]) == (990, 1.98, 1)
+    assert (read["offset"], glance["rows"], glance["walk"]["cycles"]) == (-0.02, 500, 2.0)
+    assert read["correlation"] == pytest.approx(1.0)
+    channels = {signal["name"]: signal["channels"] for signal in read["signals"]}
+    assert channels["I_M"] == 18 and channels["U_S"] == 6 and channels["a_BODY"] == 3
+    kept = RecordedWalk.model_validate(client.get(answer.headers["Location"]).json())
+    assert kept.first_tick == 500
+    assert kept.amperes == pytest.approx(log.current[490:], abs=1e-5)
+    assert glance["peak_current"] == kept.amperes.max()
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "message"),
+    [
+        ({"log": "a" * 200_000}, "log", "line 1: no headings"),
+        ({"log": "time [s],warp [1]\n"}, "log", "line 1, column 'warp [1]': unknown"),
+        ({"scenario": SHORT_WALK | {"stride": 0.4}}, "scenario", "misses its foot trajectory"),
+        ({"scenario": SHORT_WALK | {"cycles": 90}}, "scenario", "more than the 40 s allowed"),
+        ({"scenario": SHORT_WALK | {"cycle_time": 4.0}}, "log", "one walking cycle takes 4 s"),
+        ({"design": {"P": 1.0}}, "design", "P"),
+    ],
+)
+def test_a_measured_log_that_cannot_be_read_names_field_and_line(
+    client: httpx2.Client,
+    measured: dict[str, Any],
+    change: dict[str, Any],
+    field: str,
+    message: str,
+) -> None:
+    answer = client.post("/v1/recordings/measured", json=measured | change)
+    assert answer.status_code == 422, answer.text
+    (error,) = answer.json()["errors"]
+    assert error["field"].startswith(field)
+    assert message in error["message"]
+
+
+def test_currents_that_no_motor_draws_make_no_recording(
+    client: httpx2.Client, measured: dict[str, Any], log: MeasuredLog
+) -> None:
+    log.current[700, 3] += 2000.0
+    text = format_measured_log(log)
+    log.current[700, 3] -= 2000.0
+    answer = client.post("/v1/recordings/measured", json=measured | {"log": text})
+    assert answer.status_code == 422
+    assert "current.210.3" in answer.json()["errors"][0]["message"]
+
+
+def test_a_log_over_its_own_limit_is_told_what_to_do(serve: Serve) -> None:
+    client = serve(api_max_body_bytes=1000, api_max_log_bytes=2000).client
+    answer = client.post("/v1/recordings/measured", json={"log": "x" * 2000})
+    assert answer.status_code == 413
+    assert "leave out cycles" in answer.json()["detail"]
+    assert client.post("/v1/recordings/measured", json={"log": "x" * 1500}).status_code == 422
+    assert client.post("/v1/jobs", json={"name": "x" * 1500}).status_code == 413

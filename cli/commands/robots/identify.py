@@ -57,14 +57,14 @@ def record(
     as_json: Json = False,
 ) -> None:
     """Keep a measured walk where jobs can fit a robot to it; prints the recording's id."""
-    from cli.inputs.measured_walk import read_measured, read_walk, simulated_walk, synchronised
+    from cli.inputs.measured_walk import read_measured, read_walk, synchronised
     from cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
     from sim.identification.recorded_walk import record as recorded
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
     log = read_measured(measured, walk.robot)
-    pair = synchronised(measured, log, simulated_walk(walk), walk)
+    pair = synchronised(measured, log, walk.simulated(), walk)
     taken = recorded(pair, walk.scenario, walk.controller, walk.design)
     with open_jobs(server, db, create=True) as jobs:
         kept = jobs.record(taken)

@@ -46,7 +46,7 @@ def validate(
     as_json: Json = False,
 ) -> None:
     """Simulate the walk that was measured, and judge the differences by tolerance classes."""
-    from cli.inputs.measured_walk import read_measured, read_walk, simulated_walk, synchronised
+    from cli.inputs.measured_walk import read_measured, read_walk, synchronised
     from cli.output import note, print_json, stdout_console
     from cli.tables.validation import alignment, comparison_table, confidence_table, remarks
     from cli.validation_report import write_report
@@ -54,7 +54,7 @@ def validate(
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
     logs = {path: read_measured(path, walk.robot) for path in (measured, *(repeat or ()))}
-    simulated = simulated_walk(walk)
+    simulated = walk.simulated()
     pairs = [synchronised(path, log, simulated, walk) for path, log in logs.items()]
     comparison = compare_synchronised(pairs[0], [pair.measured for pair in pairs[1:]])
     if as_json:

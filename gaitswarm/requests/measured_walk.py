@@ -1,0 +1,85 @@
+"""A measured log and the walk that it is of, as a recording. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pydantic import Field
+
+from gaitswarm.errors import simulation_errors
+from gaitswarm.requests.design import DesignRequest, resolved
+from services.optimizer.errors import InvalidRequest
+from sim.errors import MeasuredLogError
+from sim.identification.recorded_walk import RecordedWalk, record
+from sim.measurement.measured_csv import parse_measured_log
+from sim.measurement.measured_log import MeasuredLog
+from sim.measurement.synchronise import Synchronised, synchronise
+from sim.measurement.walk import MeasuredWalk
+from sim.robot import load_robot
+from sim.scenario import Scenario, ScenarioChoice
+
+
+class MeasuredWalkRequest(DesignRequest):
+    """A measured log, and which design walked where when it was measured."""
+
+    scenario: ScenarioChoice = Field(
+        description="The walk: name or number of a preset (see /v1/scenarios), or your own, with as"
+        " many cycles as were measured."
+    )
+    log: str = Field(
+        min_length=1,
+        description="Text of the log: CSV with 500 rows a second and the unit in every heading, in"
+        " the format of docs/validation.md.",
+        examples=["time [s],q_D.right_front_coxa [rad]\n0.0,0.3217\n0.002,0.3218\n"],
+    )
+
+    @property
+    def walk_scenario(self) -> Scenario:
+        """The scenario in full."""
+        return resolved(self.scenario)
+
+
+@dataclass(frozen=True, slots=True)
+class ReadWalk:
+    """What was read of a measured log.
+
+    Attributes:
+        log: all of it.
+        pair: its whole cycles beside those of the simulated walk.
+        walk: the recording.
+    """
+
+    log: MeasuredLog
+    pair: Synchronised
+    walk: RecordedWalk
+
+
+def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
+    """Read a log, let the design walk, and find the lag between the two.
+
+    Args:
+        request: The log and its walk.
+
+    Returns:
+        The log, the two walks on one time axis, and the measured currents for fits.
+
+    Raises:
+        InvalidRequest: The design cannot be compiled, the gait leaves the legs' reach, the
+            simulated walk fails, or the log cannot be read or compared; names the field, and of a
+            log line, column and unit.
+        EvaluatorUnavailable: The walk cannot be simulated on this machine now.
+    """
+    request.check_design()
+    scenario, design = request.walk_scenario, request.numbers
+    robot = load_robot(request.robot)
+    with simulation_errors("scenario"):
+        walk = MeasuredWalk.of(robot, scenario, request.controller, design)
+    # Before the walk is simulated, which takes longer.
+    try:
+        log = parse_measured_log(request.log, robot)
+        with simulation_errors("scenario"):
+            simulated = walk.simulated()
+        pair = synchronise(log, simulated, walk.cycle_time)
+        return ReadWalk(log, pair, record(pair, scenario, request.controller, design))
+    except MeasuredLogError as error:
+        raise InvalidRequest(str(error), field="log") from error

@@ -13,6 +13,7 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
     "jobs": {
         "jobs": "/jobs",
         "new-job": "/jobs/new",
+        "new-identification": "/jobs/new?kind=identification",
         "compare": "/compare?jobs={job}",
     },
     "a job": {

@@ -1,12 +1,13 @@
 /** All parts of the form, with the estimate and the spec beside them. */
 
-import { useEffect, useMemo, useState } from 'preact/hooks'
+import { useMemo, useState } from 'preact/hooks'
 import { ApiProblem } from '../api/problem'
 import type { JobSpec } from '../api/types'
 import { errorsByField, specOf, withKinds } from './build-spec'
 import { CaseSection } from './case-section'
 import { type Catalogue, variablesOf } from './catalogue'
 import type { Draft } from './draft'
+import { useFirstProblem } from './first-problem'
 import { JobSection } from './job-section'
 import { JsonForm } from './json-form'
 import { OptimizerSection } from './optimizer-section'
@@ -29,10 +30,7 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
     () => errorsByField(problem instanceof ApiProblem ? problem.errors : [], draft),
     [problem, draft],
   )
-  // Not for what an estimate has against the spec: whoever types keeps the focus.
-  useEffect(() => {
-    if (submission.attempts > 0) showFirstProblem()
-  }, [submission.attempts])
+  useFirstProblem(submission.attempts)
   if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
   const parts = {
     draft,
@@ -68,13 +66,4 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
 function built(draft: Draft, catalogue: Catalogue): JobSpec {
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
   return withKinds(specOf(draft), variablesOf(controller))
-}
-
-/** After a refused submission the first field that is to blame takes the focus. */
-function showFirstProblem(): void {
-  requestAnimationFrame(() => {
-    const field = document.querySelector<HTMLElement>('.submission [aria-invalid="true"]')
-    if (field) field.focus()
-    else document.querySelector('.submission [role="alert"]')?.scrollIntoView({ block: 'center' })
-  })
 }

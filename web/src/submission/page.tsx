@@ -11,6 +11,7 @@ import { around } from './around-design'
 import { caseOf } from './case'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
 import { type Draft, draftOf, emptyDraft, preferenceOf, withScenarios } from './draft'
+import { FitPage, OtherKinds } from './fit/page'
 import { JobForm } from './form'
 import { JsonForm } from './json-form'
 import './submission.css'
@@ -25,6 +26,12 @@ interface Start {
 
 export default function NewJobPage() {
   const { query } = usePlace()
+  const kind = query.get('kind')
+  if (kind === 'identification') return <FitPage kind={kind} query={query} />
+  return <NewTuning query={query} />
+}
+
+function NewTuning({ query }: { query: URLSearchParams }) {
   const start = useResource(`new ${query}`, (signal) => prepare(query, signal))
   const from = start.data?.from ?? null
   return (
@@ -32,6 +39,7 @@ export default function NewJobPage() {
       <header class="page-header">
         <div>
           <h1>New job</h1>
+          {query.get('clone') === null && <OtherKinds kind="tuning" />}
           {from && (
             <p class="muted">
               from <a href={`/jobs/${from.id}`}>{from.name || from.id}</a>

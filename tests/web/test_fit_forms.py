@@ -1,0 +1,86 @@
+"""Forms that fit a robot to a measured walk: its log is uploaded, read, and a job made of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from sim.measurement.measured_csv import format_measured_log
+from sim.measurement.walk import MeasuredWalk
+from sim.robot import DEFAULT_ROBOT, load_robot
+from sim.scenario import find_scenario
+from tests.examples.servers import ServerProcess
+from tests.examples.walks import PUBLISHED_A
+from tests.web.visit import Visit
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of one cycle of the first preset with the design that the form begins with."""
+    scenario = find_scenario("normal-fast").model_copy(update={"cycles": 1.0})
+    walk = MeasuredWalk.of(load_robot(DEFAULT_ROBOT), scenario, "fuzzy-pi", PUBLISHED_A)
+    path = tmp_path_factory.mktemp("log") / "walk.csv"
+    path.write_text(format_measured_log(walk.simulated()), encoding="utf-8")
+    return path
+
+
+def upload(page: Page, log: Path) -> None:
+    page.get_by_label("Log").set_input_files(log)
+    page.get_by_role("button", name="Read the log").click()
+
+
+def submitted(page: Page) -> str:
+    """Id of the job, once its page is there."""
+    page.get_by_role("button", name="Submit the job").click()
+    expect(page).to_have_url(re.compile(r"/jobs/(?!new)[^/?]+$"))
+    return page.url.rsplit("/", 1)[1]
+
+
+def test_a_log_is_uploaded_read_and_identified_from(
+    server: ServerProcess, log: Path, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="422").go("/jobs/new")
+    page.get_by_role("link", name="an identification from measured walks").click()
+    page.get_by_label("Cycles").fill("2")
+    upload(page, log)
+    read = page.get_by_role("region", name="What was read")
+    expect(read).to_contain_text("1.500 s in 750 rows. The walk begins 0 s into the log; 1 whole")
+    expect(read.get_by_role("row").filter(has_text="I_M")).to_contain_text("18")
+    recording = str(read.get_attribute("data-recording"))
+    expect(page.locator(f"[data-chosen='{recording}']")).to_contain_text("1.50 s of normal-fast")
+
+    page.get_by_label("Parameters").fill("body_mass=3:5, battery_voltage")
+    page.get_by_label("Particles").fill("4")
+    page.get_by_label("Iterations").fill("1")
+    page.get_by_label("Links").fill("1, 2")
+    expect(page.locator("[data-walks='4']")).to_be_visible()
+    spec = server.job(submitted(page))["spec"]
+    assert (spec["kind"], spec["recordings"], spec["links"]) == (
+        "identification",
+        [recording],
+        [1, 2],
+    )
+    assert [(v["name"], v["low"]) for v in spec["variables"]] == [
+        ("body_mass", 3.0),
+        ("battery_voltage", 8.0),
+    ]
+
+
+def test_what_is_wrong_with_a_log_is_told_at_its_field(
+    server: ServerProcess, log: Path, tmp_path: Path, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="422").go("/jobs/new?kind=identification")
+    page.get_by_role("button", name="Read the log").click()
+    expect(page.get_by_label("Log")).to_have_accessible_description("choose a file first")
+    lines = log.read_text(encoding="utf-8").splitlines()
+    broken = tmp_path / "broken.csv"
+    broken.write_text("\n".join([*lines[:9], "warp" + lines[9], *lines[10:]]), encoding="utf-8")
+    upload(page, broken)
+    told = re.compile(r"line 10, column 'time \[s\]': 'warp.*' is not a number")
+    expect(page.get_by_label("Log")).to_have_accessible_description(told)

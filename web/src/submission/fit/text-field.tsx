@@ -1,0 +1,36 @@
+/** A labelled line of text, with a hint or what the API has against it. */
+
+import { useId } from 'preact/hooks'
+
+export function TextField({
+  label,
+  value,
+  hint,
+  error,
+  wide = false,
+  onChange,
+}: {
+  label: string
+  value: string
+  hint?: string
+  error?: string
+  wide?: boolean
+  onChange: (value: string) => void
+}) {
+  const id = useId()
+  return (
+    <div class={wide ? 'field wide' : 'field'}>
+      <label for={id}>{label}</label>
+      <input
+        id={id}
+        value={value}
+        aria-invalid={error !== undefined}
+        aria-describedby={`${id}-hint`}
+        onInput={(event) => onChange(event.currentTarget.value)}
+      />
+      <span id={`${id}-hint`} class={error === undefined ? 'hint' : 'wrong'}>
+        {error ?? hint}
+      </span>
+    </div>
+  )
+}

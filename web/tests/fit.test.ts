@@ -1,0 +1,83 @@
+import { describe, expect, test } from 'vitest'
+import type { OptimizerPreset } from '../src/api/types'
+import { EMPTY_FIT, errorsByPart } from '../src/submission/fit/fit'
+import { identificationSpec } from '../src/submission/fit/identification'
+import { emptyWalk, measuredRequest, walkErrors } from '../src/submission/fit/measured-walk'
+import { CATALOGUE } from './catalogue-example'
+
+const METHODS = [
+  { settings: { name: 'pso', particles: 25 } },
+  { settings: { name: 'one-at-a-time' } },
+] as unknown as readonly OptimizerPreset[]
+
+describe('an identification', () => {
+  test('has variables as they were typed: by name, with bounds, with choices', () => {
+    const variables = 'body_mass, battery_voltage=9:12\ncontact_law=stick:dead_zone'
+    const draft = { ...EMPTY_FIT, name: 'fit', variables }
+    expect(identificationSpec(draft, '1,3', 'hexapod', ['aa', 'bb'], METHODS)).toEqual({
+      kind: 'identification',
+      name: 'fit',
+      robot: 'hexapod',
+      recordings: ['aa', 'bb'],
+      links: [1, 3],
+      variables: [
+        'body_mass',
+        { name: 'battery_voltage', low: 9, high: 12 },
+        { name: 'contact_law', kind: 'categorical', choices: ['stick', 'dead_zone'] },
+      ],
+      optimizer: { name: 'pso', particles: 48, inertia_start: 0.9, inertia_end: 0.4 },
+      iterations: 120,
+      seed: 1,
+    })
+  })
+
+  test('sends what is no number as typed, and no particles to a method without', () => {
+    const draft = { ...EMPTY_FIT, method: 'one-at-a-time', iterations: 'ten' }
+    const spec = identificationSpec(draft, 'foot', 'hexapod', [], METHODS)
+    expect(spec.optimizer).toEqual({ name: 'one-at-a-time' })
+    expect([spec.iterations, spec.links, 'variables' in spec]).toEqual(['ten', ['foot'], false])
+  })
+
+  test('has the messages of the API by part, with the entry', () => {
+    const errors = [
+      { field: 'recordings.1', message: 'unknown' },
+      { field: 'recordings', message: 'too few' },
+      { field: 'targets.0.value', message: 'none' },
+    ]
+    expect(errorsByPart(errors)).toEqual({
+      recordings: 'entry 2: unknown; too few',
+      targets: 'entry 1, value: none',
+    })
+  })
+})
+
+describe('a measured walk', () => {
+  const draft = { ...emptyWalk(CATALOGUE), design: '{"P": 0.4}' }
+
+  test('names its preset, unless other cycles were walked', () => {
+    const { name } = CATALOGUE.scenarios[0]
+    const request = measuredRequest(draft, 'hexapod', 'time [s]', CATALOGUE)
+    expect(request).toMatchObject({ robot: 'hexapod', scenario: name, design: { P: 0.4 } })
+    const walked = measuredRequest({ ...draft, cycles: '5' }, 'hexapod', '', CATALOGUE)
+    expect(walked.scenario).toMatchObject({ name, cycles: 5 })
+  })
+
+  test('sends a design that is no JSON as typed, for the API to refuse', () => {
+    expect(measuredRequest({ ...draft, design: '{' }, '', '', CATALOGUE).design).toBe('{')
+  })
+
+  test('has the messages of the API at its fields, and those of none aside', () => {
+    const errors = [
+      { field: 'log', message: 'line 3: not a number' },
+      { field: 'scenario.cycles', message: 'must be a number' },
+      { field: 'design.P', message: 'missing' },
+      { field: '', message: 'no' },
+    ]
+    expect(walkErrors(errors)).toEqual({
+      log: 'line 3: not a number',
+      cycles: 'must be a number',
+      design: 'P: missing',
+      '': 'no',
+    })
+  })
+})

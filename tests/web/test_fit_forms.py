@@ -72,6 +72,35 @@ def test_a_log_is_uploaded_read_and_identified_from(
     ]
 
 
+def test_what_a_log_tells_is_calibrated_to_beside_what_is_typed(
+    server: ServerProcess, log: Path, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="422").go("/jobs/new?kind=calibration")
+    page.get_by_label("Cycles").fill("1")
+    upload(page, log)
+    value = page.get_by_label("value of target 1")
+    expect(value).not_to_have_value("")
+    page.get_by_label("tolerance of target 2").fill("0.3")
+    page.get_by_role("button", name="Add a target").click()
+    page.get_by_label("value of target 3").fill("fast")
+    expect(page.get_by_text("entry 3, value:")).to_be_visible()
+    page.get_by_label("value of target 3").fill("0.15")
+    page.get_by_label("Particles").fill("4")
+    page.get_by_label("Iterations").fill("1")
+    measured = float(value.input_value())
+    expect(page.locator("[data-walks='4']")).to_be_visible()
+    spec = server.job(submitted(page))["spec"]
+    assert spec["kind"] == "calibration"
+    assert [(t["quantity"], t["tolerance"], t["use"]) for t in spec["targets"]] == [
+        ("mean_current", 0.1, "fit"),
+        ("peak_current", 0.3, "predict"),
+        ("speed", 0.1, "fit"),
+    ]
+    assert spec["targets"][0]["value"] == measured
+    assert spec["walks"][0]["design"] == PUBLISHED_A
+    assert spec["walks"][0]["scenarios"][0]["cycles"] == 1.0
+
+
 def test_what_is_wrong_with_a_log_is_told_at_its_field(
     server: ServerProcess, log: Path, tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:

@@ -42,6 +42,7 @@ export const DOCUMENT: OpenApiDocument = {
           backlash: { default: [0, 0, 0] },
         },
       },
+      Target: { properties: { quantity: { type: 'string', enum: ['speed', 'mean_current'] } } },
       TuningWorlds: {
         properties: {
           count: { type: 'integer', minimum: 1, maximum: 100, default: 8 },
@@ -152,5 +153,6 @@ export const CATALOGUE = {
     scenario: fieldsOf(DOCUMENT, 'Scenario'),
     variant: fieldsOf(DOCUMENT, 'RobotVariant'),
     worlds: fieldsOf(DOCUMENT, 'TuningWorlds'),
+    target: fieldsOf(DOCUMENT, 'Target'),
   },
 } as unknown as Catalogue

@@ -1,8 +1,9 @@
 import { describe, expect, test } from 'vitest'
-import type { OptimizerPreset } from '../src/api/types'
+import type { OptimizerPreset, RecordingView } from '../src/api/types'
 import { EMPTY_FIT, errorsByPart } from '../src/submission/fit/fit'
 import { identificationSpec } from '../src/submission/fit/identification'
 import { emptyWalk, measuredRequest, walkErrors } from '../src/submission/fit/measured-walk'
+import { calibrationSpec, nextKey, withRecordings } from '../src/submission/fit/targets'
 import { CATALOGUE } from './catalogue-example'
 
 const METHODS = [
@@ -48,6 +49,40 @@ describe('an identification', () => {
       recordings: 'entry 2: unknown; too few',
       targets: 'entry 1, value: none',
     })
+  })
+})
+
+describe('a calibration', () => {
+  const recording = (id: string) =>
+    ({
+      id,
+      controller: 'pi',
+      design: { P: 0.4 },
+      walk: { name: 'fast' },
+      mean_current: 0.123456,
+      peak_current: 0.9,
+    }) as unknown as RecordingView
+
+  test('has walk and currents of each recording, and none of a recording that is left out', () => {
+    const [a, b] = [recording('aa'), recording('bb')]
+    const targets = withRecordings([], [], [a, b])
+    const { walks, targets: sent } = calibrationSpec(EMPTY_FIT, targets, 'hexapod', [b], METHODS)
+    expect(walks).toEqual([
+      { name: 'walk-1', controller: 'pi', design: { P: 0.4 }, scenarios: [{ name: 'fast' }] },
+    ])
+    expect(sent).toEqual([
+      { walk: 'walk-1', quantity: 'mean_current', value: 0.1235, tolerance: 0.1, use: 'fit' },
+      { walk: 'walk-1', quantity: 'peak_current', value: 0.9, tolerance: 0.2, use: 'predict' },
+    ])
+  })
+
+  test('keeps what was changed and removed when another recording comes', () => {
+    const [a, b] = [recording('aa'), recording('bb')]
+    const kept = withRecordings([], [], [a]).slice(0, 1)
+    const targets = withRecordings(kept, ['aa'], [a, b])
+    expect(targets.map(({ recording }) => recording)).toEqual(['aa', 'bb', 'bb'])
+    expect(new Set(targets.map(({ key }) => key)).size).toBe(3)
+    expect(nextKey(targets)).toBe(3)
   })
 })
 

@@ -25,6 +25,8 @@ export interface Catalogue {
     readonly scenario: ReadonlyMap<string, SchemaField>
     readonly variant: ReadonlyMap<string, SchemaField>
     readonly worlds: ReadonlyMap<string, SchemaField>
+    /** Of a calibration. */
+    readonly target: ReadonlyMap<string, SchemaField>
   }
 }
 
@@ -68,6 +70,7 @@ export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
       scenario: fieldsOf(document, 'Scenario'),
       variant: fieldsOf(document, 'RobotVariant'),
       worlds: fieldsOf(document, 'TuningWorlds'),
+      target: fieldsOf(document, 'Target'),
     },
   }
 }

@@ -27,7 +27,9 @@ interface Start {
 export default function NewJobPage() {
   const { query } = usePlace()
   const kind = query.get('kind')
-  if (kind === 'identification') return <FitPage kind={kind} query={query} />
+  if (kind === 'identification' || kind === 'calibration') {
+    return <FitPage kind={kind} query={query} />
+  }
   return <NewTuning query={query} />
 }
 

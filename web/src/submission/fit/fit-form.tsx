@@ -22,6 +22,7 @@ export function FitForm({
   onDraft,
   spec,
   parts,
+  before,
   children,
 }: {
   title: string
@@ -33,8 +34,10 @@ export function FitForm({
   spec: AnySpec
   /** Parts of the spec that are no fields here, whose problems are told together. */
   parts: readonly string[]
+  /** What stands before the fields. */
+  before?: ComponentChildren
   /** Fields of the kind's own, given the problems by part. */
-  children: (errors: Readonly<Record<string, string>>) => ComponentChildren
+  children?: (errors: Readonly<Record<string, string>>) => ComponentChildren
 }) {
   const [asJson, setAsJson] = useState(false)
   const submission = useSubmission(spec)
@@ -64,6 +67,7 @@ export function FitForm({
       <section class="card stack" aria-labelledby="part-fit">
         <h2 id="part-fit">{title}</h2>
         <Problems messages={parts.flatMap((part) => (errors[part] ? [errors[part]] : []))} />
+        {before}
         <div class="fields">
           {field('name', 'Name', 'shown in the list of jobs')}
           <ChoiceField
@@ -78,7 +82,7 @@ export function FitForm({
             'Parameters',
             'names, separated by commas; body_mass=3:5 for bounds, contact_law=stick:dead_zone for choices; empty: all of the robot’s',
           )}
-          {children(errors)}
+          {children?.(errors)}
           <ChoiceField
             label="Method"
             choices={catalogue.optimizers.map(({ settings }) => settings.name)}

@@ -1,21 +1,30 @@
 /** New jobs that fit a robot to measured walks: the walk, the recordings, and the form of the job. */
 
-import { useState } from 'preact/hooks'
+import { useRef, useState } from 'preact/hooks'
 import { get } from '../../api/client'
-import { type Resource, useResource } from '../../api/resource'
-import type { RecordingView } from '../../api/types'
+import { useResource } from '../../api/resource'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { setQuery } from '../../router/navigation'
 import { withQuery } from '../../router/routes'
 import { type Catalogue, loadCatalogue } from '../catalogue'
+import { CalibrationForm } from './calibration'
 import { ChosenCard } from './chosen-card'
 import { words } from './fit'
 import { IdentificationForm } from './identification'
 import { UploadCard } from './upload-card'
 
-type FitKind = 'identification'
+export type FitKind = 'identification' | 'calibration'
 
-const TITLES: Readonly<Record<FitKind, string>> = { identification: 'New identification' }
+const TITLES: Readonly<Record<FitKind, string>> = {
+  identification: 'New identification',
+  calibration: 'New calibration',
+}
+
+const WORDS = {
+  tuning: 'a search for designs',
+  identification: 'an identification from measured walks',
+  calibration: 'a calibration to measured walks',
+}
 
 /** What the form of a kind needs. */
 export interface FitProps {
@@ -24,7 +33,6 @@ export interface FitProps {
   readonly onRobot: (name: string) => void
   /** Of the recordings that were chosen. */
   readonly ids: readonly string[]
-  readonly recordings: Resource<readonly RecordingView[]>
 }
 
 export function FitPage({ kind, query }: { kind: FitKind; query: URLSearchParams }) {
@@ -46,12 +54,20 @@ export function FitPage({ kind, query }: { kind: FitKind; query: URLSearchParams
         />
       )}
       {catalogue.loading && <Loading what="the catalogue" />}
-      {catalogue.data && <Fit catalogue={catalogue.data} ids={ids} />}
+      {catalogue.data && <Fit kind={kind} catalogue={catalogue.data} ids={ids} />}
     </>
   )
 }
 
-function Fit({ catalogue, ids }: { catalogue: Catalogue; ids: readonly string[] }) {
+function Fit({
+  kind,
+  catalogue,
+  ids,
+}: {
+  kind: FitKind
+  catalogue: Catalogue
+  ids: readonly string[]
+}) {
   const usual = catalogue.fields.variant.get('name')?.default
   const [robot, setRobot] = useState(typeof usual === 'string' ? usual : catalogue.robots[0].name)
   const recordings = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
@@ -65,13 +81,17 @@ function Fit({ catalogue, ids }: { catalogue: Catalogue; ids: readonly string[] 
     const text = unique(chosen).join(',')
     setQuery({ recordings: text === '' ? null : text })
   }
-  const parts = { catalogue, robot, onRobot: setRobot, ids, recordings }
+  const parts = { catalogue, robot, onRobot: setRobot, ids }
+  const shown = useLast(recordings.data)?.filter(({ id }) => ids.includes(id)) ?? []
   return (
     <div class="stack">
       <UploadCard {...parts} onRead={({ recording }) => choose([...chosenNow(), recording.id])} />
       <ChosenCard ids={ids} recordings={recordings} onChange={choose} />
       {/* Nothing is fitted to nothing: what the job costs cannot be asked before. */}
-      {ids.length > 0 && <IdentificationForm {...parts} />}
+      {ids.length > 0 && kind === 'identification' && <IdentificationForm {...parts} />}
+      {kind === 'calibration' && shown.length > 0 && (
+        <CalibrationForm {...parts} recordings={shown} />
+      )}
     </div>
   )
 }
@@ -84,18 +104,31 @@ export function OtherKinds({
   kind: FitKind | 'tuning'
   recordings?: readonly string[]
 }) {
-  const pathOf = (other: FitKind) =>
-    withQuery('/jobs/new', { kind: other, recordings: recordings.join(',') })
+  const others = (['tuning', 'identification', 'calibration'] as const).filter((k) => k !== kind)
   return (
     <p class="muted">
-      or{' '}
-      {kind === 'tuning' ? (
-        <a href={pathOf('identification')}>an identification from measured walks</a>
-      ) : (
-        <a href="/jobs/new">a search for designs</a>
-      )}
+      {others.map((other) => (
+        <span key={other}>
+          or{' '}
+          <a
+            href={withQuery('/jobs/new', {
+              kind: other === 'tuning' ? undefined : other,
+              recordings: other === 'tuning' ? undefined : recordings.join(','),
+            })}
+          >
+            {WORDS[other]}
+          </a>{' '}
+        </span>
+      ))}
     </p>
   )
+}
+
+/** The answer before, while another one is awaited: what was typed beside it stays. */
+function useLast<T>(data: T | null): T | null {
+  const last = useRef(data)
+  if (data !== null) last.current = data
+  return last.current
 }
 
 /** As the address says when an answer comes, which may have been asked for long before. */

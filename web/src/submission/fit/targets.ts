@@ -1,0 +1,97 @@
+/** What measured walks came to, as targets of a calibration. Pure. */
+
+import type { CalibrationSpec, OptimizerPreset, RecordingView } from '../../api/types'
+import { type FitDraft, fitOf, number } from './fit'
+
+/** One target as it was typed. */
+export interface TargetDraft {
+  readonly key: number
+  /** Id of the recording that it is of. */
+  readonly recording: string
+  readonly quantity: string
+  readonly value: string
+  readonly tolerance: string
+  readonly use: 'fit' | 'predict'
+}
+
+/** What a log tells of its walk by itself: currents. Peaks are noise's too, and so only predicted. */
+export function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[] {
+  const common = { recording: recording.id }
+  return [
+    {
+      ...common,
+      key,
+      quantity: 'mean_current',
+      value: String(Number(recording.mean_current.toPrecision(4))),
+      tolerance: '0.1',
+      use: 'fit',
+    },
+    {
+      ...common,
+      key: key + 1,
+      quantity: 'peak_current',
+      value: String(Number(recording.peak_current.toPrecision(4))),
+      tolerance: '0.2',
+      use: 'predict',
+    },
+  ]
+}
+
+/** The targets of the recordings that are chosen: those there are, and the first ones of new recordings. */
+export function withRecordings(
+  targets: readonly TargetDraft[],
+  seen: readonly string[],
+  recordings: readonly RecordingView[],
+): readonly TargetDraft[] {
+  const all = [...targets]
+  for (const recording of recordings) {
+    if (!seen.includes(recording.id)) all.push(...targetsOf(recording, nextKey(all)))
+  }
+  return all
+}
+
+export function nextKey(targets: readonly TargetDraft[]): number {
+  return Math.max(-1, ...targets.map(({ key }) => key)) + 1
+}
+
+/** What a walk is called in the job. */
+export function walkName(index: number): string {
+  return `walk-${index + 1}`
+}
+
+/** Of the targets only those whose recording is chosen count. */
+export function calibrationSpec(
+  draft: FitDraft,
+  targets: readonly TargetDraft[],
+  robot: string,
+  recordings: readonly RecordingView[],
+  methods: readonly OptimizerPreset[],
+): CalibrationSpec {
+  const places = new Map(recordings.map(({ id }, index) => [id, walkName(index)]))
+  return {
+    kind: 'calibration',
+    robot,
+    walks: recordings.map(({ controller, design, walk }, index) => ({
+      name: walkName(index),
+      controller,
+      design,
+      scenarios: [walk],
+    })),
+    targets: shown(targets, recordings).map(({ recording, quantity, value, tolerance, use }) => ({
+      walk: places.get(recording),
+      quantity,
+      value: number(value),
+      tolerance: number(tolerance),
+      use,
+    })),
+    ...fitOf(draft, methods),
+  } as unknown as CalibrationSpec
+}
+
+/** Those of the chosen recordings. */
+export function shown(
+  targets: readonly TargetDraft[],
+  recordings: readonly RecordingView[],
+): readonly TargetDraft[] {
+  return targets.filter(({ recording }) => recordings.some(({ id }) => id === recording))
+}

@@ -70,3 +70,25 @@ def test_every_design_is_in_the_file_of_parallel_coordinates(
     assert best == pytest.approx(told, rel=1e-6)
     page.keyboard.press("Escape")
     expect(page.get_by_role("menu")).to_have_count(0)
+
+
+def test_what_limits_the_winner_is_saved_with_the_names_of_its_columns(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}")
+    card = page.get_by_role("region", name="What limits the winner", exact=True)
+    saved = save(page, "What limits the winner", "Picture (SVG)", tmp_path)
+    drawing = ET.parse(saved).getroot()  # noqa: S314 - this page's own
+    drawn = " ".join(text.text or "" for text in drawing.iter(f"{SVG}text"))
+    names = card.locator("thead th").all_inner_texts()
+    assert len(names) > 3
+    assert all(" ".join(name.split()) in drawn for name in names)
+
+    file = save(page, "What limits the winner", "Numbers (CSV)", tmp_path)
+    with file.open(newline="") as numbers:
+        rows = list(csv.DictReader(numbers))
+    told = server.client.get(f"/v1/jobs/{finished_job}").json()["best"]["scenarios"]
+    values = {(row["Scenario"], row["Objective"]): float(row["Value"]) for row in rows}
+    assert {scenario for scenario, _ in values} == set(told)
+    for (scenario, objective), value in values.items():
+        assert value == told[scenario]["objectives"][objective.replace(" ", "_")]

@@ -12,9 +12,12 @@ export interface Picture {
   readonly height: number
 }
 
-/** Not of the picture: controls, what only readers of screens hear, and what follows the pointer. */
+/**
+ * Not of the picture: controls other than the heads of columns, what only readers of screens hear,
+ * and what follows the pointer.
+ */
 const LEFT_OUT =
-  '[data-not-drawn], .visually-hidden, button, select, input, details, .readout, .u-select, [class*="u-cursor"]'
+  '[data-not-drawn], .visually-hidden, button:not(th > button), select, input, details, .readout, .u-select, [class*="u-cursor"]'
 
 const ROOM = 12
 

@@ -1,6 +1,7 @@
 /** What limits the winner now, in words and numbers. */
 
 import type { Job, JobSpec, Preference } from '../api/types'
+import { ChartFrame } from '../components/chart-frame'
 import { Table } from '../components/table'
 import { formatNumber, percent, quantity } from '../format/number'
 import { inWords } from '../format/words'
@@ -12,15 +13,17 @@ export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
   if (!analysis) return null
   const units = new Map(job.objectives.map((o) => [o.name, o.unit]))
   return (
-    <section class="card" aria-labelledby="limits">
-      <h2 id="limits">What limits the winner</h2>
+    <ChartFrame
+      title="What limits the winner"
+      table={() => <FactorTable analysis={analysis} units={units} />}
+    >
       <div class="stack">
         <p data-limit={`${analysis.worstScenario} ${analysis.worstFactor.objective}`}>
           {explain(analysis, units)}
         </p>
         {Object.keys(analysis.utilities).length > 1 && <ContributionTable analysis={analysis} />}
       </div>
-    </section>
+    </ChartFrame>
   )
 }
 
@@ -85,6 +88,44 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
         logarithm of the scenario’s utility over the geometric mean of all.
       </p>
     </div>
+  )
+}
+
+/** Every objective of every scenario: what it is, what it adds, and what a change of it is worth. */
+function FactorTable({ analysis, units }: { analysis: Analysis; units: Map<string, string> }) {
+  return (
+    <Table
+      caption="What limits the winner"
+      rows={analysis.factors}
+      rowKey={({ scenario, objective }) => `${scenario} ${objective}`}
+      order={{ column: 'sensitivity', descending: true }}
+      columns={[
+        { key: 'scenario', label: 'Scenario', header: true, value: (f) => f.scenario },
+        { key: 'objective', label: 'Objective', value: (f) => inWords(f.objective) },
+        {
+          key: 'value',
+          label: 'Value',
+          numeric: true,
+          value: (f) => f.value,
+          cell: (f) => formatNumber(f.value, 4),
+        },
+        { key: 'unit', label: 'Unit', value: (f) => units.get(f.objective) ?? '1' },
+        {
+          key: 'contribution',
+          label: 'Adds to the logarithm of the utility',
+          numeric: true,
+          value: (f) => f.contribution,
+          cell: (f) => formatNumber(f.contribution, 3),
+        },
+        {
+          key: 'sensitivity',
+          label: 'Change of the fitness per change of it',
+          numeric: true,
+          value: (f) => f.sensitivity,
+          cell: (f) => formatNumber(f.sensitivity, 3),
+        },
+      ]}
+    />
   )
 }
 

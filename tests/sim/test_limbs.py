@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from importlib import resources
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -14,6 +13,7 @@ import pytest
 from sim.errors import RobotFileError
 from sim.kernel.compiled.native import native_kernel
 from sim.kernel.dynamics.kinds import robot_constants
+from sim.kernel.dynamics.spatial import Scalar
 from sim.kernel.dynamics.traced import Traced
 from sim.kernel.dynamics.tree import leaves
 from sim.kernel.emitted.source import kernel_identity, kernel_source
@@ -27,6 +27,8 @@ from sim.robot.urdf import parse_urdf
 from tests.examples.paths import QUADRUPED
 from tests.examples.walks import short_walk, walk
 from tests.sim.pinocchio_oracle import Oracle, robot_named
+
+Pair = tuple[Scalar, Scalar]
 
 BRIEF = short_walk(cycle_time=0.5)
 
@@ -181,12 +183,13 @@ def test_legs_that_are_no_chains_of_hinges_to_their_feet_are_refused_by_name(
 def test_a_traced_function_comes_to_the_same_with_other_symbols_and_numbers() -> None:
     runs = []
 
-    def lever(arm: tuple[Any, Any], force: tuple[Any, Any]) -> tuple[Any, tuple[Any, float]]:
+    def lever(arm: Pair, force: Pair) -> tuple[Scalar, Pair]:
         runs.append(arm)
         return arm[0] * force[1] - arm[1] * force[0], (arm[0] / arm[1], 2.0)
 
     x, y, z = (ca.SX.sym(name) for name in "xyz")
-    traced = Traced(lever, (x, y), (z, 3.0))
+    examples: tuple[Pair, Pair] = (x, y), (z, 3.0)
+    traced = Traced(lever, *examples)
     for arm, force in (((y, z), (x, 3.0)), ((2.0, 4.0), (x, 3.0)), ((0.0, y), (0.0, 3.0))):
         moment, (ratio, two) = traced(arm, force)
         expected, (quotient, _) = lever(arm, force)

@@ -21,6 +21,7 @@ from sim import former_names
 from sim.choice import NAME, OWN, alternatives
 from sim.errors import SimulationInputError
 from sim.former_names import current_names
+from sim.usual_duty import USUAL_SUPPORT, with_duty_factor
 from sim.variables import VariableName, split_name
 from sim.wording import message_of
 
@@ -130,7 +131,8 @@ class Scenario(BaseModel):
         default=0.56,
         ge=0.1,
         le=0.95,
-        description="Share of the cycle of the phase that `duty_phase` names [1].",
+        description="Share of the cycle of the phase that `duty_phase` names; the default is"
+        f" {', '.join(f'{share:g} in a {gait}' for gait, share in USUAL_SUPPORT.items())} [1].",
     )
     duty_phase: Literal["support", "swing"] = Field(
         default="support", description="Phase whose share of the cycle `duty_factor` is."
@@ -240,7 +242,7 @@ class Scenario(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _read_former_names(cls, document: Any) -> Any:
-        return current_names(document, former_names.SCENARIO)
+        return with_duty_factor(current_names(document, former_names.SCENARIO))
 
     @model_validator(mode="after")
     def _gait_is_one(self) -> Scenario:

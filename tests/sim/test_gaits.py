@@ -322,3 +322,26 @@ def test_feet_touch_the_ground_when_the_gait_plans_it(
 def test_presets_are_in_the_robots_own_gait() -> None:
     scenario = find_scenario("normal-fast")
     assert (scenario.gait, scenario.phases, scenario.by_group) == ("own", None, None)
+
+
+@pytest.mark.parametrize(
+    ("given", "support"),
+    [
+        ({"gait": "wave"}, 0.85),
+        ({"gait": "crawl"}, 0.85),
+        ({"gait": "ripple"}, 0.7),
+        ({"gait": "ripple", "duty_phase": "swing"}, 0.7),
+        ({"gait": "trot"}, 0.56),
+        ({}, 0.56),
+        ({"gait": "wave", "duty_factor": 0.56}, 0.56),
+    ],
+)
+def test_gaits_that_need_more_support_have_it_unless_it_is_given(
+    given: dict[str, Any], support: float
+) -> None:
+    walk = Scenario(**CRAWL | {"name": "one"} | given)
+    assert walk.support_share == pytest.approx(support)
+    assert Scenario.model_validate(walk.model_dump()) == walk
+    assert walk.model_dump()["duty_factor"] == walk.duty_factor
+    renamed = with_gait(walk, {"gait": float(GAIT_NAMES.index("wave"))})
+    assert renamed.gait == "wave" and renamed.duty_factor == walk.duty_factor

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
 
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import MeasuredLogError
 from sim.measurement.measured_log import MeasuredLog
+from sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 
@@ -127,6 +127,10 @@ def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, floa
 
 def _cross_correlation(x: Floats, y: Floats) -> Floats:
     """sum over rows and columns of x[t + k] y[t], for k from -(len(y) - 1) to len(x) - 1."""
+    # Slow to import, and what only shows recordings needs none of it.
+    require_room_for_scipy()
+    from scipy.signal import fftconvolve  # noqa: PLC0415
+
     product: Floats = fftconvolve(x, y[::-1], axes=0).sum(axis=1)
     return product
 

@@ -33,6 +33,12 @@ def test_help_imports_none_of_the_heavy_packages(of: list[str]) -> None:
     assert loaded_by(statements, HEAVY) == set()
 
 
+@pytest.mark.slow
+def test_commands_on_a_database_import_nothing_that_few_of_them_need() -> None:
+    rare = ("scipy", "casadi", "pinocchio", "ray", "fastapi", "matplotlib", "pyarrow")
+    assert loaded_by("import gaitswarm.jobs.database.jobs", rare) == set()
+
+
 def test_help_is_that_of_the_innermost_command_wherever_it_is_asked_for(
     gaitswarm: Gaitswarm,
 ) -> None:

@@ -32,7 +32,7 @@ MeasuredWalkBody = Annotated[
     MeasuredWalkRequest, Depends(validated(MeasuredWalkRequest, "request"))
 ]
 
-MEASURED: Final = f"{PREFIX}/recordings/measured"
+MEASURED: Final = f"{PREFIX}/measured-walks"
 """The path whose bodies hold a measured log, and may be as large as one."""
 
 RecordingId = Annotated[
@@ -57,7 +57,7 @@ def add_recording(
     """Motor currents of a measured walk, for jobs of kind `identification`.
 
     The id is the content's hash: the same walk again is the same recording. `gaitswarm record` and
-    POST /v1/recordings/measured make one of a measured log.
+    POST /v1/measured-walks make one of a measured log.
     """
     return _kept(walk, service, response, actor)
 

@@ -69,7 +69,7 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/certificate",
         "post /v1/estimates",
         "post /v1/recordings",
-        "post /v1/recordings/measured",
+        "post /v1/measured-walks",
         "get /v1/recordings/{recording_id}",
         "get /v1/recordings/{recording_id}/summary",
         "post /v1/simulations",

@@ -111,7 +111,7 @@ def test_a_measured_log_is_read_and_its_whole_cycles_are_recorded(
 ) -> None:
     # Larger than other bodies may be: blank lines are left out.
     answer = client.post(
-        "/v1/recordings/measured", json=measured | {"log": measured["log"] + "\n" * 600_000}
+        "/v1/measured-walks", json=measured | {"log": measured["log"] + "\n" * 600_000}
     )
     assert answer.status_code == 201, answer.text
     read = answer.json()
@@ -145,7 +145,7 @@ def test_a_measured_log_that_cannot_be_read_names_field_and_line(
     field: str,
     message: str,
 ) -> None:
-    answer = client.post("/v1/recordings/measured", json=measured | change)
+    answer = client.post("/v1/measured-walks", json=measured | change)
     assert answer.status_code == 422, answer.text
     (error,) = answer.json()["errors"]
     assert error["field"].startswith(field)
@@ -158,15 +158,15 @@ def test_currents_that_no_motor_draws_make_no_recording(
     log.current[700, 3] += 2000.0
     text = format_measured_log(log)
     log.current[700, 3] -= 2000.0
-    answer = client.post("/v1/recordings/measured", json=measured | {"log": text})
+    answer = client.post("/v1/measured-walks", json=measured | {"log": text})
     assert answer.status_code == 422
     assert "current.210.3" in answer.json()["errors"][0]["message"]
 
 
 def test_a_log_over_its_own_limit_is_told_what_to_do(serve: Serve) -> None:
     client = serve(api_max_body_bytes=1000, api_max_log_bytes=2000).client
-    answer = client.post("/v1/recordings/measured", json={"log": "x" * 2000})
+    answer = client.post("/v1/measured-walks", json={"log": "x" * 2000})
     assert answer.status_code == 413
     assert "leave out cycles" in answer.json()["detail"]
-    assert client.post("/v1/recordings/measured", json={"log": "x" * 1500}).status_code == 422
+    assert client.post("/v1/measured-walks", json={"log": "x" * 1500}).status_code == 422
     assert client.post("/v1/jobs", json={"name": "x" * 1500}).status_code == 413

@@ -48,7 +48,7 @@ export function UploadCard({
     setRead(null)
     try {
       const body = measuredRequest(draft, robot, await file.text(), catalogue)
-      const answer = await post('/v1/recordings/measured', { body })
+      const answer = await post('/v1/measured-walks', { body })
       setRead(answer)
       onRead(answer)
     } catch (error) {

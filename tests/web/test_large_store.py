@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from playwright.sync_api import expect
@@ -155,6 +156,46 @@ def test_the_first_view_of_a_long_job_is_small_and_then_complete(
     expect(page.locator("[data-selected]")).to_have_attribute(
         "data-selected", str(PARTICLES * ITERATIONS)
     )
+
+
+@pytest.mark.timeout(600)
+def test_a_picker_loads_what_it_shows_and_finds_all_others(
+    large_server: Server, visit: Callable[..., Visit]
+) -> None:
+    visited = visit(large_server.url)
+    page = visited.go("/controller")
+    field = page.get_by_role("combobox", name="Design")
+    expect(field).to_have_value("fuzzy-pi: A")
+
+    def asked() -> list[dict[str, list[str]]]:
+        addresses = map(urlsplit, visited.requested)
+        return [parse_qs(one.query) for one in addresses if one.path == "/v1/jobs"]
+
+    assert asked() == []
+    field.focus()
+    field.press("ArrowDown")
+    offered = page.get_by_role("group", name="Best of a job").get_by_role("option")
+    expect(offered).to_have_count(20)
+    page.get_by_role("option", name="Show more").click()
+    expect(offered).to_have_count(40)
+    field.press("Escape")
+    expect(page.get_by_role("listbox")).to_have_count(0)
+    expect(field).to_have_value("fuzzy-pi: A")
+
+    query = {"state": "succeeded", "search": "short", "reverse": True, "limit": 1}
+    [oldest] = large_server.client.get("/v1/jobs", params=query).json()["items"]
+    field.press_sequentially(oldest["name"])
+    expect(offered).to_have_count(1)
+    expect(offered).to_have_attribute("aria-selected", "true")
+    assert field.get_attribute("aria-activedescendant") == offered.get_attribute("id")
+    field.press("Enter")
+    expect(page).to_have_url(re.compile(f"job={oldest['id']}"))
+    expect(field).to_have_attribute("aria-expanded", "false")
+    assert [one["limit"] for one in asked()] == [["20"]] * len(asked())
+
+    field.press("ArrowDown")
+    field.press_sequentially("no such job")
+    expect(page.get_by_role("status").get_by_text("Nothing fits.")).to_be_visible()
 
 
 def largest_asset(visited: Visit) -> int:

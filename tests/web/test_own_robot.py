@@ -66,4 +66,4 @@ def test_meshes_of_a_robot_of_ones_own_are_drawn_and_can_be_switched_off(
     expect(page.get_by_label("Scenario").locator("option")).to_have_count(1)
     page.goto(f"{server.url}/jobs/{job_id}/scenarios")
     expect(page.get_by_text("This robot has no published design.")).to_be_visible()
-    expect(page.get_by_label("Compare with")).to_have_value("none")
+    expect(page.get_by_label("Compare with")).to_have_value("nothing")

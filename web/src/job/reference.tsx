@@ -1,12 +1,12 @@
 /** What a job's winner is compared with: a published design, or the winner of another job. */
 
-import { useMemo } from 'preact/hooks'
 import { get, post } from '../api/client'
-import { jobsOfKind } from '../api/jobs-of-kind'
+import { foundJobs } from '../api/found-jobs'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
+import { Combobox } from '../components/combobox'
 import type { Design } from '../format/value'
 
 export interface Reference {
@@ -78,49 +78,41 @@ function walkOf(
 export function ReferencePicker({
   job,
   choice,
+  label,
   onChoose,
 }: {
   job: Job
   choice: string
+  /** What the reference is called, once it is known. */
+  label: string | null
   onChoose: (choice: string) => void
 }) {
   const tuning = job.kind === 'tuning'
   const hasPublished = tuning && isPublished((job.spec as JobSpec).robot)
   const published = useResource(hasPublished ? 'controllers' : null, catalogue)
-  const others = useResource(`others ${job.kind}`, (signal) => jobsOfKind(job.kind, signal))
-  const jobs = useMemo(
-    () => (others.data ?? []).filter((other) => other.id !== job.id && other.best_fitness !== null),
-    [others.data, job.id, job.kind],
-  )
+  const groups = [{ label: '', choices: [{ value: 'none', label: 'nothing' }] }]
+  if (hasPublished) groups.push({ label: 'Published designs', choices: designs(published.data) })
+  const known = groups.flatMap(({ choices }) => choices).find(({ value }) => value === choice)
   return (
-    <label class="row">
-      <span class="label">Compare with</span>
-      <select value={choice} onChange={(event) => onChoose(event.currentTarget.value)}>
-        <option value="none">nothing</option>
-        {hasPublished && (
-          <optgroup label="Published designs">
-            {(published.data ?? []).flatMap((controller) =>
-              Object.keys(controller.published).map((study) => (
-                <option
-                  key={`${controller.name}:${study}`}
-                  value={`published:${controller.name}:${study}`}
-                >
-                  {controller.name}, {study}
-                </option>
-              )),
-            )}
-          </optgroup>
-        )}
-        <optgroup label="Winners of other jobs">
-          {jobs.map((other) => (
-            <option key={other.id} value={`job:${other.id}`}>
-              {other.name || other.id}
-              {other.name ? ` (${other.id})` : ''}
-            </option>
-          ))}
-        </optgroup>
-      </select>
-      {tuning && !hasPublished && <span class="muted small">{NOT_PUBLISHED}</span>}
-    </label>
+    <Combobox
+      label="Compare with"
+      shown={known?.label ?? label ?? choice.slice(choice.indexOf(':') + 1)}
+      hint={tuning && !hasPublished ? NOT_PUBLISHED : undefined}
+      groups={groups}
+      found={{
+        label: 'Winners of other jobs',
+        search: foundJobs(job.kind, { without: [job.id], value: (id) => `job:${id}` }),
+      }}
+      onChoose={onChoose}
+    />
+  )
+}
+
+function designs(controllers: readonly Controller[] | null) {
+  return (controllers ?? []).flatMap(({ name, published }) =>
+    Object.keys(published).map((study) => ({
+      value: `published:${name}:${study}`,
+      label: `${name}, ${study}`,
+    })),
   )
 }

@@ -52,7 +52,12 @@ export function ScenariosPanel({ job }: { job: Job }) {
     <div class="stack">
       {isFit && <RecordingsCard recordings={recordings} />}
       <div class="row spread">
-        <ReferencePicker job={job} choice={choice} onChoose={(against) => setQuery({ against })} />
+        <ReferencePicker
+          job={job}
+          choice={choice}
+          label={reference.data?.label ?? null}
+          onChoose={(against) => setQuery({ against })}
+        />
         {reference.data && isRanked(job) && (
           <Summary job={job} rows={rows} label={reference.data.label} />
         )}

@@ -3,6 +3,7 @@
 import { get } from '../api/client'
 import { usePolling, useResource } from '../api/resource'
 import type { Tournament, TournamentStandings } from '../api/types'
+import { Combobox } from '../components/combobox'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount, formatNumber } from '../format/number'
 import { setQuery, usePlace } from '../router/navigation'
@@ -127,6 +128,10 @@ function Standings({
   )
 }
 
+function nameOf(tournament: Tournament | undefined, id: string): string {
+  return tournament ? `${problemsInWords(tournament.problems)} (${id})` : id
+}
+
 function Comparison({
   found,
   others,
@@ -141,20 +146,27 @@ function Comparison({
     <section class="card" aria-labelledby="comparison">
       <header class="row spread">
         <h2 id="comparison">Ranks on other problems</h2>
-        <label class="row">
-          <span class="label">Compare with the tournament</span>
-          <select
-            value={chosen ?? ''}
-            onChange={(event) => setQuery({ compare: event.currentTarget.value || null })}
-          >
-            <option value="">none</option>
-            {others.map((other) => (
-              <option key={other.id} value={other.id}>
-                {`${problemsInWords(other.problems)} (${other.id})`}
-              </option>
-            ))}
-          </select>
-        </label>
+        <Combobox
+          label="Compare with the tournament"
+          shown={
+            chosen === null
+              ? 'none'
+              : nameOf(
+                  others.find(({ id }) => id === chosen),
+                  chosen,
+                )
+          }
+          groups={[
+            {
+              label: '',
+              choices: [
+                { value: '', label: 'none' },
+                ...others.map((other) => ({ value: other.id, label: nameOf(other, other.id) })),
+              ],
+            },
+          ]}
+          onChoose={(value) => setQuery({ compare: value || null })}
+        />
       </header>
       {correlation === null ? (
         <p class="muted">

@@ -1,9 +1,9 @@
 /** Choosing a design: published ones, and the best ones of jobs. */
 
-import { useId } from 'preact/hooks'
 import { get } from '../api/client'
-import { jobsOfKind } from '../api/jobs-of-kind'
+import { foundJobs } from '../api/found-jobs'
 import { useResource } from '../api/resource'
+import { type ChoiceGroup, Combobox } from '../components/combobox'
 import { type DesignSource, sourceOfWord, wordOf } from './design-source'
 
 export function DesignPicker({
@@ -16,7 +16,7 @@ export function DesignPicker({
 }: {
   label: string
   chosen: DesignSource | null
-  /** How to call what is chosen if it is in neither list. */
+  /** How to call what is chosen. */
   chosenLabel: string
   /** What the choice of no design is called; without it there must be one. */
   none?: string
@@ -24,53 +24,28 @@ export function DesignPicker({
   note?: string
   onChoose: (source: DesignSource | null) => void
 }) {
-  const id = useId()
   const controllers = useResource('controllers', (signal) => get('/v1/controllers', { signal }))
-  const jobs = useResource('jobs', (signal) => jobsOfKind('tuning', signal))
   const published = (controllers.data?.items ?? []).flatMap((controller) =>
     Object.keys(controller.published).map((study) => ({
-      word: wordOf({ kind: 'published', controller: controller.name, study }),
-      text: `${controller.name}: ${study}`,
+      value: wordOf({ kind: 'published', controller: controller.name, study }),
+      label: `${controller.name}: ${study}`,
     })),
   )
-  const best = (jobs.data ?? [])
-    .filter((job) => job.best_fitness !== null)
-    .map((job) => ({ word: wordOf({ kind: 'best', job: job.id }), text: job.name || job.id }))
+  const groups: ChoiceGroup[] = []
+  if (none !== undefined) groups.push({ label: '', choices: [{ value: '', label: none }] })
+  if (note === undefined) groups.push({ label: 'Published designs', choices: published })
   const word = chosen ? wordOf(chosen) : ''
-  const listed = word === '' || [...published, ...best].some((option) => option.word === word)
+  const known = published.find(({ value }) => value === word)?.label
   return (
-    <div class="field">
-      <label for={id}>{label}</label>
-      <select
-        id={id}
-        value={word}
-        onChange={(event) => onChoose(sourceOfWord(event.currentTarget.value))}
-      >
-        {none !== undefined && <option value="">{none}</option>}
-        {!listed && <option value={word}>{chosenLabel}</option>}
-        {note === undefined && <Options label="Published designs" options={published} />}
-        <Options label="Best of a job" options={best} />
-      </select>
-      {note !== undefined && <span class="hint">{note}</span>}
-    </div>
+    <Combobox
+      label={label}
+      shown={chosen ? (known ?? chosenLabel) : (none ?? '')}
+      hint={note}
+      groups={groups}
+      found={{ label: 'Best of a job', search: bestOfJobs }}
+      onChoose={(value) => onChoose(sourceOfWord(value))}
+    />
   )
 }
 
-function Options({
-  label,
-  options,
-}: {
-  label: string
-  options: readonly { readonly word: string; readonly text: string }[]
-}) {
-  if (options.length === 0) return null
-  return (
-    <optgroup label={label}>
-      {options.map(({ word, text }) => (
-        <option key={word} value={word}>
-          {text}
-        </option>
-      ))}
-    </optgroup>
-  )
-}
+const bestOfJobs = foundJobs('tuning', { value: (job) => wordOf({ kind: 'best', job }) })

@@ -10,7 +10,7 @@ import {
   widthAt,
 } from '../../src/job/parameters/intervals'
 import {
-  candidates,
+  furtherRuns,
   labelsOf,
   repeatedSeeds,
   runsOf,
@@ -107,7 +107,7 @@ function summary(change: Partial<JobSummary>): JobSummary {
   return { id: 'x', kind: 'identification', scenarios, best_fitness: 0.03, ...change } as JobSummary
 }
 
-test('fits of the same recordings are offered first, other kinds of jobs never', () => {
+test('only fits of the same recordings with a design are offered as further runs', () => {
   const jobs = [
     summary({ id: 'a' }),
     summary({ id: 'b', scenarios: ['r2', 'r1'] }),
@@ -115,14 +115,12 @@ test('fits of the same recordings are offered first, other kinds of jobs never',
     summary({ id: 'd', best_fitness: null }),
     summary({ id: 'e', kind: 'tuning' }),
   ]
-  const { same, others } = candidates(jobs, jobs[0])
-  expect(same.map(({ id }) => id)).toEqual(['b'])
-  expect(others.map(({ id }) => id)).toEqual(['c', 'd'])
+  expect(furtherRuns(jobs, jobs[0]).map(({ id }) => id)).toEqual(['b'])
 })
 
 test('calibrations are compared with calibrations', () => {
   const jobs = ['a', 'b'].map((id) => summary({ id, kind: 'calibration' }))
-  const { same } = candidates([...jobs, summary({ id: 'c' })], jobs[0])
+  const same = furtherRuns([...jobs, summary({ id: 'c' })], jobs[0])
   expect(same.map(({ id }) => id)).toEqual(['b'])
 })
 

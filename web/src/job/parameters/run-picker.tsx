@@ -1,13 +1,18 @@
 /** The runs that are compared: this job, and others that may have fitted the same. */
 
-import { jobsOfKind } from '../../api/jobs-of-kind'
+import { get } from '../../api/client'
+import { foundJobs } from '../../api/found-jobs'
 import { useResource } from '../../api/resource'
 import type { Job, JobSummary } from '../../api/types'
+import { Combobox } from '../../components/combobox'
 import { ErrorNotice } from '../../components/feedback'
 import { formatCount, quantity } from '../../format/number'
 import { jobPath, withQuery } from '../../router/routes'
 import { caseWords, fitnessUnit } from '../fitness'
-import { candidates, MOST_RUNS, repeatedSeeds } from './runs'
+import { furtherRuns, isSameFit, MOST_RUNS, repeatedSeeds } from './runs'
+
+/** Newest jobs among which runs of the same fit are offered; a search finds all others. */
+const OFFERED = 100
 
 export function RunPicker({
   job,
@@ -22,11 +27,13 @@ export function RunPicker({
   also: readonly string[]
   onChoose: (also: readonly string[]) => void
 }) {
-  const listed = useResource(`fits ${job.kind}`, (signal) => jobsOfKind(job.kind, signal))
+  const listed = useResource(`fits ${job.kind}`, (signal) =>
+    get('/v1/jobs', { query: { kind: job.kind, limit: OFFERED }, signal }),
+  )
   const words = caseWords(job.kind)
-  const { same, others } = candidates(listed.data ?? [], job)
-  const known = new Set([...same, ...others].map(({ id }) => id))
-  const unlisted = listed.data ? also.filter((id) => !known.has(id)) : []
+  const same = furtherRuns(listed.data?.items ?? [], job)
+  const known = new Set(same.map(({ id }) => id))
+  const added = also.filter((id) => !known.has(id))
   const all = same.map(({ id }) => id).slice(0, MOST_RUNS)
   const repeated = repeatedSeeds(runs)
   const toggle = (id: string, on: boolean) =>
@@ -69,15 +76,27 @@ export function RunPicker({
           <span class="muted small">{described(job, job.spec.seed)}</span>
         </li>
         {same.map(run)}
-        {unlisted.map(run)}
+        {listed.data && added.map(run)}
       </ul>
-      {others.length > 0 && (
-        <details open={others.some(({ id }) => also.includes(id))}>
-          <summary>
-            Jobs on other {words.many}, or without parameters yet ({formatCount(others.length)})
-          </summary>
-          <ul class="runs">{others.map(run)}</ul>
-        </details>
+      {also.length < MOST_RUNS && (
+        <Combobox
+          label="Add a run"
+          shown=""
+          placeholder="name, id, note or tag"
+          hint={
+            listed.data?.next
+              ? `Above: those of the newest ${OFFERED} jobs on these ${words.many}. All others are found here.`
+              : undefined
+          }
+          found={{
+            label: 'Jobs, the newest first',
+            search: foundJobs(job.kind, {
+              without: [job.id, ...also],
+              note: (other) => (isSameFit(other, job) ? '' : `other ${words.many}`),
+            }),
+          }}
+          onChoose={(id) => toggle(id, true)}
+        />
       )}
       {repeated.length > 0 && (
         <p class="notice" data-tone="warn">

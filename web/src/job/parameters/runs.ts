@@ -16,18 +16,20 @@ export function wordOfRuns(ids: readonly string[]): string | null {
   return ids.length === 0 ? null : ids.join(',')
 }
 
-/** Other jobs of the same kind: those with a design that were fitted to the same, and the others. */
-export function candidates(
+type Fitted = Pick<JobSummary, 'kind' | 'scenarios'>
+
+/** Whether two jobs are of one kind and were fitted to the same. */
+export function isSameFit(one: Fitted, other: Fitted): boolean {
+  const cases = (job: Fitted) => [...job.scenarios].sort().join()
+  return one.kind === other.kind && cases(one) === cases(other)
+}
+
+/** Other jobs that were fitted to the same and have a design. */
+export function furtherRuns(
   jobs: readonly JobSummary[],
-  own: Pick<JobSummary, 'id' | 'kind' | 'scenarios'>,
-): { readonly same: readonly JobSummary[]; readonly others: readonly JobSummary[] } {
-  const cases = (job: { readonly scenarios: readonly string[] }) => [...job.scenarios].sort().join()
-  const fitted = jobs.filter((job) => job.kind === own.kind && job.id !== own.id)
-  const isSame = (job: JobSummary) => cases(job) === cases(own)
-  return {
-    same: fitted.filter((job) => isSame(job) && job.best_fitness !== null),
-    others: fitted.filter((job) => !isSame(job) || job.best_fitness === null),
-  }
+  own: Fitted & Pick<JobSummary, 'id'>,
+): readonly JobSummary[] {
+  return jobs.filter((job) => job.id !== own.id && job.best_fitness !== null && isSameFit(job, own))
 }
 
 /** Short names of runs: their seeds where these tell them apart, else their ids. */

@@ -32,3 +32,12 @@ export function lazyPage<P extends object>(
     return Page ? <Page {...props} /> : <Loading what={what} />
   }
 }
+
+/** The same of a module's export of some name. */
+export function lazyPart<K extends string, P extends object>(
+  what: string,
+  name: K,
+  load: () => Promise<Readonly<Record<K, ComponentType<P>>>>,
+): ComponentType<P> {
+  return lazyPage<P>(what, async () => ({ default: (await load())[name] }))
+}

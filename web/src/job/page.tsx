@@ -5,30 +5,69 @@ import { isReadable } from '../api/readable'
 import type { Iteration, Job, StoredJob } from '../api/types'
 import { Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../components/feedback'
+import { lazyPart } from '../components/lazy-page'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
 import { setTitle } from '../title'
-import { ActivityPanel } from './activity/panel'
-import { AnalysisPanel } from './analysis/panel'
 import { budgetSpent } from './budget'
-import { CertificatePanel } from './certificate-panel'
-import { FirmwarePanel } from './firmware-panel'
 import { caseWords } from './fitness'
 import { type Gain, useGain } from './gain'
 import { JobHeader } from './header'
-import { IterationPanel } from './iteration-panel'
-import { IterationsPanel } from './iterations-panel'
 import './job.css'
 import { OverviewPanel } from './overview-panel'
-import { ParametersPanel } from './parameters/parameters-panel'
-import { PreferencesPanel } from './preferences-panel'
-import { ReproducePanel } from './reproduce-panel'
-import { RobustnessPanel } from './robustness-panel'
-import { ScenariosPanel } from './scenarios-panel'
-import { TargetsPanel } from './targets-panel'
-import { TradeOffsPanel } from './trade-offs/panel'
 import { type LiveJob, useJob } from './use-job'
-import { VariablesPanel } from './variables-panel'
+
+// Only the overview's code comes with the page.
+const ActivityPanel = lazyPart('the activity', 'ActivityPanel', () => import('./activity/panel'))
+const AnalysisPanel = lazyPart('the analysis', 'AnalysisPanel', () => import('./analysis/panel'))
+const CertificatePanel = lazyPart(
+  'the certificate',
+  'CertificatePanel',
+  () => import('./certificate-panel'),
+)
+const FirmwarePanel = lazyPart('the firmware', 'FirmwarePanel', () => import('./firmware-panel'))
+const IterationPanel = lazyPart(
+  'the iteration',
+  'IterationPanel',
+  () => import('./iteration-panel'),
+)
+const IterationsPanel = lazyPart(
+  'the iterations',
+  'IterationsPanel',
+  () => import('./iterations-panel'),
+)
+const ParametersPanel = lazyPart(
+  'the parameters',
+  'ParametersPanel',
+  () => import('./parameters/parameters-panel'),
+)
+const PreferencesPanel = lazyPart(
+  'the preferences',
+  'PreferencesPanel',
+  () => import('./preferences-panel'),
+)
+const ReproducePanel = lazyPart('the spec', 'ReproducePanel', () => import('./reproduce-panel'))
+const RobustnessPanel = lazyPart(
+  'the robustness',
+  'RobustnessPanel',
+  () => import('./robustness-panel'),
+)
+const ScenariosPanel = lazyPart(
+  'the scenarios',
+  'ScenariosPanel',
+  () => import('./scenarios-panel'),
+)
+const TargetsPanel = lazyPart('the targets', 'TargetsPanel', () => import('./targets-panel'))
+const TradeOffsPanel = lazyPart(
+  'the trade-offs',
+  'TradeOffsPanel',
+  () => import('./trade-offs/panel'),
+)
+const VariablesPanel = lazyPart(
+  'the variables',
+  'VariablesPanel',
+  () => import('./variables-panel'),
+)
 
 const TABS = [
   { tab: '', label: 'Overview' },

@@ -182,8 +182,8 @@ def test_a_picker_loads_what_it_shows_and_finds_all_others(
     expect(page.get_by_role("listbox")).to_have_count(0)
     expect(field).to_have_value("fuzzy-pi: A")
 
-    query = {"state": "succeeded", "search": "short", "reverse": True, "limit": 1}
-    [oldest] = large_server.client.get("/v1/jobs", params=query).json()["items"]
+    query = "state=succeeded&search=short&reverse=true&limit=1"
+    [oldest] = large_server.client.get(f"/v1/jobs?{query}").json()["items"]
     field.press_sequentially(oldest["name"])
     expect(offered).to_have_count(1)
     expect(offered).to_have_attribute("aria-selected", "true")

@@ -94,7 +94,7 @@ def walk(
                 step.drift(timestep if left else 0.5 * timestep)
                 sensed = sensed + share * (np.abs(middle.current) - sensed)
                 measures.add(middle, timestep)
-    return record.trace(measures.objectives(d.qpos[2] - record.states[0, 2]))
+    return record.trace(measures.objectives(record.states[0, 2] - d.qpos[2]))
 
 
 def settled_share(robot: Robot, timestep: float) -> float:
@@ -159,8 +159,8 @@ class _Measures:
         )
         self._time += timestep
 
-    def objectives(self, rise: float) -> Floats:
-        """f1..f6; rise: of the body [m]."""
+    def objectives(self, sunk: float) -> Floats:
+        """f1..f6; sunk: how far the body is below where it was [m]."""
         rms = np.sqrt(self._sums[:3] / self._time)
         distance = self._sums[4]
-        return np.array([*rms, self._sums[3] / distance, self._time / distance, rise])
+        return np.array([*rms, self._sums[3] / distance, self._time / distance, sunk])

@@ -59,7 +59,9 @@ export function RunPicker({
         <span class="row">
           {all.length > 0 && all.some((id) => !also.includes(id)) && (
             <button type="button" class="compact primary" onClick={() => onChoose(all)}>
-              Compare all {all.length + 1} runs on these {words.many}
+              {listed.data?.next
+                ? `Compare the ${all.length + 1} runs listed here`
+                : `Compare all ${all.length + 1} runs on these ${words.many}`}
             </button>
           )}
           <a class="button compact" href={nextRun(job, [...runs])}>

@@ -112,7 +112,7 @@ def test_the_trade_offs_benchmark_judges_as_many_designs_by_every_method() -> No
 @pytest.mark.slow
 def test_the_benchmark_of_legs_tells_how_much_faster_fewer_are(told: Told) -> None:
     rows = {(row["robot"], row["what"]): row for row in told("legs", "--rounds", "1")}
-    assert set(rows) == set(product(("hexapod", "quadruped"), ("walks", "stands")))
+    assert set(rows) >= set(product(("hexapod", "quadruped"), ("walks", "stands")))
     for (_, what), row in rows.items():
         ratio = rows["hexapod", what]["us_per_step"] / row["us_per_step"]
         assert row["times_as_fast"] == pytest.approx(ratio)

@@ -200,7 +200,7 @@ def test_a_jobs_headline_convergence_winner_and_walk(
 
     winner = page.get_by_role("region", name="The winner")
     expect(winner.get_by_role("img")).to_have_count(len(job["best"]["design"]))
-    winner.get_by_role("button", name=re.compile("^Show as table")).click()
+    winner.get_by_role("button", name=re.compile("^Show as table.*The winner")).click()
     rows = winner.get_by_role("table", name="The winner in its bounds").locator("tbody tr")
     expect(rows).to_have_count(len(job["best"]["design"]))
 

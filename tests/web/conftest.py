@@ -113,8 +113,9 @@ def server(
 
 @pytest.fixture(scope="session")
 def finished_job(server: ServerProcess) -> str:
-    """A job that the server has walked to its end."""
-    job_id = server.submit(SMALL_JOB)
+    """A job that the server has walked to its end, whatever other tests have run before."""
+    # Designs of another job that is the same would not walk again.
+    job_id = server.submit(SMALL_JOB | {"seed": 7})
     server.wait_for(job_id, "succeeded")
     return job_id
 

@@ -139,6 +139,25 @@ def test_a_killed_search_leaves_no_process() -> None:
     assert ended == [process]
 
 
+LEFT_OPEN = """
+import sys
+from services.optimizer.search.local import nomad_client
+from tests.optimizer.test_mads import begun
+# What a module holds is collected when the names of others are gone.
+nomad_client.left_open = begun(), list(sys.modules.values())
+"""
+
+
+def test_a_search_that_is_left_open_ends_with_its_process_and_in_silence() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-W", "always::ResourceWarning", "-c", LEFT_OPEN],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ended.stderr == ""
+
+
 def test_a_choice_of_two_is_found() -> None:
     space = Space([Axis(0.0, 1.0), Axis(0.0, 1.0, "categorical")])
     asked = designs_asked("mads", space, lambda x: (x[:, 0] - 0.4) ** 2 + x[:, 1], 60, seed=2)

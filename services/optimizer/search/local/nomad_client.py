@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import subprocess
@@ -30,6 +31,8 @@ class Nomad:
         """Begin a conversation; the process starts with the first message."""
         self._said: list[str] = []
         self._process: subprocess.Popen[str] | None = None
+        # Its own reference: a conversation may be closed when this module's names are gone.
+        self._idle = _IDLE
 
     def begin(
         self, x0: list[float], lower: list[float], upper: list[float], parameters: list[str]
@@ -61,7 +64,7 @@ class Nomad:
 
     def close(self) -> None:
         """End the process, if there is one, and wait until it is gone."""
-        _IDLE.remove(self)
+        self._idle.remove(self)
         self.sleep()
 
     def sleep(self) -> None:
@@ -72,14 +75,14 @@ class Nomad:
             process.communicate()
 
     def _exchange(self, message: str) -> Block | None:
-        _IDLE.remove(self)
+        self._idle.remove(self)
         if self._process is None:
             self._process = _start()
             for said in self._said:
                 _answer(self._process, said)
         block = _answer(self._process, message)
         self._said.append(message)
-        _IDLE.add(self)
+        self._idle.add(self)
         return block
 
 
@@ -101,8 +104,16 @@ class _Idle:
         with self._lock:
             self._order.pop(id(nomad), None)
 
+    def sleep(self) -> None:
+        """End the processes of all."""
+        with self._lock:
+            while self._order:
+                self._order.popitem()[1].sleep()
+
 
 _IDLE: Final = _Idle()
+# Searches that are never closed are collected when this process ends, too late to wait for others.
+atexit.register(_IDLE.sleep)
 
 
 def _start() -> subprocess.Popen[str]:

@@ -42,6 +42,21 @@ has_compiler() {
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_USER=0 PIP_NO_INPUT=1 PIP_ROOT_USER_ACTION=ignore
 install() { "$venv/bin/python" -m pip install --quiet --no-deps --no-compile "$@"; }
 
+# A lock file by one pip for each processor: most of the time is unpacking, which a pip does on one.
+install_locked() {
+    parts=$(mktemp -d)
+    processors=$(getconf _NPROCESSORS_ONLN)
+    awk -v folder="$parts" -v parts="$((processors < 8 ? processors : 8))" '
+        /^[[:alnum:]]/ { requirement++ }
+        requirement { print > (folder "/" requirement % parts ".txt") }' "$1"
+    status=0
+    find "$parts" -name '*.txt' -print0 | xargs -0 -n 1 -P 8 \
+        "$venv/bin/python" -m pip install --quiet --no-deps --no-compile \
+        --require-hashes --only-binary :all: -r || status=$?
+    rm -rf "$parts"
+    return "$status"
+}
+
 key="$(cat "$lock" requirements/compiler.lock pyproject.toml scripts/setup.sh | cksum) $PWD ${PYTHON:-}"
 stamp="$venv/installed-$1"
 if [ -x "$venv/bin/gaitswarm" ] && is_suitable "$venv/bin/python" \
@@ -60,14 +75,15 @@ if ! is_suitable "$venv/bin/python" || [ "$(cat "$venv/home" 2>/dev/null)" != "$
 fi
 rm -f "$stamp"
 say "installing $lock; the first time this takes a minute or two"
-install --require-hashes --only-binary :all: -r "$lock"
+install_locked "$lock"
 if ! has_compiler; then
     say "no C compiler found: installing the one of the ziglang wheel, so that simulation is fast"
     install --require-hashes --only-binary :all: -r requirements/compiler.lock \
         || say "that failed; simulation falls back to the slow reference interpreter"
 fi
 install --no-build-isolation --editable .
-# On all processors, which pip does on one. What cannot be compiled is never imported.
-"$venv/bin/python" -m compileall -q -j 0 "$venv/lib" >/dev/null 2>&1 || true
+# On all processors, which pip does on one. What cannot be compiled is never imported, nor are the
+# tests that packages bring.
+"$venv/bin/python" -m compileall -q -j 0 -x '[/\\]tests?[/\\]' "$venv/lib" >/dev/null 2>&1 || true
 echo "$key" > "$stamp"
 say "done in $(($(date +%s) - started)) s"

@@ -20,7 +20,7 @@ from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
 from tests.certificate.examples import columns, small
 
-WORLDS = 20_000
+WORLDS = 10_000
 
 
 @contextmanager

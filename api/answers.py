@@ -26,6 +26,9 @@ _LEVEL: Final = 1
 _LARGEST: Final = 32 << 20
 """Bytes of all answers and parts of answers that are remembered."""
 
+_PAGES: Final = 1000
+"""Pages of which is noted when they were read."""
+
 _ENTRY: Final = 500
 """Bytes that each takes beside its own."""
 
@@ -35,18 +38,21 @@ class Encoded:
 
     Attributes:
         plain: The text, in UTF-8.
+        key: By which an answer is found whose text is all that is known of it; else None.
     """
 
-    __slots__ = ("_compressed", "_job", "plain")
+    __slots__ = ("_compressed", "_job", "key", "plain")
 
-    def __init__(self, plain: bytes, job: Job | None = None) -> None:
+    def __init__(self, plain: bytes, job: Job | None = None, key: Hashable | None = None) -> None:
         """Take on a text.
 
         Args:
             plain: The text, in UTF-8.
             job: That it tells of; kept, so that no other object is taken for it.
+            key: By which it is found.
         """
         self.plain = plain
+        self.key = key
         self._job = job
         self._compressed: bytes | None = None
 
@@ -89,6 +95,7 @@ class Answers:
         self._largest = largest
         self._size = 0
         self._known: OrderedDict[Hashable, Encoded] = OrderedDict()
+        self._pages: OrderedDict[Hashable, tuple[Hashable, Hashable]] = OrderedDict()
         self._lock = threading.Lock()
 
     @property
@@ -112,8 +119,20 @@ class Answers:
         """
         if job.state is JobState.RUNNING:
             return Encoded(make())
-        key = (what, id(job))
-        return self._find(key) or self._add(key, Encoded(make(), job))
+        found = self.find_of_job(what, job)
+        return found or self._add((what, id(job)), Encoded(make(), job))
+
+    def find_of_job(self, what: str, job: Job) -> Encoded | None:
+        """Look for what follows from a job alone.
+
+        Args:
+            what: Is told of the job.
+            job: As it was read.
+
+        Returns:
+            The JSON; None if it is not remembered.
+        """
+        return None if job.state is JobState.RUNNING else self._find((what, id(job)))
 
     def of_history(self, key: Hashable, make: Callable[[], bytes]) -> Encoded:
         """Encode what never changes: whole iterations that are committed.
@@ -127,6 +146,44 @@ class Answers:
         """
         return self._find(key) or self._add(key, Encoded(make()))
 
+    def find_of_history(self, key: Hashable) -> Encoded | None:
+        """Look for what never changes.
+
+        Args:
+            key: What is told, and of which job; whether the job is there still has been asked.
+
+        Returns:
+            The JSON; None if it is not remembered.
+        """
+        return self._find(key)
+
+    def note_page(self, key: Hashable, version: Hashable, page: Encoded) -> None:
+        """Note what is answered as long as nothing is committed.
+
+        Args:
+            key: What is asked for, and of which store.
+            version: Of the store, asked for before the page was read.
+            page: The answer, as `same` gave it.
+        """
+        with self._lock:
+            self._pages[key] = (version, page.key)
+            self._pages.move_to_end(key)
+            if len(self._pages) > _PAGES:
+                self._pages.popitem(last=False)
+
+    def find_page(self, key: Hashable, version: Hashable) -> Encoded | None:
+        """Look for what was noted.
+
+        Args:
+            key: What is asked for, and of which store.
+            version: Of the store by now.
+
+        Returns:
+            The JSON; None if something was committed since, or it is not remembered.
+        """
+        noted = self._pages.get(key)
+        return None if noted is None or noted[0] != version else self._find(noted[1])
+
     def same(self, plain: bytes) -> Encoded:
         """Find an answer by its text, so that it is compressed once.
 
@@ -136,10 +193,8 @@ class Answers:
         Returns:
             The JSON.
         """
-        if len(plain) < LEAST_COMPRESSED:
-            return Encoded(plain)
         key = blake2b(plain, digest_size=16).digest()
-        return self._find(key) or self._add(key, Encoded(plain))
+        return self._find(key) or self._add(key, Encoded(plain, key=key))
 
     def _find(self, key: Hashable) -> Encoded | None:
         with self._lock:

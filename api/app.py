@@ -14,6 +14,7 @@ from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddle
 from api.access import AccessMiddleware
 from api.answers import LEAST_COMPRESSED
 from api.dependencies import Component, lifespan
+from api.direct import DirectAnswers
 from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
 from api.manual import FOLDER as MANUAL
 from api.manual import add_manual
@@ -143,6 +144,8 @@ def create_app(
     add_page(app, page_folder)
     add_manual(app, manual_folder)
     add_problem_handlers(app)
+    # The innermost: what it answers has the limits and headers of all other answers.
+    app.add_middleware(DirectAnswers)
     app.add_middleware(
         BodyLimitMiddleware,
         max_bytes=settings.api_max_body_bytes,

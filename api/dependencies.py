@@ -12,6 +12,7 @@ import anyio
 from anyio.to_thread import run_sync
 from fastapi import Depends, FastAPI, Path, Query, Request
 from pydantic import Field
+from starlette.types import Scope
 
 from api.answers import Answers
 from api.rates import OpenStreams
@@ -81,6 +82,10 @@ class ComputingSlots:
 _VALIDATIONS: Final = 2
 """Bodies that are validated at once: threads of Python take turns, the event loop's among them."""
 
+_READINGS: Final = 2
+"""Frequent questions that are read for at once. More threads would take turns as well, and spread
+over more connections, each of which has to read anew what another one knows."""
+
 
 @dataclass(frozen=True, slots=True)
 class Component:
@@ -101,11 +106,11 @@ class State(TypedDict):
     """`request.state` of every request: what the lifespan of the application yields.
 
     slots: for walks. analyses: for what reads whole histories. validations: threads that validate
-    bodies. draining: set by the server on the first signal to end; it still answers then. stopping:
-    set when it begins to stop; event streams end then. topics: jobs that these streams follow.
-    streams: that are open, by asker. components: parts of the process beside the database.
-    metrics: of this process. activity: what happens to the jobs that it runs, if it runs any.
-    answers: that are remembered.
+    bodies. readings: threads that read for frequent questions. draining: set by the server on the
+    first signal to end; it still answers then. stopping: set when it begins to stop; event streams
+    end then. topics: jobs that these streams follow. streams: that are open, by asker. components:
+    parts of the process beside the database. metrics: of this process. activity: what happens to
+    the jobs that it runs, if it runs any. answers: that are remembered.
     """
 
     service: JobService
@@ -113,6 +118,7 @@ class State(TypedDict):
     slots: ComputingSlots
     analyses: ComputingSlots
     validations: anyio.CapacityLimiter
+    readings: anyio.CapacityLimiter
     draining: asyncio.Event
     streams: OpenStreams
     stopping: asyncio.Event
@@ -155,6 +161,7 @@ def lifespan(
             slots=ComputingSlots("simulations", workers, queue),
             analyses=ComputingSlots("analyses", analysts, waiting),
             validations=anyio.CapacityLimiter(_VALIDATIONS),
+            readings=anyio.CapacityLimiter(_READINGS),
             draining=asyncio.Event(),
             stopping=stopping,
             topics=topics,
@@ -176,6 +183,16 @@ async def service(request: Request) -> JobService:
         request: under way.
     """
     return cast(JobService, request.state.service)
+
+
+def service_of(scope: Scope) -> JobService:
+    """The same, where routes and their dependencies are not asked for.
+
+    Args:
+        scope: of a request under way.
+    """
+    replaced = scope["app"].dependency_overrides.get(service)
+    return cast(JobService, scope["state"]["service"] if replaced is None else replaced())
 
 
 async def settings(request: Request) -> Settings:

@@ -113,6 +113,9 @@ _KINDS: Final[tuple[tuple[type[Exception], HTTPStatus, str], ...]] = (
 )
 """Domain errors, the more special first."""
 
+DOMAIN_ERRORS: Final = (GaitswarmError, SimulationError)
+"""What `domain_problem` answers."""
+
 _HTTP: Final = {
     400: ("malformed-json", "the body cannot be read as JSON; send one JSON object, not too deep"),
     404: ("not-found", "no resource has this path; /docs lists those that exist"),
@@ -259,11 +262,23 @@ def add_problem_handlers(app: FastAPI) -> None:
     """
     app.add_exception_handler(RequestValidationError, _on_invalid)
     app.add_exception_handler(HTTPException, _on_http_error)
-    app.add_exception_handler(GaitswarmError, _on_domain_error)
-    app.add_exception_handler(SimulationError, _on_domain_error)
+    for raised in DOMAIN_ERRORS:
+        app.add_exception_handler(raised, domain_problem)
 
 
-async def _on_domain_error(request: Request, error: Exception) -> Response:
+async def domain_problem(request: Request, error: Exception) -> Response:
+    """Answer what the domain refuses.
+
+    Args:
+        request: under way.
+        error: that was raised.
+
+    Returns:
+        The response.
+
+    Raises:
+        Exception: the error itself, if it is none of the table above.
+    """
     if isinstance(error, TooManyRequests):
         return too_many_requests(request.url.path, error.retry_after, str(error))
     found = next((row for row in _KINDS if isinstance(error, row[0])), None)

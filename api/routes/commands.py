@@ -9,7 +9,7 @@ from fastapi import APIRouter, Body, Depends, status
 from api.access import Actor, Asking, OwnersQuota, check_may_prioritize, may_command
 from api.dependencies import JobId, Service
 from api.documentation import problems
-from api.routes.jobs import job_in_full
+from api.reads import job_in_full
 from gaitswarm.views import PREFIX, ExtensionRequest, JobView, PriorityRequest, ResumeRequest
 from services.optimizer.jobs.job import Command
 

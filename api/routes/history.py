@@ -8,7 +8,6 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from api.answers import page_of
 from api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
@@ -21,6 +20,7 @@ from api.dependencies import (
     Slots,
 )
 from api.documentation import binary, problems
+from api.reads import Best, Evaluations, Iterations
 from gaitswarm.evidence.contents import evidence
 from gaitswarm.evidence.history import run_verification
 from gaitswarm.settings import Settings
@@ -32,12 +32,10 @@ from gaitswarm.views import (
     EvaluationView,
     IterationView,
     PageView,
-    encoded_evaluations,
-    encoded_iterations,
 )
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
-from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.errors import InvalidRequest
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
 
@@ -58,19 +56,8 @@ def list_iterations(
     limit: Annotated[int, Query(ge=1, le=1000, description="Most iterations on a page.")] = 100,
 ) -> Response:
     """Fitness of the designs, iteration by iteration, in pages; the data of a convergence plot."""
-    job = service.job(job_id)
-
-    def encoded() -> bytes:
-        page = service.iterations(job.id, after=after, limit=limit)
-        return page_of(encoded_iterations(page.items), page.next)
-
-    # A page that others follow never changes; the last one is as long as the job is by now.
-    committed = job.progress.iterations
-    end = limit if after is None else after + 1 + limit
-    if end < committed:
-        key = ("iterations", job.id, after, limit)
-        return remembered.of_history(key, encoded).answer(request)
-    return remembered.same(encoded()).answer(request)
+    asked = Iterations(after, limit)
+    return asked.answer(remembered, service, service.job(job_id)).answer(request)
 
 
 @router.get(
@@ -93,14 +80,8 @@ def list_evaluations(
 
     Raw objectives are as simulated; utilities follow from them and the job's preference.
     """
-    job = service.job(job_id)
-    # Nothing is told of a job whose spec can no longer be read, be it remembered or not.
-    spec = job.spec
-
-    def encoded() -> bytes:
-        return encoded_evaluations(service.evaluations(job.id, iteration), spec)
-
-    return remembered.of_history(("evaluations", job.id, iteration), encoded).answer(request)
+    asked = Evaluations(iteration)
+    return asked.answer(remembered, service, service.job(job_id)).answer(request)
 
 
 @router.get(
@@ -115,18 +96,7 @@ def get_best(request: Request, job_id: JobId, service: Service, remembered: Reme
 
     404 while no design has walked in every scenario.
     """
-    job = service.job(job_id)
-
-    def encoded() -> bytes:
-        best = service.best(job.id)
-        if best is None:
-            raise NotFound(
-                f"job {job.id} has no design yet that walks in every scenario; ask again after its"
-                " next iteration, or see why designs fail in its evaluations"
-            )
-        return BestView.from_evaluation(best, job.spec).model_dump_json(by_alias=True).encode()
-
-    return remembered.of_job("best", job, encoded).answer(request)
+    return Best().answer(remembered, service, service.job(job_id)).answer(request)
 
 
 @router.get(

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
 from api.access import NewPriority, Owner, OwnersQuota
-from api.answers import page_of
 from api.bodies import validated
 from api.dependencies import (
     Analysing,
@@ -20,6 +19,7 @@ from api.dependencies import (
     Slots,
 )
 from api.documentation import problems
+from api.reads import InFull, JobList, job_in_full
 from gaitswarm.views import (
     PREFIX,
     EstimateView,
@@ -30,10 +30,9 @@ from gaitswarm.views import (
 from gaitswarm.views.job import JobKind
 from services.optimizer.jobs.documents import AnySpec
 from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.job import Job, JobOrder, JobState
+from services.optimizer.jobs.job import JobOrder, JobState
 from services.optimizer.jobs.labels import JobFilter
 from services.optimizer.jobs.notification import check_url
-from services.optimizer.service import JobService
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
 
@@ -263,24 +262,8 @@ def list_jobs(
     where = JobFilter(
         archived=archived, robot=robot, controller=controller, preference=preference, tag=tag
     )
-    page = service.jobs(
-        state=state,
-        kind=kind,
-        parent=parent,
-        search=search,
-        where=where,
-        order=order,
-        reverse=reverse,
-        after=after,
-        limit=limit,
-    )
-    items = [remembered.of_job("summary", job, partial(_summary, job)) for job in page.items]
-    text = page_of((item.plain for item in items), page.next)
-    return remembered.same(text).answer(request)
-
-
-def _summary(job: Job) -> bytes:
-    return JobSummaryView.from_job(job).model_dump_json(by_alias=True).encode()
+    listed = JobList(state, kind, parent, search, where, order, reverse, after, limit)
+    return listed.encoded(remembered, listed.read(service)).answer(request)
 
 
 @router.get(
@@ -292,23 +275,4 @@ def _summary(job: Job) -> bytes:
 )
 def get_job(request: Request, job_id: JobId, service: Service, remembered: Remembered) -> Response:
     """State, progress, rates, estimated time left, best design so far, and why it failed if so."""
-    job = service.job(job_id)
-
-    def in_full() -> bytes:
-        return job_in_full(service, job).model_dump_json(by_alias=True).encode()
-
-    return remembered.of_job("in full", job, in_full).answer(request)
-
-
-def job_in_full(service: JobService, job: Job) -> JobView:
-    """Make the answer of every route that is about one job.
-
-    Args:
-        service: Where the job is.
-        job: As it was read.
-
-    Returns:
-        The job with its best design.
-    """
-    found = job.progress.best_fitness is not None
-    return JobView.from_job_and_best(job, service.best(job.id) if found else None)
+    return InFull().answer(remembered, service, service.job(job_id)).answer(request)

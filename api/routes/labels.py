@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query
 from api.access import Actor, may_command
 from api.dependencies import JobId, Service
 from api.documentation import problems
-from api.routes.jobs import job_in_full
+from api.reads import job_in_full
 from gaitswarm.views import PREFIX, JobView
 from gaitswarm.views.labels import JobFacetsView
 from services.optimizer.jobs.labels import LabelsChange

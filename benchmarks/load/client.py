@@ -69,14 +69,14 @@ async def ask_at_rate(
     Returns:
         The answers.
     """
-    idle: list[_Connection] = []
+    idle: list[Connection] = []
     answers: list[Answer] = []
     free = asyncio.Semaphore(_MOST_CONNECTIONS)
     begun = time.perf_counter()
 
     async def ask(kind: str, text: bytes, due: float) -> None:
         async with free:
-            connection = idle.pop() if idle else _Connection(target)
+            connection = idle.pop() if idle else Connection(target)
             status, length = 0, 0
             with suppress(OSError, EOFError):
                 status, length = await connection.ask(text)
@@ -94,7 +94,7 @@ async def ask_at_rate(
     return answers
 
 
-class _Connection:
+class Connection:
     """One that is kept alive."""
 
     def __init__(self, target: Target) -> None:

@@ -104,8 +104,8 @@ def run(database: str, load: Load, say: Callable[[str], None] = lambda _: None) 
     with ExitStack() as opened:
         server = _serve(database, load, opened)
         target = Target.of(server.url)
-        wanted = _requests(server.client, target, np.random.default_rng(load.seed))
-        job, idle = server.submit(_JOB), _waiting_jobs(server.client)
+        wanted = requests_to(server.client, target, np.random.default_rng(load.seed))
+        job, idle = server.submit(_JOB), waiting_jobs(server.client)
         if load.slots:
             _wait_for_iterations(server, job, 10)
         trial = _Trial(server, target, wanted, [job, *idle] if load.slots else idle, load)
@@ -166,7 +166,7 @@ class _Trial:
         await asyncio.sleep(_SETTLE)
         pid = self.server.process.pid
         streams.iterations = 0
-        client, server, clock = time.process_time(), _computed(pid), time.perf_counter()
+        client, server, clock = time.process_time(), computed(pid), time.perf_counter()
         begun = datetime.now(UTC)
         if loaded:
             rate, seconds = self.load.per_second, self.load.seconds
@@ -175,7 +175,7 @@ class _Trial:
         else:
             await asyncio.sleep(self.load.seconds)
         elapsed = time.perf_counter() - clock
-        window = _Window(begun, datetime.now(UTC), (_computed(pid) - server) / elapsed)
+        window = _Window(begun, datetime.now(UTC), (computed(pid) - server) / elapsed)
         if loaded:
             self.found.client.append((time.process_time() - client) / elapsed)
             self.found.events += streams.iterations
@@ -197,7 +197,7 @@ class _Trial:
         ]
 
 
-def _requests(
+def requests_to(
     client: httpx2.Client, target: Target, draw: np.random.Generator
 ) -> list[tuple[str, bytes]]:
     """Kinds and texts of requests, the kinds in turn."""
@@ -253,7 +253,7 @@ def _pages(client: httpx2.Client) -> list[tuple[str | None, list[dict[str, Any]]
             return pages
 
 
-def _waiting_jobs(client: httpx2.Client) -> list[str]:
+def waiting_jobs(client: httpx2.Client) -> list[str]:
     """Jobs that have not ended and do not run: their streams stay open."""
     page = client.get("/v1/jobs", params={"state": "paused", "limit": 200}).raise_for_status()
     return [job["id"] for job in page.json()["items"]]
@@ -289,7 +289,7 @@ def _rate(commits: Sequence[tuple[datetime, int]], window: _Window) -> float:
     return (after - before) / (ended - begun).total_seconds()
 
 
-def _computed(pid: int) -> float:
+def computed(pid: int) -> float:
     """Time of processors that a process has had [s]."""
     after_name = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     return (int(after_name[11]) + int(after_name[12])) / os.sysconf("SC_CLK_TCK")

@@ -19,12 +19,14 @@ from gaitswarm.views import (
     PageView,
     evaluation_views,
 )
+from services.monitoring.metrics import Metrics
 from services.optimizer.access import Scope
 from services.optimizer.jobs.job import Command, Job
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.labels import LabelsChange
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit, Serve
+from tests.store.test_job_reading import statements
 
 
 def test_remembered_answers_are_the_views_byte_for_byte(
@@ -139,3 +141,82 @@ def test_a_job_is_told_by_its_own_object(store: SqlStore, spec: JobSpec) -> None
     told = [answers.of_job("id", job, job.id.encode).plain.decode() for job in (*jobs, *jobs)]
     assert told == [job.id for job in (*jobs, *jobs)]
     assert answers.of_job("id", store.job(jobs[0].id), lambda: b"anew").plain != b"anew"
+
+
+def test_the_short_way_answers_as_the_routes_do(
+    client: httpx2.Client, store: SqlStore, job: Job, spec: JobSpec, commit: Commit
+) -> None:
+    commit(job, 3)
+    waiting = store.create_job(spec)[0]
+    paths = [
+        *("/v1/jobs", "/v1/jobs?limit=1", "/v1/jobs?order=name&search=small&archived=false"),
+        *("/v1/jobs?limit=0", "/v1/jobs?limit=x", "/v1/jobs?after=", "/v1/jobs?after=none"),
+        *("/v1/jobs?state=queued", "/v1/jobs?state=", "/v1/jobs?limit=1&limit=2", "/v1/jobs?x=%00"),
+        *(f"/v1/jobs?search={'a' * length}" for length in (200, 201)),
+    ]
+    for one in (job.id, waiting.id, "b" * 12, "b" * 65):
+        here = f"/v1/jobs/{one}"
+        paths += [here, f"{here}/best", f"{here}/iterations"]
+        paths += [f"{here}/iterations?after=0&limit=1", f"{here}/iterations?after=-1&limit=1001"]
+        paths += [f"{here}/iterations/{index}/evaluations" for index in ("1", "01", "9", "x", "-1")]
+    for path in paths:
+        # A parameter that there is not takes the long way, and changes nothing.
+        long_way = f"{path}{'&' if '?' in path else '?'}unknown=1"
+        for encoding in ("gzip", "identity"):
+            accepted = {"Accept-Encoding": encoding}
+            short, long = (client.get(p, headers=accepted) for p in (path, long_way))
+            assert (short.status_code, short.content) == (long.status_code, long.content), path
+            for answer in (short, long):
+                for header in ("date", "x-request-id"):
+                    del answer.headers[header]
+            assert short.headers == long.headers, path
+
+
+def test_the_short_way_is_counted_under_the_same_routes(
+    serve: Serve, store: SqlStore, job: Job, commit: Commit
+) -> None:
+    commit(job, 3)
+    metrics = Metrics()
+    server = serve(metrics=metrics)
+    here = f"/v1/jobs/{job.id}"
+    paths = ("/v1/jobs", here, f"{here}/best", f"{here}/iterations")
+    for path in (*paths, f"{here}/iterations/0/evaluations"):
+        for query in ("", "?unknown=1"):
+            assert server.client.get(f"{path}{query}").status_code == 200
+    found = {
+        sample.labels["route"]: sample.value
+        for metric in metrics.http_requests.collect()
+        for sample in metric.samples
+        if sample.name.endswith("_total")
+    }
+    assert len(found) == 5 and set(found.values()) == {2.0}, found
+
+
+def test_what_is_asked_again_is_neither_read_by_statements_nor_made_anew(
+    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+) -> None:
+    commit(job, 3)
+    here = f"/v1/jobs/{job.id}"
+    paths = [
+        *("/v1/jobs", "/v1/jobs?search=small", here, f"{here}/best"),
+        *(f"{here}/iterations?limit=1", f"{here}/iterations/0/evaluations"),
+    ]
+    before = [client.get(path).content for path in paths]
+    with statements() as sent:
+        assert [client.get(path).content for path in paths] == before
+    assert sent == []
+    store.label(job.id, LabelsChange(note="look here"))
+    with statements() as sent:
+        after = [client.get(path).content for path in paths]
+    assert [a != b for a, b in zip(after, before, strict=True)] == [True] * 3 + [False] * 3
+    assert sent
+
+
+def test_a_list_with_a_job_that_runs_is_read_anew(
+    client: httpx2.Client, job: Job, commit: Commit
+) -> None:
+    commit(job, 1)
+    client.get("/v1/jobs")
+    with statements() as sent:
+        client.get("/v1/jobs")
+    assert sent

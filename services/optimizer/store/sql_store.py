@@ -77,6 +77,7 @@ from services.optimizer.store.statements.submissions import (
     insert_job,
     repeated_job,
 )
+from services.optimizer.store.transactions.at_once import SqlAtOnce
 from services.optimizer.store.transactions.deletion import SqlDeletion
 from services.optimizer.store.transactions.history import SqlHistory, checked_limit
 from services.optimizer.store.transactions.outbox import SqlOutbox
@@ -128,6 +129,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
         self.tokens = SqlTokens(database, clock)
         self.outbox = SqlOutbox(database, clock)
         self.changes = SqlChanges(database)
+        self.at_once = SqlAtOnce(database)
 
     # jobs, as their users see them
 
@@ -373,6 +375,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
     def close(self) -> None:
         """Close the pooled connections."""
         self.changes.close()
+        self.at_once.close()
         self._database.close()
 
 

@@ -186,7 +186,9 @@ def connect(url: URL, *, for_migration: bool = False) -> Database:
     if for_migration:
         options |= {"poolclass": NullPool}
     else:
+        # Of idle connections the one that was used last knows most of what is stored.
         options |= {"pool_size": 8, "max_overflow": 24, "pool_timeout": BUSY_SECONDS}
+        options |= {"pool_use_lifo": True}
     if url.get_backend_name() == "sqlite":
         engine = _sqlite_engine(url, options, foreign_keys=not for_migration)
         return Database(engine, url.database or "")

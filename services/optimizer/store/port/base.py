@@ -23,7 +23,7 @@ from services.optimizer.jobs.reference import Reference
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.port.deletions import Deletions
 from services.optimizer.store.port.labelling import Labelling
-from services.optimizer.store.port.reading import Changes, CommittedHistory, Page, Queue
+from services.optimizer.store.port.reading import AtOnce, Changes, CommittedHistory, Page, Queue
 from services.optimizer.store.port.running import Runs
 from sim.identification.recorded_walk import RecordedWalk, Recordings
 
@@ -38,6 +38,10 @@ class Store(CommittedHistory, Deletions, Labelling, Runs, Protocol):
     @property
     def changes(self) -> Changes:
         """Of jobs, for those who wait for them."""
+
+    @property
+    def at_once(self) -> AtOnce:
+        """For threads that must not wait."""
 
     @property
     def tokens(self) -> Tokens:

@@ -140,7 +140,7 @@ _documents: Final = RowMemory[JobDocuments](LARGEST)
 _jobs: Final = RowMemory[Job](LARGEST)
 
 
-def shown_job(row: Row[Any], dialect: Dialect) -> Job:
+def shown_job(row: Row[Any] | Values, dialect: Dialect) -> Job:
     """A job from its row, as `to_job` has it.
 
     Args:

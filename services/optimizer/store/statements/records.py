@@ -46,7 +46,7 @@ _ID: Final = re.compile(rf"[{ID_ALPHABET}]{{12}}")
 _OF_JOB: Final = (jobs.c.id == bindparam("job"), EXISTING)
 _WHOLE: Final = select(jobs).where(*_OF_JOB)
 _LOCKED: Final = _WHOLE.with_for_update()
-_SHOWN: Final = select(*SHOWN).where(*_OF_JOB)
+SHOWN_JOB: Final = select(*SHOWN).where(*_OF_JOB)
 _ID_ALONE: Final = select(jobs.c.id).where(*_OF_JOB)
 
 
@@ -100,7 +100,7 @@ def job_to_show(connection: Connection, job_id: str) -> Job:
     Raises:
         NotFound: There is no such job.
     """
-    return shown_job(_row_of(connection, job_id, _SHOWN), connection.dialect)
+    return shown_job(_row_of(connection, job_id, SHOWN_JOB), connection.dialect)
 
 
 def require_job(connection: Connection, job_id: str) -> None:

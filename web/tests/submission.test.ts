@@ -43,11 +43,11 @@ describe('a draft', () => {
     const started = (changes: Partial<Draft['start']>) =>
       specOf({ ...empty, start: { ...empty.start, ...changes } }).start
     expect(specOf(empty)).not.toHaveProperty('start')
-    expect(started({ jobs: 'k2q7, m3x8 ' })).toEqual({ jobs: ['k2q7', 'm3x8'], count: 5 })
-    expect(started({ jobs: 'k2q7', count: 'many' })).toEqual({ jobs: ['k2q7'], count: 'many' })
+    expect(started({ jobs: ['k2q7', 'm3x8'] })).toEqual({ jobs: ['k2q7', 'm3x8'], count: 5 })
+    expect(started({ jobs: ['k2q7'], count: 'many' })).toEqual({ jobs: ['k2q7'], count: 'many' })
     const cloned = draftOf({ start: [{ P: 0.4 }, { P: 0.5 }] } as unknown as JobSpec, CATALOGUE)
     expect(specOf(cloned).start).toEqual([{ P: 0.4 }, { P: 0.5 }])
-    expect(started({ jobs: 'k2q7', designs: [{ P: 0.4 }] })).toHaveProperty('jobs')
+    expect(started({ jobs: ['k2q7'], designs: [{ P: 0.4 }] })).toHaveProperty('jobs')
     const named = draftOf({ start: { jobs: ['k2q7'], count: 9 } } as unknown as JobSpec, CATALOGUE)
     expect(specOf(named).start).toEqual({ jobs: ['k2q7'], count: 9 })
   })

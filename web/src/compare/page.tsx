@@ -7,6 +7,7 @@ import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { Table } from '../components/table'
 import { formatCount, formatNumber, NONE, percent } from '../format/number'
 import { usePlace } from '../router/navigation'
+import { idsOf } from '../router/query-value'
 import { jobPath } from '../router/routes'
 import { ConvergenceCard } from './convergence-card'
 import { DistributionCard } from './distribution-card'
@@ -15,7 +16,7 @@ import './compare.css'
 
 export default function ComparePage() {
   const { query } = usePlace()
-  const ids = [...new Set((query.get('jobs') ?? '').split(',').filter((id) => id !== ''))]
+  const ids = idsOf(query.get('jobs'))
   const [first, ...also] = ids
   const found = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
     get('/v1/jobs/{job_id}/comparison', { path: { job_id: first }, query: { also }, signal }),

@@ -20,6 +20,8 @@ interface Props {
   readonly placeholder?: string
   /** Below the field. */
   readonly hint?: string
+  /** Whether what is chosen was refused. */
+  readonly wrong?: boolean
   /** Offered before any question to the server; those that contain what is typed. */
   readonly groups?: readonly ChoiceGroup[]
   /** Finds on the server, under a heading. */
@@ -27,7 +29,16 @@ interface Props {
   readonly onChoose: (value: string) => void
 }
 
-export function Combobox({ label, shown, placeholder, hint, groups = [], found, onChoose }: Props) {
+export function Combobox({
+  label,
+  shown,
+  placeholder,
+  hint,
+  wrong,
+  groups = [],
+  found,
+  onChoose,
+}: Props) {
   const id = useId()
   const [open, setOpen] = useState(false)
   /** Typed since it was opened; null for nothing. */
@@ -118,6 +129,7 @@ export function Combobox({ label, shown, placeholder, hint, groups = [], found, 
           aria-autocomplete="list"
           aria-controls={isListed ? `${id}-list` : undefined}
           aria-activedescendant={isListed && active >= 0 ? `${id}-${active}` : undefined}
+          aria-invalid={wrong}
           aria-describedby={hint === undefined ? undefined : `${id}-hint`}
           autocomplete="off"
           spellcheck={false}

@@ -62,6 +62,11 @@ export function oneOf<K extends string>(words: readonly K[], usual: K): Codec<K>
   }
 }
 
+/** Ids of a list in the address, separated by commas, each once. */
+export function idsOf(text: string | null): string[] {
+  return [...new Set((text ?? '').split(/[\s,]+/))].filter((id) => id !== '')
+}
+
 /** Numbers between colons; NaN for what is none. */
 export function numbersOf(text: string): number[] {
   return text.split(':').map((part) => Number(part || Number.NaN))

@@ -7,6 +7,7 @@ import type { Job, JobSpec } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { preferenceIn } from '../job/preference'
 import { usePlace } from '../router/navigation'
+import { idsOf } from '../router/query-value'
 import { around } from './around-design'
 import { caseOf } from './case'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
@@ -98,8 +99,8 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
 }
 
 function startingFrom(draft: Draft, query: URLSearchParams): Draft {
-  const jobs = query.get('start')
-  return jobs === null ? draft : { ...draft, start: { ...draft.start, jobs } }
+  const jobs = idsOf(query.get('start'))
+  return jobs.length === 0 ? draft : { ...draft, start: { ...draft.start, jobs } }
 }
 
 /** Whether the form would lose something of a job: what it is, or the case of a plug-in that is not here. */

@@ -1,14 +1,16 @@
 /** Which jobs may be further runs of the same fit. Pure. */
 
 import type { Job, JobSummary } from '../../api/types'
+import { idsOf } from '../../router/query-value'
 
 /** Runs that the API compares at once, besides the first. */
 export const MOST_RUNS = 31
 
 /** Job ids of an address such as `?also=a,b`, each once, without the job itself. */
 export function runsOf(query: URLSearchParams, own: string): readonly string[] {
-  const named = (query.get('also') ?? '').split(',').map((id) => id.trim())
-  return [...new Set(named)].filter((id) => id !== '' && id !== own).slice(0, MOST_RUNS)
+  return idsOf(query.get('also'))
+    .filter((id) => id !== own)
+    .slice(0, MOST_RUNS)
 }
 
 /** The query of such an address; null for none. */

@@ -3,6 +3,7 @@
 import { useState } from 'preact/hooks'
 import type { Resource } from '../../api/resource'
 import type { RecordingView } from '../../api/types'
+import { ChosenList } from '../../components/chosen-list'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { formatNumber } from '../../format/number'
 import { words } from './fit'
@@ -41,26 +42,9 @@ export function ChosenCard({
           retry={recordings.reload}
         />
       )}
-      {ids.length > 0 && (
-        <ul class="stack-tight">
-          {ids.map((id) => (
-            <li key={id} class="row" data-chosen={id}>
-              <span>
-                <code>{id.slice(0, 12)}</code>{' '}
-                {inWords(recordings.data?.find((recording) => recording.id === id))}
-              </span>
-              <button
-                type="button"
-                class="compact"
-                aria-label={`Remove ${id.slice(0, 12)}`}
-                onClick={() => onChange(ids.filter((other) => other !== id))}
-              >
-                Remove
-              </button>
-            </li>
-          ))}
-        </ul>
-      )}
+      <ChosenList ids={ids} short={(id) => id.slice(0, 12)} onChange={onChange}>
+        {(id) => inWords(recordings.data?.find((recording) => recording.id === id))}
+      </ChosenList>
       <div class="row">
         <TextField
           label="Others"

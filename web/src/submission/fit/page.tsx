@@ -5,11 +5,11 @@ import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { setQuery } from '../../router/navigation'
+import { idsOf } from '../../router/query-value'
 import { withQuery } from '../../router/routes'
 import { type Catalogue, loadCatalogue } from '../catalogue'
 import { CalibrationForm } from './calibration'
 import { ChosenCard } from './chosen-card'
-import { words } from './fit'
 import { IdentificationForm } from './identification'
 import { UploadCard } from './upload-card'
 
@@ -37,7 +37,7 @@ export interface FitProps {
 
 export function FitPage({ kind, query }: { kind: FitKind; query: URLSearchParams }) {
   const catalogue = useResource('catalogue', loadCatalogue)
-  const ids = unique(words(query.get('recordings') ?? ''))
+  const ids = idsOf(query.get('recordings'))
   return (
     <>
       <header class="page-header">
@@ -78,7 +78,7 @@ function Fit({
     ),
   )
   const choose = (chosen: readonly string[]) => {
-    const text = unique(chosen).join(',')
+    const text = idsOf(chosen.join()).join()
     setQuery({ recordings: text === '' ? null : text })
   }
   const parts = { catalogue, robot, onRobot: setRobot, ids }
@@ -133,9 +133,5 @@ function useLast<T>(data: T | null): T | null {
 
 /** As the address says when an answer comes, which may have been asked for long before. */
 function chosenNow(): string[] {
-  return words(new URLSearchParams(location.search).get('recordings') ?? '')
-}
-
-function unique(ids: readonly string[]): string[] {
-  return [...new Set(ids)]
+  return idsOf(new URLSearchParams(location.search).get('recordings'))
 }

@@ -15,6 +15,7 @@ _SOURCES: Final[dict[str, dict[str, str]]] = {
         "job_id": "$request.path.job_id",
         "iteration": "$response.body#/items/0/index",
     },
+    "list_recordings": {"recording_id": "$response.body#/items/0/id"},
     "add_recording": {"recording_id": "$response.body#/id"},
     "record_measured_walk": {"recording_id": "$response.body#/recording/id"},
 }

@@ -21,8 +21,13 @@ from api.dependencies import (
 )
 from api.documentation import problems
 from gaitswarm.requests.measured_walk import MeasuredWalkRequest, read_measured_walk
-from gaitswarm.views import PREFIX
-from gaitswarm.views.identification import IdentifiabilityView, MeasuredWalkView, RecordingView
+from gaitswarm.views import PREFIX, PageView
+from gaitswarm.views.identification import (
+    IdentifiabilityView,
+    MeasuredWalkView,
+    RecordingEntryView,
+    RecordingView,
+)
 from services.optimizer.service import JobService
 from sim.identification.recorded_walk import RecordedWalk
 
@@ -60,6 +65,36 @@ def add_recording(
     POST /v1/measured-walks make one of a measured log.
     """
     return _kept(walk, service, response, actor)
+
+
+@router.get(
+    "/recordings",
+    tags=["recordings"],
+    operation_id="list_recordings",
+    summary="List recorded walks",
+    responses=problems(422),
+)
+def list_recordings(
+    service: Service,
+    search: Annotated[
+        str,
+        Query(
+            max_length=200,
+            description="Only recordings whose id, scenario or controller contain this, whatever"
+            " its case.",
+        ),
+    ] = "",
+    after: Annotated[
+        str | None, Query(max_length=200, description="`next` of the page before.")
+    ] = None,
+    limit: Annotated[int, Query(ge=1, le=200, description="Most recordings on a page.")] = 50,
+) -> PageView[RecordingEntryView]:
+    """Recordings without their numbers, the newest first. Later ones do not shift later pages.
+
+    Whoever may read sees all of them, as with jobs.
+    """
+    page = service.recordings(search=search, after=after, limit=limit)
+    return PageView(items=[RecordingEntryView.from_entry(e) for e in page.items], next=page.next)
 
 
 @router.post(

@@ -42,7 +42,11 @@ if TYPE_CHECKING:
     from gaitswarm.views.comparison import JobComparisonView
     from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
-    from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+    from gaitswarm.views.identification import (
+        IdentifiabilityView,
+        RecordingEntryView,
+        RecordingView,
+    )
     from gaitswarm.views.importance import ImportanceView
     from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
@@ -290,6 +294,12 @@ class AsyncJobs(ABC):
     @abstractmethod
     async def record(self, walk: RecordedWalk) -> RecordingView:
         """Keep a recorded walk, to which jobs can fit parameters of the robot."""
+
+    @abstractmethod
+    def recordings(
+        self, *, search: str = "", limit: int | None = None
+    ) -> AsyncIterator[RecordingEntryView]:
+        """List recorded walks."""
 
     @abstractmethod
     async def recording(self, recording_id: str) -> RecordedWalk:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         JobSummaryView,
         JobView,
     )
-    from gaitswarm.views.identification import RecordingView
+    from gaitswarm.views.identification import RecordingEntryView, RecordingView
     from sim.identification.recorded_walk import RecordedWalk
 
 JobEvent: TypeAlias = IterationView | StateView
@@ -355,6 +355,20 @@ class Jobs(Findings, Tournaments, Walks, ABC):
 
         Returns:
             The recording's id, and the walk at a glance.
+        """
+
+    @abstractmethod
+    def recordings(
+        self, *, search: str = "", limit: int | None = None
+    ) -> Iterator[RecordingEntryView]:
+        """List recorded walks, the newest first.
+
+        Args:
+            search: Only walks whose id, scenario or controller contain this, whatever its case.
+            limit: Most walks to list; None for all.
+
+        Returns:
+            The walks without their currents.
         """
 
     @abstractmethod

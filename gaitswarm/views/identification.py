@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 from pydantic import Field
 
 from gaitswarm.views.base import View, finite
@@ -12,6 +14,7 @@ from services.optimizer.analysis.fits.identifiability import (
     ParameterIdentifiability,
     Trust,
 )
+from services.optimizer.store.port.recordings import RecordingEntry
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.identification.recorded_walk import RecordedWalk
 from sim.measurement.measured_log import MeasuredLog, Quantity
@@ -191,6 +194,50 @@ class RecordingView(View):
             mean_current=float(walk.amperes.mean()),
             peak_current=float(walk.amperes.max()),
             synthetic=walk.synthetic,
+        )
+
+
+class RecordingEntryView(View):
+    """A recorded walk in a list. One that this server cannot read has an id, a time and a size."""
+
+    id: str = Field(
+        description="Identifier, as in `recordings` of a job.",
+        examples=["0f343b0931126a20f133d67c2b018a3b"],
+    )
+    created_at: datetime = Field(description="When it was first stored.")
+    scenario: str | None = Field(
+        description="Name of its scenario; null if it cannot be read.", examples=["normal-fast"]
+    )
+    controller: str | None = Field(
+        description="Controller that drove it; null if it cannot be read.", examples=["fuzzy-pi"]
+    )
+    joints: int | None = Field(description="Joints whose currents were measured.", examples=[18])
+    rows: int | None = Field(description="Rows.", examples=[1500])
+    rate: float = Field(description="Rows a second [1/s].", examples=[500.0])
+    seconds: float | None = Field(description="Time that is compared [s].", examples=[3.0])
+    size: int = Field(description="Characters of the stored document.", examples=[206113])
+    synthetic: bool = Field(
+        description="Whether it was computed, not measured on a robot.", examples=[False]
+    )
+
+    @classmethod
+    def from_entry(cls, entry: RecordingEntry) -> RecordingEntryView:
+        """Make a view of a recording in a list.
+
+        Args:
+            entry: as the store has it.
+        """
+        return cls(
+            id=entry.id,
+            created_at=entry.created_at,
+            scenario=entry.scenario,
+            controller=entry.controller,
+            joints=entry.joints,
+            rows=entry.rows,
+            rate=1.0 / CONTROL_PERIOD,
+            seconds=None if entry.rows is None else entry.rows * CONTROL_PERIOD,
+            size=entry.size,
+            synthetic=entry.synthetic,
         )
 
 

@@ -28,6 +28,7 @@ from services.optimizer.labelling import Labelling
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from services.optimizer.run.runner import runner_name
 from services.optimizer.store.port.reading import Page
+from services.optimizer.store.port.recordings import RecordingEntry
 from sim.identification.recorded_walk import RecordedWalk
 
 _EARLIER: Final = 50
@@ -218,6 +219,24 @@ class JobService(Questions, Commands, Deletion, Labelling):
             NotFound: no walk of that id.
         """
         return self.store.recordings([recording_id])[recording_id]
+
+    def recordings(
+        self, *, search: str = "", after: str | None = None, limit: int = 50
+    ) -> Page[RecordingEntry]:
+        """Read a page of the list of recorded walks, the newest first.
+
+        Args:
+            search: only walks whose id, scenario or controller contain this, whatever its case.
+            after: `next` of the page before; None for the first page.
+            limit: most walks on the page.
+
+        Returns:
+            The page, without the currents.
+
+        Raises:
+            InvalidRequest: `after` is no cursor of this list.
+        """
+        return self.store.recording_list(search=search, after=after, limit=limit)
 
     def estimate(self, spec: Spec) -> Estimate:
         """Say what a job would cost, by the rate of jobs like it or a walk that is measured here.

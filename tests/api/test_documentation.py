@@ -68,6 +68,7 @@ def test_the_routes_are_these(document: Document) -> None:
         "get /v1/tournaments/{job_id}/problems/{problem}",
         f"get {job}/certificate",
         "post /v1/estimates",
+        "get /v1/recordings",
         "post /v1/recordings",
         "post /v1/measured-walks",
         "get /v1/recordings/{recording_id}",

@@ -41,6 +41,36 @@ def test_a_recording_is_kept_and_can_be_looked_at(client: httpx2.Client) -> None
     assert client.get(f"{answer.headers['Location']}/summary").json() == glance
 
 
+def test_recordings_are_listed_by_pages_without_their_numbers(client: httpx2.Client) -> None:
+    ids = [
+        client.post("/v1/recordings", json=WALK | {"first_tick": tick}).json()["id"]
+        for tick in (30, 31)
+    ]
+    first = client.get("/v1/recordings", params={"search": ids[0][:20].upper()}).json()
+    [item] = first["items"]
+    assert first["next"] is None
+    assert item.pop("created_at") and item.pop("size") > 1000
+    assert item == {
+        "id": ids[0],
+        "scenario": SHORT_WALK["name"],
+        "controller": "fuzzy-pi",
+        "joints": 18,
+        "rows": 10,
+        "rate": 500.0,
+        "seconds": 0.02,
+        "synthetic": False,
+    }
+    after, found = None, list[str]()
+    while not found or after is not None:
+        query = {"limit": 1} | ({} if after is None else {"after": after})
+        page = client.get("/v1/recordings", params=query).json()
+        found += [recording["id"] for recording in page["items"]]
+        after = page["next"]
+    assert set(ids) <= set(found) and len(set(found)) == len(found)
+    refused = client.get("/v1/recordings?after=then")
+    assert [error["field"] for error in refused.json()["errors"]] == ["after"]
+
+
 def test_the_same_recording_again_is_the_same(client: httpx2.Client) -> None:
     assert kept(client) == kept(client)
 

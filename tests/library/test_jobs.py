@@ -439,6 +439,9 @@ def test_a_recorded_walk_is_kept_and_taken_back(reach: Reach, db: Path) -> None:
     assert kept.rows == 2
     assert kept.mean_current == pytest.approx(0.15)
     assert jobs.recording(kept.id) == walk
+    [listed] = jobs.recordings(search="FAST", limit=2)
+    assert (listed.id, listed.rows, listed.seconds) == (kept.id, 2, kept.seconds)
+    assert list(jobs.recordings(search="slow")) == []
     assert jobs.record(walk).id == kept.id
 
 

@@ -12,6 +12,7 @@ from services.optimizer.store.sql_store import SqlStore
 from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
+from tests.store.examples import Clock
 
 
 def recording(**changes: object) -> RecordedWalk:
@@ -48,6 +49,36 @@ def test_the_same_walk_is_the_same_recording_and_another_is_another(store: SqlSt
 def test_an_unknown_recording_is_not_found(store: SqlStore) -> None:
     with pytest.raises(NotFound, match="there is no recording '0000"):
         store.recordings(["0" * 32])
+
+
+def test_recordings_are_listed_by_pages_and_searched(store: SqlStore, clock: Clock) -> None:
+    walks = [recording(first_tick=20 + k) for k in range(3)]
+    walks.append(recording(scenario=SHORT_WALK | {"name": "Slope_4"}, synthetic=True))
+    ids = []
+    for walk in walks:
+        ids.append(store.add_recording(walk))
+        clock.advance(1.0)
+    page = store.recording_list(limit=3)
+    assert [entry.id for entry in page.items] == ids[:0:-1]
+    newest = page.items[0]
+    assert (newest.scenario, newest.controller) == ("Slope_4", "fuzzy-pi")
+    assert (newest.joints, newest.rows, newest.synthetic) == (18, 10, True)
+    assert newest.size > 18 * 10 * len("0.1")
+    # What is stored meanwhile shifts no page.
+    store.add_recording(recording(first_tick=30))
+    rest = store.recording_list(after=page.next, limit=3)
+    assert ([entry.id for entry in rest.items], rest.next) == ([ids[0]], None)
+    assert not rest.items[0].synthetic
+
+    def found(text: str) -> set[str]:
+        return {entry.id for entry in store.recording_list(search=text).items}
+
+    assert found("SLOPE_") == found(ids[3][:12]) == {ids[3]}
+    assert found("%") == found("e_w") == found("fuzzy-pi\0") == set()
+    assert len(found("Fuzzy-PI")) == 5
+    with pytest.raises(InvalidRequest, match="not a cursor") as refused:
+        store.recording_list(after="yesterday")
+    assert refused.value.field == "after"
 
 
 def test_a_claim_brings_the_recordings_that_the_job_names(store: SqlStore) -> None:

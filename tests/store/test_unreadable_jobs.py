@@ -256,6 +256,21 @@ def test_a_job_with_a_recording_is_set_aside_too(
             JobService(store).recording(name)
 
 
+def test_a_recording_that_cannot_be_read_hides_no_other_in_the_list(
+    store: SqlStore, database_url: str
+) -> None:
+    whole, broken = (store.add_recording(recording(first_tick=k)) for k in (20, 21))
+    statement = "UPDATE recordings SET document = :document WHERE id = :id"
+    # PostgreSQL itself refuses what is no JSON.
+    damaged = ['{"current": [[0.1]]', "[]"] if "sqlite" in database_url else ["[]"]
+    for document in damaged:
+        execute(database_url, statement, document, broken)
+        for search in ("", broken):
+            entries = {entry.id: entry for entry in store.recording_list(search=search).items}
+            assert (entries[broken].scenario, entries[broken].rows) == (None, None)
+            assert (whole in entries) is (search == "")
+
+
 def test_a_job_whose_ask_cannot_be_read_is_set_aside_too(
     store: SqlStore, clock: Clock, database_url: str
 ) -> None:

@@ -53,7 +53,21 @@ def test_a_log_is_uploaded_read_and_identified_from(
     expect(read).to_contain_text("1.500 s in 750 rows. The walk begins 0 s into the log; 1 whole")
     expect(read.get_by_role("row").filter(has_text="I_M")).to_contain_text("18")
     recording = str(read.get_attribute("data-recording"))
-    expect(page.locator(f"[data-chosen='{recording}']")).to_contain_text("1.50 s of normal-fast")
+    chosen = page.locator(f"[data-chosen='{recording}']")
+    expect(chosen).to_contain_text("1.50 s of normal-fast")
+
+    # It is kept: whoever left it out, or comes later, finds it.
+    page.get_by_role("button", name=f"Remove {recording[:12]}").click()
+    expect(chosen).to_have_count(0)
+    field = page.get_by_role("combobox", name="Recordings that are kept")
+    field.fill("NORMAL-F")
+    offered = page.get_by_role("option", name=re.compile(recording[:12]))
+    expect(offered).to_contain_text("18 joints · 500 rows a second")
+    offered.click()
+    expect(chosen).to_contain_text("1.50 s of normal-fast")
+    field.fill(recording)
+    expect(page.get_by_text("Nothing fits.")).to_be_visible()
+    field.press("Escape")
 
     page.get_by_label("Parameters").fill("body_mass=3:5, battery_voltage")
     page.get_by_label("Particles").fill("4")

@@ -1,10 +1,23 @@
 import { describe, expect, test } from 'vitest'
 import type { OptimizerPreset, RecordingView } from '../src/api/types'
 import { EMPTY_FIT, errorsByPart } from '../src/submission/fit/fit'
+import { choiceOf } from '../src/submission/fit/found-recordings'
 import { identificationSpec } from '../src/submission/fit/identification'
 import { emptyWalk, measuredRequest, walkErrors } from '../src/submission/fit/measured-walk'
 import { calibrationSpec, nextKey, withRecordings } from '../src/submission/fit/targets'
 import { CATALOGUE } from './catalogue-example'
+
+test('a kept recording is offered by what it is of, and refused if it cannot be read', () => {
+  const kept = { id: '0f343b0931126a20', created_at: '2026-03-01T10:00:00Z', size: 206113 }
+  const walk = { scenario: 'slope', controller: 'pi', joints: 18, rate: 500, seconds: 3 }
+  const choice = choiceOf({ ...kept, ...walk, rows: 1500, synthetic: true })
+  expect([choice.value, choice.label]).toEqual([kept.id, '3.00 s of slope with pi'])
+  expect(choice.note).toContain('0f343b093112 · 2026-03-01')
+  expect(choice.note).toContain('18 joints · 500 rows a second · 206 kB · synthetic')
+  const nothing = { scenario: null, controller: null, joints: null, rows: null, seconds: null }
+  const broken = choiceOf({ ...kept, ...nothing, rate: 500, synthetic: false })
+  expect(broken.refused).toContain('cannot be read')
+})
 
 const METHODS = [
   { settings: { name: 'pso', particles: 25 } },

@@ -30,7 +30,7 @@ from gaitswarm.views import (
     JobView,
 )
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import RecordingView
+from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.evaluator import Evaluator
@@ -277,6 +277,14 @@ class AsyncDatabaseJobs(AsyncDatabaseFindings, AsyncLocalWalks, AsyncJobs):
         """Write a recorded walk into the database."""
         jobs = await self._jobs()
         return await to_thread.run_sync(jobs.record, walk)
+
+    async def recordings(
+        self, *, search: str = "", limit: int | None = None
+    ) -> AsyncIterator[RecordingEntryView]:
+        """List the database's recorded walks, read by pages."""
+        jobs = await self._jobs()
+        async for entry in iterated(partial(jobs.recordings, search=search, limit=limit)):
+            yield entry
 
     async def recording(self, recording_id: str) -> RecordedWalk:
         """Read a recorded walk."""

@@ -7,8 +7,9 @@ import shlex
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from itertools import islice
-from typing import Final, Unpack
+from typing import Final, TypeVar, Unpack
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.jobs.database.embedded import Workers, run_here
@@ -27,13 +28,16 @@ from gaitswarm.views import (
     JobView,
 )
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import RecordingView
+from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
+from services.optimizer.store.port.reading import Page
 from services.runtime import EvaluatorKind
 from sim.identification.recorded_walk import RecordedWalk
+
+T = TypeVar("T")
 
 POLL_SECONDS: Final = 0.5
 """How often a job that is followed is looked at [s]."""
@@ -201,9 +205,17 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         limit: int | None = None,
     ) -> Iterator[JobSummaryView]:
         """List the database's jobs, read by pages."""
-        in_order = (arguments.order(order), reverse)
-        found = self._all(arguments.state(state), parent, search, where, in_order)
-        return map(JobSummaryView.from_job, islice(found, limit))
+        pages = partial(
+            self._service.jobs,
+            state=arguments.state(state),
+            parent=parent,
+            search=search,
+            where=where,
+            order=arguments.order(order),
+            reverse=reverse,
+            limit=PAGE,
+        )
+        return map(JobSummaryView.from_job, islice(_items(pages), limit))
 
     def job(self, job_id: str) -> JobView:
         """Read one job."""
@@ -289,6 +301,13 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         """Write a recorded walk into the database."""
         return RecordingView.from_walk(self._service.record(walk), walk)
 
+    def recordings(
+        self, *, search: str = "", limit: int | None = None
+    ) -> Iterator[RecordingEntryView]:
+        """List the database's recorded walks, read by pages."""
+        pages = partial(self._service.recordings, search=search, limit=PAGE)
+        return map(RecordingEntryView.from_entry, islice(_items(pages), limit))
+
     def recording(self, recording_id: str) -> RecordedWalk:
         """Read a recorded walk."""
         return self._service.recording(recording_id)
@@ -297,32 +316,17 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         """Close the store."""
         self._service.store.close()
 
-    def _all(
-        self,
-        state: JobState | None,
-        parent: str | None,
-        search: str,
-        where: JobFilter,
-        in_order: tuple[JobOrder, bool],
-    ) -> Iterator[Job]:
-        after: str | None = None
-        order, reverse = in_order
-        while True:
-            page = self._service.jobs(
-                state=state,
-                parent=parent,
-                search=search,
-                where=where,
-                order=order,
-                reverse=reverse,
-                after=after,
-                limit=PAGE,
-            )
-            yield from page.items
-            if page.next is None:
-                return
-            after = page.next
-
     def _in_full(self, job: Job) -> JobView:
         found = job.progress.best_fitness is not None
         return JobView.from_job_and_best(job, self._service.best(job.id) if found else None)
+
+
+def _items(page: Callable[..., Page[T]]) -> Iterator[T]:
+    """All items of a list that is read by pages."""
+    after: str | None = None
+    while True:
+        found = page(after=after)
+        yield from found.items
+        if found.next is None:
+            return
+        after = found.next

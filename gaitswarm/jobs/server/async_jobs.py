@@ -48,7 +48,7 @@ from gaitswarm.views import (
     PageView,
 )
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import RecordingView
+from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.outage import Backoff
@@ -150,15 +150,10 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
     ) -> AsyncIterator[JobSummaryView]:
         """List the server's jobs, page by page."""
         wanted, sorted_by = arguments.state(state), arguments.order(order)
-        left = limit
         pages = self._items(
             lambda after: calls.jobs(wanted, parent, search, where, (sorted_by, reverse), after)
         )
-        async for job in pages:
-            if left is not None:
-                if left <= 0:
-                    return
-                left -= 1
+        async for job in _first(limit, pages):
             yield job
 
     async def job(self, job_id: str) -> JobView:
@@ -246,6 +241,14 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
         """Send a recorded walk to the server."""
         return await self._send(calls.record(walk))
 
+    async def recordings(
+        self, *, search: str = "", limit: int | None = None
+    ) -> AsyncIterator[RecordingEntryView]:
+        """List the server's recorded walks, page by page."""
+        pages = self._items(lambda after: calls.recordings(search, after))
+        async for recording in _first(limit, pages):
+            yield recording
+
     async def recording(self, recording_id: str) -> RecordedWalk:
         """Ask the server for a recorded walk."""
         return await self._send(calls.recording(recording_id))
@@ -292,3 +295,16 @@ class AsyncServerJobs(AsyncServerFindings, AsyncServerWalks, AsyncJobs):
             else:
                 seconds = attempts.after_refusal(response)
             await anyio.sleep(seconds)
+
+
+async def _first(limit: int | None, items: AsyncIterator[T]) -> AsyncIterator[T]:
+    """So many items, or all; no further page is asked for."""
+    left = limit
+    if left is not None and left <= 0:
+        return
+    async for item in items:
+        yield item
+        if left is not None:
+            left -= 1
+            if left <= 0:
+                return

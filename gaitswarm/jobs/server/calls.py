@@ -22,7 +22,11 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
-from gaitswarm.views.identification import IdentifiabilityView, RecordingView
+from gaitswarm.views.identification import (
+    IdentifiabilityView,
+    RecordingEntryView,
+    RecordingView,
+)
 from gaitswarm.views.tournament import (
     ProblemRunsView,
     TournamentStandingsView,
@@ -245,6 +249,16 @@ def record(walk: RecordedWalk) -> Call[RecordingView]:
         walk: As it was measured.
     """
     return posted("/recordings", RecordingView, walk)
+
+
+def recordings(search: str, after: str | None) -> Call[PageView[RecordingEntryView]]:
+    """A page of the list of recorded walks.
+
+    Args:
+        search: Text that id, scenario or controller contain, whatever its case.
+        after: `next` of the page before; None for the first page.
+    """
+    return page("/recordings", PageView[RecordingEntryView], after, {"search": search})
 
 
 def recording(recording_id: str) -> Call[RecordedWalk]:

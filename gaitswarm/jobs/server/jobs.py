@@ -46,7 +46,7 @@ from gaitswarm.views import (
     PageView,
 )
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import RecordingView
+from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from services.optimizer.run.outage import Backoff
@@ -243,6 +243,12 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
     def record(self, walk: RecordedWalk) -> RecordingView:
         """Send a recorded walk to the server."""
         return self._send(calls.record(walk))
+
+    def recordings(
+        self, *, search: str = "", limit: int | None = None
+    ) -> Iterator[RecordingEntryView]:
+        """List the server's recorded walks, page by page."""
+        return islice(self._items(lambda after: calls.recordings(search, after)), limit)
 
     def recording(self, recording_id: str) -> RecordedWalk:
         """Ask the server for a recorded walk."""

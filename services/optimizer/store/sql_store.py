@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
@@ -59,11 +58,6 @@ from services.optimizer.store.statements.job_list import (
 from services.optimizer.store.statements.job_orders import sort_jobs
 from services.optimizer.store.statements.labels import count_facets, label_job
 from services.optimizer.store.statements.queue import count_jobs
-from services.optimizer.store.statements.recordings import (
-    insert_recording,
-    load_recordings,
-    recording_id,
-)
 from services.optimizer.store.statements.records import (
     entering,
     job_row,
@@ -81,9 +75,9 @@ from services.optimizer.store.transactions.at_once import SqlAtOnce
 from services.optimizer.store.transactions.deletion import SqlDeletion
 from services.optimizer.store.transactions.history import SqlHistory, checked_limit
 from services.optimizer.store.transactions.outbox import SqlOutbox
+from services.optimizer.store.transactions.recordings import SqlRecordings
 from services.optimizer.store.transactions.runs import SqlRuns
 from services.optimizer.store.transactions.tokens import SqlTokens
-from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _LONGEST_KEY: Final = 200
 
@@ -114,7 +108,7 @@ def open_store(url: str, *, clock: Clock = database_time) -> SqlStore:
     return SqlStore(database, clock=clock)
 
 
-class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
+class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
     """`Store` on a database that has the newest schema, such as `open_store` gives.
 
     Args:
@@ -125,6 +119,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
     def __init__(self, database: Database, *, clock: Clock = database_time) -> None:
         SqlHistory.__init__(self, database)
         SqlDeletion.__init__(self, database, clock)
+        SqlRecordings.__init__(self, database, clock)
         SqlRuns.__init__(self, database, clock)
         self.tokens = SqlTokens(database, clock)
         self.outbox = SqlOutbox(database, clock)
@@ -334,27 +329,6 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRuns):
             now, action = self._clock(connection), AuditAction.PRIORITIZE
             note_change(connection, now, actor, action, job_id, priority=priority)
             return to_job(update_job(connection, row, {"priority": priority}))
-
-    # recorded walks
-
-    def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
-        """Keep a recorded walk, once."""
-        try:
-            with self._database.transaction(write=True) as connection:
-                now = self._clock(connection)
-                name, new = insert_recording(connection, walk, now)
-                if new:
-                    action = AuditAction.ADD_RECORDING
-                    note_change(connection, now, actor, action, recording=name)
-                return name
-        except IntegrityError:
-            # Another process has stored the same walk between our look and our insertion.
-            return recording_id(walk)
-
-    def recordings(self, ids: Sequence[str]) -> Recordings:
-        """Read recorded walks."""
-        with self._database.transaction(write=False) as connection:
-            return load_recordings(connection, ids)
 
     def audit(
         self, *, job_id: str | None = None, after: str | None = None, limit: int = 50

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, Protocol
 
 from services.optimizer.access import Tokens
@@ -24,11 +23,11 @@ from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.port.deletions import Deletions
 from services.optimizer.store.port.labelling import Labelling
 from services.optimizer.store.port.reading import AtOnce, Changes, CommittedHistory, Page, Queue
+from services.optimizer.store.port.recordings import KeptRecordings
 from services.optimizer.store.port.running import Runs
-from sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
-class Store(CommittedHistory, Deletions, Labelling, Runs, Protocol):
+class Store(CommittedHistory, Deletions, KeptRecordings, Labelling, Runs, Protocol):
     """Thread-safe. Every method is one transaction: it happens wholly or not at all.
 
     Methods that take an id raise NotFound for an unknown one. Methods that take a claim raise
@@ -251,31 +250,6 @@ class Store(CommittedHistory, Deletions, Labelling, Runs, Protocol):
         Args:
             job_id: Of the job; one that is gone is let be.
             reference: The published design in the job's cases.
-        """
-
-    def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
-        """Keep a recorded walk.
-
-        Args:
-            walk: As it was recorded.
-            actor: Whom the audit log is to name, if the walk is new.
-
-        Returns:
-            Its id, which depends on its content alone.
-        """
-
-    def recordings(self, ids: Sequence[str]) -> Recordings:
-        """Read recorded walks.
-
-        Args:
-            ids: Of the walks.
-
-        Returns:
-            The walks by id.
-
-        Raises:
-            NotFound: There is no such recording; names the first.
-            Unreadable: One was stored by another version, or damaged.
         """
 
     def audit(

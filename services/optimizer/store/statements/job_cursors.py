@@ -17,7 +17,7 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def to_cursor(created_at: datetime, job_id: str) -> str:
-    """Place of a job in the list by age.
+    """Place of a job, or of a recording, in the list by age.
 
     Args:
         created_at: When the job was submitted.
@@ -42,12 +42,25 @@ def from_cursor(text: str) -> tuple[datetime, str]:
         InvalidRequest: It is no such cursor; names the field `after`.
     """
     match = _CURSOR.fullmatch(text)
+    created_at = None if match is None else time_of(match[1])
+    if match is None or created_at is None:
+        raise no_cursor()
+    return created_at, match[2]
+
+
+def time_of(digits: str) -> datetime | None:
+    """Read the time of a cursor.
+
+    Args:
+        digits: Microseconds since 1970.
+
+    Returns:
+        The time; None beyond the calendar's end.
+    """
     try:
-        if match is not None:
-            return _EPOCH + timedelta(microseconds=int(match[1])), match[2]
+        return _EPOCH + timedelta(microseconds=int(digits))
     except OverflowError:
-        pass
-    raise no_cursor()
+        return None
 
 
 def to_fitness_cursor(fitness: float | None, job_id: str) -> str:

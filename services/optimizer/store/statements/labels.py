@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, Final
 
-from sqlalchemy import ColumnElement, Connection, Text, case, cast, func, select
+from sqlalchemy import ColumnElement, Connection, select
 
 from services.optimizer.jobs.audit import AuditAction
 from services.optimizer.jobs.labels import (
@@ -20,6 +20,7 @@ from services.optimizer.store.rows.evaluation_rows import Row
 from services.optimizer.store.rows.job_rows import labels_of
 from services.optimizer.store.rows.tables import jobs
 from services.optimizer.store.statements.audit import note_change
+from services.optimizer.store.statements.documents import text_at
 from services.optimizer.store.statements.records import job_row, update_job
 
 _FIELDS: Final = ("robot", "controller", "preference")
@@ -59,15 +60,7 @@ def spec_field(connection: Connection, name: str) -> ColumnElement[str]:
     Returns:
         The text; "" where the spec has none of this name, or is no JSON.
     """
-    document = cast(jobs.c.spec, Text)
-    if connection.dialect.name == "sqlite":
-        # It keeps any text, and fails at a path into one that is not JSON.
-        is_readable: ColumnElement[bool] = func.json_valid(document)
-    else:
-        # A zero byte, as JSON spells it, makes PostgreSQL fail at any path into the document.
-        is_readable = func.strpos(document, r"\u0000") == 0
-    found = case((is_readable, jobs.c.spec[name].as_string()), else_="")
-    return func.coalesce(cast(found, Text), "")
+    return text_at(connection, jobs.c.spec, name)
 
 
 def facet_columns(connection: Connection) -> list[ColumnElement[Any]]:

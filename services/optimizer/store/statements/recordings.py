@@ -6,17 +6,35 @@ A recording's id is its content's hash: it never changes, and storing it again i
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
-from sqlalchemy import Connection, insert, select
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Row,
+    Text,
+    cast,
+    false,
+    func,
+    insert,
+    select,
+    tuple_,
+)
 
-from services.optimizer.errors import NotFound
+from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.store.port.reading import Page
+from services.optimizer.store.port.recordings import RecordingEntry
 from services.optimizer.store.rows.job_rows import first_problems, kept
 from services.optimizer.store.rows.tables import recordings
+from services.optimizer.store.statements.documents import length_at, text_at
+from services.optimizer.store.statements.job_cursors import time_of, to_cursor
 from sim.identification.recorded_walk import RecordedWalk, Recordings
+
+_CURSOR: Final = re.compile(r"([0-9]{1,18})\.([0-9a-f]{32})", re.ASCII)
 
 
 def recording_id(walk: RecordedWalk) -> str:
@@ -72,6 +90,79 @@ def load_recordings(connection: Connection, ids: Sequence[str]) -> Recordings:
         if name not in documents:
             raise NotFound(f"there is no recording {name!r}")
     return {name: _walk(name, documents[name]) for name in ids}
+
+
+def recording_page(
+    connection: Connection, search: str, after: str | None, limit: int
+) -> Page[RecordingEntry]:
+    """Read a page of the list of recorded walks, the newest first.
+
+    Args:
+        connection: An open transaction.
+        search: Only walks whose id, scenario or controller contain this, whatever its case.
+        after: `next` of the page before; None for the first page.
+        limit: Most walks on the page.
+
+    Returns:
+        The page.
+
+    Raises:
+        InvalidRequest: `after` is no cursor of this list.
+    """
+    document = recordings.c.document
+    scenario = text_at(connection, document, "scenario", "name")
+    controller = text_at(connection, document, "controller")
+    place = (recordings.c.created_at, recordings.c.id)
+    among: list[ColumnElement[bool]] = []
+    if search:
+        words = scenario + "\n" + controller + "\n" + recordings.c.id
+        # A zero byte is in no text, and PostgreSQL refuses it.
+        among.append(words.icontains(search, autoescape=True) if "\0" not in search else false())
+    if after is not None:
+        among.append(tuple_(*place) < _from_cursor(after))
+    # Which walks the page has is told first: their documents alone are looked into.
+    newest = select(recordings.c.id).where(*among).order_by(*(c.desc() for c in place))
+    ids = connection.execute(newest.limit(limit + 1)).scalars().all()
+    columns = (
+        recordings.c.id,
+        recordings.c.created_at,
+        func.length(cast(document, Text)).label("size"),
+        scenario.label("scenario"),
+        controller.label("controller"),
+        length_at(connection, document, "joints").label("joints"),
+        length_at(connection, document, "current").label("rows"),
+        text_at(connection, document, "synthetic").label("synthetic"),
+    )
+    rows = connection.execute(select(*columns).where(recordings.c.id.in_(ids[:limit])))
+    by_id = {row.id: _entry(row) for row in rows}
+    found = tuple(by_id[name] for name in ids[:limit])
+    more = len(ids) > limit
+    return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
+
+
+def _from_cursor(text: str) -> tuple[datetime, str]:
+    match = _CURSOR.fullmatch(text)
+    created_at = None if match is None else time_of(match[1])
+    if match is None or created_at is None:
+        raise InvalidRequest(
+            "not a cursor of the list of recordings; pass the `next` of the page before",
+            field="after",
+        )
+    return created_at, match[2]
+
+
+def _entry(row: Row[Any]) -> RecordingEntry:
+    return RecordingEntry(
+        row.id,
+        row.created_at,
+        row.size,
+        row.scenario or None,
+        row.controller or None,
+        row.joints,
+        row.rows,
+        # A truth of JSON as text is spelt by its database.
+        row.synthetic in ("true", "1"),
+    )
 
 
 def _walk(name: str, document: Any) -> RecordedWalk:

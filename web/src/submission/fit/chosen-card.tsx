@@ -1,13 +1,12 @@
-/** The recordings that a robot is fitted to: those that were read here, and others by their ids. */
+/** The recordings that a robot is fitted to: those that were read here, and others that are kept. */
 
-import { useState } from 'preact/hooks'
 import type { Resource } from '../../api/resource'
 import type { RecordingView } from '../../api/types'
 import { ChosenList } from '../../components/chosen-list'
+import { Combobox } from '../../components/combobox'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { formatNumber } from '../../format/number'
-import { words } from './fit'
-import { TextField } from './text-field'
+import { foundRecordings, shortId } from './found-recordings'
 
 export function ChosenCard({
   ids,
@@ -18,21 +17,11 @@ export function ChosenCard({
   recordings: Resource<readonly RecordingView[]>
   onChange: (ids: readonly string[]) => void
 }) {
-  const [typed, setTyped] = useState('')
   return (
-    <form
-      class="card stack"
-      noValidate
-      aria-labelledby="part-recordings"
-      onSubmit={(event) => {
-        event.preventDefault()
-        onChange([...ids, ...words(typed)])
-        setTyped('')
-      }}
-    >
+    <section class="card stack" aria-labelledby="part-recordings">
       <h2 id="part-recordings">Recordings to fit to</h2>
       {ids.length === 0 && (
-        <p class="muted">None yet: read a measured walk above, or add one by its id.</p>
+        <p class="muted">None yet: read a measured walk above, or choose one that is kept.</p>
       )}
       {recordings.loading && <Loading what="the recordings" />}
       {recordings.error && (
@@ -42,21 +31,19 @@ export function ChosenCard({
           retry={recordings.reload}
         />
       )}
-      <ChosenList ids={ids} short={(id) => id.slice(0, 12)} onChange={onChange}>
+      <ChosenList ids={ids} short={shortId} onChange={onChange}>
         {(id) => inWords(recordings.data?.find((recording) => recording.id === id))}
       </ChosenList>
-      <div class="row">
-        <TextField
-          label="Others"
-          value={typed}
-          hint="ids that gaitswarm record printed, separated by commas"
-          onChange={setTyped}
+      <div class="fields">
+        <Combobox
+          label="Recordings that are kept"
+          shown=""
+          placeholder="scenario, controller or id"
+          found={{ label: 'Recordings, the newest first', search: foundRecordings(ids) }}
+          onChoose={(id) => onChange([...ids, id])}
         />
-        <button type="submit" class="compact" disabled={words(typed).length === 0}>
-          Add
-        </button>
       </div>
-    </form>
+    </section>
   )
 }
 

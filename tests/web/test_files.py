@@ -35,6 +35,8 @@ def test_a_chart_gives_its_numbers_in_full_and_its_picture(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}")
+    # All six iterations, also where they are there before the chart is.
+    expect(page.locator(".uplot").first).to_have_attribute("data-range", "0 5")
     numbers = save(page, "Convergence", "Numbers (CSV)", tmp_path)
     assert numbers.name == "small-convergence.csv"
     with numbers.open(newline="") as file:

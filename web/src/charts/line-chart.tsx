@@ -160,10 +160,10 @@ function renew(plot: uPlot, data: uPlot.AlignedData) {
   })
 }
 
-/** The stretch of x that is shown; null where it is all. */
+/** The stretch of x that is shown; null where it is all, and before anything is. */
 function zoomOf({ scales, data: [x] }: uPlot): readonly [number, number] | null {
   const { min, max } = scales.x
-  if (x.length === 0 || min === undefined || max === undefined) return null
+  if (x.length === 0 || typeof min !== 'number' || typeof max !== 'number') return null
   return min > x[0] || max < x[x.length - 1] ? [min, max] : null
 }
 

@@ -25,65 +25,65 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
   const tone = STATE_TONES[job.state]
   return (
     <section class="card job-header" aria-label="The job">
-      <div class="page-header">
-        <div>
-          <div class="row">
-            <h1>{job.name || job.id}</h1>
-            <span role="status">
-              <StateBadge state={job.state} />
-            </span>
-            <StreamNote live={live} />
-            <EndNotice job={job} />
+      <div class="job-summary">
+        <div class="page-header">
+          <div>
+            <div class="row">
+              <h1>{job.name || job.id}</h1>
+              <span role="status">
+                <StateBadge state={job.state} />
+              </span>
+              <StreamNote live={live} />
+              <EndNotice job={job} />
+            </div>
+            <p class="muted small">{subtitle(job)}</p>
+            {((job.tags ?? []).length > 0 || job.note || job.archived) && (
+              <p class="small" data-labels>
+                {[...(job.archived ? ['archived'] : []), ...(job.tags ?? [])].join(' · ')}
+                {job.note && <span class="job-note">{job.note}</span>}
+              </p>
+            )}
+            {job.kind === 'tournament' && (
+              <p class="small">
+                <a href={tournamentPath(job.id)}>Its tournament: all methods compared</a>
+              </p>
+            )}
+            {isReadable(job) && <WorldsNote job={job} />}
+            <LineageNote job={job} />
           </div>
-          <p class="muted small">{subtitle(job)}</p>
-          {((job.tags ?? []).length > 0 || job.note || job.archived) && (
-            <p class="small" data-labels>
-              {[...(job.archived ? ['archived'] : []), ...(job.tags ?? [])].join(' · ')}
-              {job.note && <span class="job-note">{job.note}</span>}
-            </p>
-          )}
-          {job.kind === 'tournament' && (
-            <p class="small">
-              <a href={tournamentPath(job.id)}>Its tournament: all methods compared</a>
-            </p>
-          )}
-          {isReadable(job) && <WorldsNote job={job} />}
-          <LineageNote job={job} />
+          <JobActions job={job} onJob={live.replace} />
         </div>
-        <JobActions job={job} onJob={live.replace} />
-      </div>
-      {job.waiting && (
-        <div class="notice" data-tone="warn" role="status" data-waiting>
-          <strong>It waits, and goes on by itself.</strong>
-          <p>{job.waiting}</p>
-        </div>
-      )}
-      {job.error && (
-        <div class="notice" data-tone="bad" role="alert" data-error>
-          <strong>{isReadable(job) ? 'It failed.' : 'It cannot be read.'}</strong>
-          <p>{job.error}</p>
-          {isReadable(job) && (
-            <p class="small">
-              What was committed before is kept. Resume tries the iteration again; clone lets you
-              change the job.
-            </p>
-          )}
-        </div>
-      )}
-      <Progress
-        done={spent.done}
-        planned={spent.planned}
-        label={`${spent.done} of ${spent.planned} ${spent.unit}`}
-        tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
-      />
-      <div class="headline">
+        {job.waiting && (
+          <div class="notice" data-tone="warn" role="status" data-waiting>
+            <strong>It waits, and goes on by itself.</strong>
+            <p>{job.waiting}</p>
+          </div>
+        )}
+        {job.error && (
+          <div class="notice" data-tone="bad" role="alert" data-error>
+            <strong>{isReadable(job) ? 'It failed.' : 'It cannot be read.'}</strong>
+            <p>{job.error}</p>
+            {isReadable(job) && (
+              <p class="small">
+                What was committed before is kept. Resume tries the iteration again; clone lets you
+                change the job.
+              </p>
+            )}
+          </div>
+        )}
+        <Progress
+          done={spent.done}
+          planned={spent.planned}
+          label={`${spent.done} of ${spent.planned} ${spent.unit}`}
+          tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
+        />
         <Figures
           job={job}
           gain={gain}
           committed={Math.max(job.iterations, followed.iterations.length)}
         />
-        {isReadable(job) && job.kind === 'tuning' && job.best && <WalkPreview job={job} />}
       </div>
+      {isReadable(job) && job.kind === 'tuning' && job.best && <WalkPreview job={job} />}
     </section>
   )
 }

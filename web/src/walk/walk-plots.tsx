@@ -48,7 +48,7 @@ export function WalkPlots({
           </select>
         </div>
       </div>
-      <div class="grid">
+      <div class="grid plots">
         <ObjectivesTable walks={all} />
         <GaitChart walks={walks} playback={playback} />
         {specs.map((spec) => (

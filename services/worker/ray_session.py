@@ -42,6 +42,9 @@ _BEFORE_IMPORT: Final = {
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
 }
 
+_UNUSED: Final = ("start_api_server", "start_monitor", "start_log_monitor")
+"""What starts processes of a head that an embedded cluster does without."""
+
 WORKER_ENVIRONMENT: Final = {
     # The slots are the parallelism.
     "OMP_NUM_THREADS": "1",
@@ -221,7 +224,7 @@ def _embed(ray: ModuleType, cpus: int) -> RaySession:
     }
     try:
         # Workers inherit the environment that the cluster was started in.
-        with _environment(WORKER_ENVIRONMENT | _import_path() | _token()):
+        with _environment(WORKER_ENVIRONMENT | _import_path() | _token()), _bare(ray):
             ray.init(**options)
     except Exception as error:
         with suppress(Exception):
@@ -312,6 +315,24 @@ def _environment(values: Mapping[str, str]) -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+@contextmanager
+def _bare(ray: ModuleType) -> Iterator[None]:
+    """Start no processes that walks have no use for: of the dashboard, of autoscaling, of logs.
+
+    They take as long to start as the workers. Of `ray.init` no option leaves them out. A Ray that
+    has them by other names starts them.
+    """
+    node = ray._private.node.Node  # noqa: SLF001 - there is no other way
+    unused = {name: vars(node)[name] for name in _UNUSED if name in vars(node)}
+    for name in unused:
+        setattr(node, name, lambda *_, **__: None)
+    try:
+        yield
+    finally:
+        for name, start in unused.items():
+            setattr(node, name, start)
 
 
 @contextmanager

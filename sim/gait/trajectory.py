@@ -284,6 +284,12 @@ def require_reachable(robot: Robot, scenario: Scenario) -> None:
             most.
         BeyondJointLimit: A joint would leave its limits; names the one that does by most.
     """
+    _check_reach(robot, scenario)
+
+
+@lru_cache(maxsize=_KEPT)
+def _check_reach(robot: Robot, scenario: Scenario) -> None:
+    """`require_reachable`, which every job asks for of the scenarios that most jobs have."""
     gait = _Gait.of(scenario)
     gait = replace(gait, ticks=min(gait.ticks, _CHECKED_TICKS))
     time, feet = gait.time(), _feet(robot, scenario)

@@ -32,8 +32,8 @@ def test_it_finds_hidden_parameters_and_the_hidden_law_of_friction(store: SqlSto
     wanted = spec(
         targets=true_targets(),
         variables=["battery_voltage", "body_mass", "contact_law"],
-        optimizer={"name": "pso", "particles": 40, "inertia_start": 0.9, "inertia_end": 0.4},
-        iterations=16,
+        optimizer={"name": "pso", "particles": 16, "inertia_start": 0.7, "inertia_end": 0.3},
+        iterations=12,
     )
     best = store.best(finished(store, wanted))
     assert best is not None

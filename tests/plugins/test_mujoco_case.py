@@ -6,12 +6,15 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.examples.processes import COMMAND_LINE
+from tests.examples.commands import Result, run_command
+from tests.examples.forked import run_forked
 from tests.plugins.conftest import EXAMPLE
 
 pytestmark = pytest.mark.slow
@@ -28,21 +31,21 @@ SPEC = {
 }
 
 
-def command(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """A command in a process of its own."""
-    return subprocess.run(
-        [sys.executable, *COMMAND_LINE, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def said(done: Result) -> Any:
+    """What a command printed as JSON."""
+    assert done.code == 0, done.err
+    return json.loads(done.out)
 
 
 def gaitswarm(*arguments: object) -> Any:
-    """What a command prints as JSON."""
-    done = command(*arguments, "--json")
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    """What a command of this process prints as JSON."""
+    return said(run_command(*arguments, "--json"))
+
+
+def process(*arguments: str | Path) -> Result:
+    """A command in a process of its own, which imports the package as it is now."""
+    done = run_forked(*arguments)
+    return Result(done.returncode, done.stdout, done.stderr)
 
 
 def run(db: Path, *options: object) -> Any:
@@ -64,7 +67,7 @@ def test_it_keeps_to_the_contract_of_cases(mujoco_case: Path) -> None:
 def test_it_is_listed_with_its_distribution_and_the_schema_of_its_settings(
     mujoco_case: Path,
 ) -> None:
-    (listed,) = gaitswarm("plugins")
+    (listed,) = said(process("plugins", "--json"))
     assert listed == {
         "kind": "case",
         "name": "mujoco-walk",
@@ -73,7 +76,7 @@ def test_it_is_listed_with_its_distribution_and_the_schema_of_its_settings(
         "state": "ok",
         "reason": None,
     }
-    (case,) = gaitswarm("cases")
+    (case,) = said(process("cases", "--json"))
     assert case["settings_schema"]["properties"]["rate"]["default"] == 5000
 
 
@@ -92,35 +95,38 @@ def test_a_job_of_it_is_resumed_to_the_same_bits(mujoco_case: Path, tmp_path: Pa
     resumed = run(tmp_path / "half.db", "--resume", job_id)
     assert resumed["best"] == whole["best"]
 
-    refused = command("preferences", job_id, "--db", tmp_path / "half.db", "--samples", 5)
-    assert refused.returncode == 2
-    assert "samples: the job's designs were put to mujoco-walk" in refused.stderr
+    refused = run_command("preferences", job_id, "--db", tmp_path / "half.db", "--samples", 5)
+    assert refused.code == 2
+    assert "samples: the job's designs were put to mujoco-walk" in refused.err
 
 
-def test_with_other_code_of_the_plug_in_a_job_does_not_go_on(
+def test_with_other_code_of_the_plug_in_or_without_it_a_job_does_not_go_on(
     mujoco_case: Path, tmp_path: Path
-) -> None:
-    db, spec = tmp_path / "jobs.db", tmp_path / "spec.json"
-    spec.write_text(json.dumps(SPEC))
-    job_id = run(db, "--spec", spec, "--iterations", 1)["id"]
-    gaitswarm("extend", job_id, "--db", db, "--iterations", 2)
-    package = mujoco_case / "gaitswarm_mujoco_case"
-    package.unlink()
-    shutil.copytree(EXAMPLE / "gaitswarm_mujoco_case", package)
-    with (package / "case.py").open("a") as file:
-        file.write("# edited\n")
-    refused = command("optimize", "--db", db, "--resume", job_id)
-    assert refused.returncode == 4, refused.stderr
-    assert "gaitswarm-mujoco-case 0.1.0 (code " in refused.stderr
-
-
-def test_without_the_package_its_jobs_are_listed_and_say_what_is_missing(
-    mujoco_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     db, spec = tmp_path / "jobs.db", tmp_path / "spec.json"
     spec.write_text(json.dumps(SPEC | {"name": "in MuJoCo"}))
     job_id = run(db, "--spec", spec, "--iterations", 1)["id"]
-    monkeypatch.delenv("PYTHONPATH")
-    (listed,) = gaitswarm("list", "--db", db)
-    assert (listed["id"], listed["name"], listed["state"]) == (job_id, "in MuJoCo", "succeeded")
-    assert "unknown case 'mujoco-walk'" in gaitswarm("status", job_id, "--db", db)["error"]
+    package = mujoco_case / "gaitswarm_mujoco_case"
+    with without(mujoco_case):
+        (listed,) = said(process("list", "--db", db, "--json"))
+        assert (listed["id"], listed["name"]) == (job_id, "in MuJoCo")
+        assert listed["state"] == "succeeded"
+        error = said(process("status", job_id, "--db", db, "--json"))["error"]
+        assert "unknown case 'mujoco-walk'" in error
+
+    gaitswarm("extend", job_id, "--db", db, "--iterations", 2)
+    package.unlink()
+    shutil.copytree(EXAMPLE / "gaitswarm_mujoco_case", package)
+    with (package / "case.py").open("a") as file:
+        file.write("# edited\n")
+    refused = process("optimize", "--db", db, "--resume", job_id)
+    assert refused.code == 4, refused.err
+    assert "gaitswarm-mujoco-case 0.1.0 (code " in refused.err
+
+
+@contextmanager
+def without(site: Path) -> Iterator[None]:
+    """Processes that are started meanwhile have no package of a folder."""
+    sys.path.remove(str(site))
+    yield
+    sys.path.insert(0, str(site))

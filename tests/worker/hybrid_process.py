@@ -1,4 +1,4 @@
-"""Lets Ray take over from threads, in a process of its own, and loses or closes it."""
+"""Lets Ray take over from threads, in a process of its own, loses it and closes it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock, patch
@@ -27,46 +26,36 @@ def walked(here: Mock) -> int:
 
 
 def take_over() -> str:
+    """Ray takes over, is lost, and takes over again; then the evaluator is closed."""
     evaluator = HybridEvaluator(2, long_job_seconds=0.0)
     walks = len(WANTED.designs) * len(WANTED.cases)
     expected = bits(walked_at_once(WANTED))
-    with patch.object(Task, "run", autospec=True, side_effect=Task.run) as here:
-        requests = 0
-        while not evaluator.on_ray:
-            here.reset_mock()
+
+    def walked_here() -> int:
+        """Of a request, all of whose walks come to what they should."""
+        with patch.object(Task, "run", autospec=True, side_effect=Task.run) as here:
             assert bits(evaluator.evaluate(WANTED, never)) == expected
-            requests += 1
-            # Ray starts sooner on processors that rest now and then.
-            time.sleep(0.2)
-            # All of a request's walks; or none, if Ray took over a moment ago.
-            assert walked(here) == walks or evaluator.on_ray
-        assert requests > 1
-        here.reset_mock()
-        assert bits(evaluator.evaluate(WANTED, never)) == expected
-        assert walked(here) == 0
-    return f"took over\n{left_by(evaluator)}"
+        return walked(here)
 
-
-def lose() -> str:
-    evaluator = HybridEvaluator(1, long_job_seconds=0.0)
-    expected = bits(evaluator.evaluate(WANTED, never))
+    # The first request says how long the job is; while Ray is started, walks go on here.
+    assert [walked_here(), walked_here()] == [walks, walks]
     eventually(lambda: evaluator.on_ray)
-    assert bits(evaluator.evaluate(WANTED, never)) == expected
+    assert walked_here() == 0
+    # All that is said from here on is said of the loss.
+    sys.stderr.write("loses Ray\n")
     for process in descendants(os.getpid()):
         if "gcs_server" in process.title:
             os.kill(process.pid, signal.SIGKILL)
 
     def lost() -> bool:
         assert bits(evaluator.evaluate(WANTED, never)) == expected
-        time.sleep(0.1)
         return not evaluator.on_ray
 
     with patch("services.worker.cluster.pump.PULSE_SECONDS", 0.3):
         eventually(lost)
     eventually(lambda: evaluator.on_ray)
-    assert bits(evaluator.evaluate(WANTED, never)) == expected
-    evaluator.close()
-    return "here, then on Ray again"
+    assert walked_here() == 0
+    return f"took over\n{left_by(evaluator)}"
 
 
 def close(state: str) -> str:
@@ -88,12 +77,7 @@ def left_by(evaluator: HybridEvaluator) -> str:
 
 
 def main(what: str, *arguments: str) -> None:
-    if what == "take-over":
-        told = take_over()
-    elif what == "lose":
-        told = lose()
-    else:
-        told = close(*arguments)
+    told = take_over() if what == "take-over" else close(*arguments)
     sys.stdout.write(f"{told}\n")
 
 

@@ -74,9 +74,9 @@ def line_with(stream: IO[str] | None, pattern: str) -> re.Match[str]:
 
 
 def within(seconds: float, condition: Callable[[], bool]) -> bool:
-    """Whether something comes true in time; asked again and again, an eighth of the time at most.
+    """Whether something comes true in time; asked again and again, some ten times a second.
 
-    A condition that is looked at without a pause, as a request to a server, would keep a processor
+    A condition that takes long, as a request to a server, would otherwise keep a processor
     from what is waited for.
     """
     begun = asked = time.monotonic()
@@ -84,7 +84,7 @@ def within(seconds: float, condition: Callable[[], bool]) -> bool:
         answered = time.monotonic()
         if answered > begun + seconds:
             return False
-        time.sleep(min(max(0.01, 7.0 * (answered - asked)), 0.5))
+        time.sleep(min(max(0.01, 7.0 * (answered - asked)), 0.1))
         asked = time.monotonic()
     return True
 

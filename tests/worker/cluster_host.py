@@ -23,7 +23,11 @@ from tests.examples.paths import ROOT
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_STORE_BYTES = 80 * 1024 * 1024
+_SMALL: dict[str, Any] = {
+    "object_store_memory": 80 * 1024 * 1024,
+    # A process of every node that walks have no use for.
+    "include_log_monitor": False,
+}
 
 _cluster: Any = None
 _nodes: dict[str, Any] = {}
@@ -89,9 +93,7 @@ def start(port: int | None = None, cpus: int = 0) -> str:
 
     _cluster = ray.cluster_utils.Cluster()
     chosen = {} if port is None else {"gcs_server_port": port}
-    _cluster.add_node(
-        num_cpus=cpus, include_dashboard=False, object_store_memory=_STORE_BYTES, **chosen
-    )
+    _cluster.add_node(num_cpus=cpus, include_dashboard=False, no_monitor=True, **_SMALL, **chosen)
     return str(_cluster.address)
 
 
@@ -100,7 +102,7 @@ def add(cpus: int = 1, environment: Mapping[str, str] | None = None) -> str:
     before = dict(os.environ)
     os.environ.update(environment or {})
     try:
-        node = _cluster.add_node(num_cpus=cpus, object_store_memory=_STORE_BYTES)
+        node = _cluster.add_node(num_cpus=cpus, **_SMALL)
     finally:
         os.environ.clear()
         os.environ.update(before)

@@ -1,4 +1,4 @@
-"""Opens Ray, has robots walk, and then closes it, waits to be killed, or kills its cluster."""
+"""Opens Ray, has robots walk, perhaps kills its cluster, and waits to be killed or to close it."""
 
 from __future__ import annotations
 
@@ -19,23 +19,26 @@ from tests.worker.requests import bits, never, request
 heard = threading.Event()
 
 
+def say(line: str) -> None:
+    """At once, as whoever reads it may then end this process."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
 def main(ending: str) -> None:
     signal.signal(signal.SIGTERM, lambda *_: heard.set())
     evaluator = RayEvaluator(cpus=1)
     walked = bits(evaluator.evaluate(request(2), never))
-    sys.stdout.write("walked\n")
-    sys.stdout.flush()
-    if ending == "wait":
-        time.sleep(600.0)
+    say("walked")
     if ending == "lose":
         for process in descendants(os.getpid()):
             if "gcs_server" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
         with patch("services.worker.cluster.pump.PULSE_SECONDS", 0.3):
-            sys.stdout.write(f"{until_lost(evaluator)}\n")
-        sys.stdout.write(f"{told_to_stop_while_reopening(evaluator)}\n")
+            say(until_lost(evaluator))
+        say(told_to_stop_while_reopening(evaluator))
         assert bits(evaluator.evaluate(request(2), never)) == walked
-        sys.stdout.write(f"{terminated()}\n")
+        say(terminated())
     sys.stdin.readline()
     evaluator.close()
 

@@ -31,15 +31,21 @@ def environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     shutil.rmtree(directory, ignore_errors=True)
 
 
+@pytest.fixture
+def host(environment: None) -> Iterator[Process]:
+    """Holds one cluster after the other."""
+    with Process() as process:
+        yield process
+
+
 @contextmanager
-def cluster(port: int) -> Iterator[None]:
+def cluster(host: Process, port: int) -> Iterator[None]:
     """A head with a CPU that listens at a port; at the end it is killed."""
-    with Process() as host:
-        host.run(cluster_host.start, port=port, cpus=1)
-        try:
-            yield
-        finally:
-            host.run(cluster_host.kill)
+    host.run(cluster_host.start, port=port, cpus=1)
+    try:
+        yield
+    finally:
+        host.run(cluster_host.kill)
 
 
 def workers(server: ServerProcess) -> tuple[str, str]:
@@ -51,7 +57,7 @@ def workers(server: ServerProcess) -> tuple[str, str]:
 
 
 def test_a_server_that_is_started_while_its_cluster_is_away_waits_for_it_says_so_and_goes_on(
-    environment: None, database: Path
+    host: Process, database: Path
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as reserved:
         port = reserved.getsockname()[1]
@@ -63,7 +69,7 @@ def test_a_server_that_is_started_while_its_cluster_is_away_waits_for_it_says_so
         )
         first = server.submit(SMALL_SPEC)
         eventually(lambda: "no Ray cluster listens" in (server.job(first)["waiting"] or ""))
-        with cluster(port):
+        with cluster(host, port):
             ended = server.wait_for(first, "succeeded", seconds=240.0)
             assert ended["waiting"] is None
             assert workers(server) == ("ok", "")
@@ -71,7 +77,7 @@ def test_a_server_that_is_started_while_its_cluster_is_away_waits_for_it_says_so
         eventually(lambda: server.job(second)["waiting"] is not None)
         # While it is tried again, it may be there.
         eventually(lambda: workers(server)[0] == "degraded")
-        with cluster(port):
+        with cluster(host, port):
             again = server.wait_for(second, "succeeded", seconds=240.0)
         assert again["head"] is not None and again["best_fitness"] == ended["best_fitness"]
     finally:

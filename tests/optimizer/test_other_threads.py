@@ -20,7 +20,7 @@ from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
 from tests.certificate.examples import columns, small
 
-WORLDS = 10_000
+WORLDS = 20_000
 
 
 @contextmanager
@@ -31,6 +31,16 @@ def without_collection() -> Iterator[None]:
         yield
     finally:
         gc.enable()
+
+
+def computes_in_parts(compute: Callable[[], object]) -> bool:
+    """Whether no call takes a tenth of the time.
+
+    In one of some tries: what else the machine does can only make a call longer.
+    """
+    compute()
+    with without_collection():
+        return any(longest_call(compute) < 0.1 for _ in range(4))
 
 
 def longest_call(compute: Callable[[], object]) -> float:
@@ -45,17 +55,15 @@ def longest_call(compute: Callable[[], object]) -> float:
         elif event in ("c_return", "c_exception") and begun:
             longest = max(longest, time.thread_time() - begun.pop())
 
+    before = time.thread_time()
     compute()
-    with without_collection():
-        before = time.thread_time()
+    total = time.thread_time() - before
+    # Again, for to be told of every call takes longer than most of them.
+    sys.setprofile(note)
+    try:
         compute()
-        total = time.thread_time() - before
-        # Again, for to be told of every call takes longer than most of them.
-        sys.setprofile(note)
-        try:
-            compute()
-        finally:
-            sys.setprofile(None)
+    finally:
+        sys.setprofile(None)
     return longest / total
 
 
@@ -72,10 +80,10 @@ LOGARITHMS = np.random.default_rng(1).random((WORLDS, 8))
     ids=["fitness", "utilities", "judgement"],
 )
 def test_designs_are_judged_in_parts(compute: Callable[[], object]) -> None:
-    assert longest_call(compute) < 0.1
+    assert computes_in_parts(compute)
 
 
 def test_a_certificate_is_summed_up_in_parts() -> None:
     spec = small(worlds=WORLDS)
     walked = columns(spec, np.random.default_rng(1).uniform(5.0, 9.0, (WORLDS + 1, 2)))
-    assert longest_call(lambda: certificate(spec, walked)) < 0.1
+    assert computes_in_parts(lambda: certificate(spec, walked))

@@ -86,8 +86,6 @@ def test_the_start_up_benchmark_tells_how_long_people_wait() -> None:
     assert all(0.0 < waited < 120.0 for waited in seconds.values())
     for cache in ("warm", "cold"):
         assert seconds[f"optimize, {cache}: first walk"] < seconds[f"optimize, {cache}: result"]
-    # With an empty cache there is a kernel to compile first.
-    assert seconds["optimize, warm: first walk"] < seconds["optimize, cold: first walk"]
 
 
 @pytest.mark.slow

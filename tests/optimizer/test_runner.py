@@ -352,7 +352,7 @@ def test_a_process_that_is_to_end_does_not_wait_for_a_store_that_is_away(store: 
     threading.Thread(target=set_after, args=(absent.refusal, stop)).start()
     begun = time.monotonic()
     assert run(cast(Store, absent), evaluator, stop, lease_seconds=600.0).progress.iterations == 0
-    assert time.monotonic() - begun < 2.0
+    assert time.monotonic() - begun < 10.0
 
 
 def test_a_process_that_is_to_end_does_not_wait_to_read_a_budget_that_has_changed(

@@ -83,7 +83,7 @@ def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
     begun = time.monotonic()
     with pytest.raises(EvaluationStopped):
         evaluator.evaluate(request(8000, scenarios=(long,)), stop.is_set)
-    assert time.monotonic() - begun < 2.0
+    assert time.monotonic() - begun < 10.0
 
 
 def test_whether_to_stop_is_asked_at_least_once_a_second(

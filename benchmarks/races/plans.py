@@ -64,7 +64,7 @@ PLANS: Final = {
     "chapter-4-long": Plan(
         ("cma-es", "de", "pso-ps", "tlbo", "pso-thesis", "pymoo-pso"), ROBOT, 5, 2500
     ),
-    "chapter-3": Plan(("cma-es", "de", "pso-ps", "pso-thesis", "tlbo"), CHAPTER_3, 5, 625),
+    "chapter-3": Plan(("cma-es", "de", "pso-ps", "pso-thesis", "tlbo"), CHAPTER_3, 20, 625),
     "function": Plan(
         (*ANCHORS, *LOCAL, *OTHERS, "pymoo-pso", "scipy-de", "cma"), FUNCTION, 30, 5000
     ),

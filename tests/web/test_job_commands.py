@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from services.optimizer.store.sql_store import SqlStore
 from tests.examples.jobs import SMALL_SPEC
@@ -19,6 +19,19 @@ pytestmark = pytest.mark.slow
 
 def named(page: Page, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).click()
+
+
+def answer_late(route: Route) -> None:
+    """Let a page that asks for something meanwhile, as one does when the network is back, see that
+    it is gone."""
+    if route.request.method != "DELETE":
+        route.continue_()
+        return
+    answer = route.fetch()
+    page = route.request.frame.page
+    page.evaluate("dispatchEvent(new Event('online'))")
+    page.wait_for_timeout(200)
+    route.fulfill(response=answer)
 
 
 def test_a_job_is_deleted_after_its_page_has_said_what_is_lost_and_what_stays(
@@ -43,6 +56,7 @@ def test_a_job_is_deleted_after_its_page_has_said_what_is_lost_and_what_stays(
     expect(dialog).to_be_hidden()
     assert server.job(job_id)["state"] == "succeeded"
 
+    page.route(f"**/v1/jobs/{job_id}", answer_late)
     named(page, "Delete…")
     named(page, "Delete the job")
     expect(page).to_have_url(re.compile(r"/$"))

@@ -15,7 +15,14 @@ import { PriorityDialog } from './priority-dialog'
 
 type Asking = 'cancel' | 'delete' | 'extend' | 'label' | 'priority' | null
 
-export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: StoredJob) => void }) {
+interface Props {
+  readonly job: StoredJob
+  readonly onJob: (job: StoredJob) => void
+  /** A deletion begins, or did not come about; the page asks nothing of the job meanwhile. */
+  readonly onDeleting: (deleting: boolean) => void
+}
+
+export function JobActions({ job, onJob, onDeleting }: Props) {
   const [asking, setAsking] = useState<Asking>(null)
   const [busy, setBusy] = useState(false)
   const [error, setError] = useState<unknown>(null)
@@ -110,8 +117,15 @@ export function JobActions({ job, onJob }: { job: StoredJob; onJob: (job: Stored
           setBusy(true)
           setError(null)
           setAsking(null)
+          onDeleting(true)
           remove('/v1/jobs/{job_id}', { path })
-            .then(() => navigate('/'), setError)
+            .then(
+              () => navigate('/'),
+              (problem: unknown) => {
+                setError(problem)
+                onDeleting(false)
+              },
+            )
             .finally(() => setBusy(false))
         }}
         onDismiss={() => setAsking(null)}

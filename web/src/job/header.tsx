@@ -51,7 +51,7 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
             {isReadable(job) && <WorldsNote job={job} />}
             <LineageNote job={job} />
           </div>
-          <JobActions job={job} onJob={live.replace} />
+          <JobActions job={job} onJob={live.replace} onDeleting={live.hold} />
         </div>
         {job.waiting && (
           <div class="notice" data-tone="warn" role="status" data-waiting>

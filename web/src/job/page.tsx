@@ -136,7 +136,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
     >
       <Breadcrumbs crumbs={crumbsOf(job, tab)} here={hereOf(job, tab)} />
       <JobHeader live={live} job={job} gain={gain} />
-      {isReadable(job) && <Parts live={live} job={job} tab={tab} gain={gain} />}
+      {isReadable(job) && !live.held && <Parts live={live} job={job} tab={tab} gain={gain} />}
     </div>
   )
 }

@@ -13,6 +13,9 @@ export interface LiveJob {
   /** Show what a command answered, and follow the job if it goes on. */
   readonly replace: (job: StoredJob) => void
   readonly reload: () => void
+  /** Nothing is asked of the job until `hold(false)`: of one that is being deleted, say. */
+  readonly held: boolean
+  readonly hold: (held: boolean) => void
 }
 
 const NOTHING_YET: Followed = {
@@ -38,15 +41,22 @@ export function useJob(id: string): LiveJob {
   const stream = useRef<EventStream | null>(null)
   const asked = useRef(0)
   const missing = useRef(false)
+  // Ends what is asked when nobody wants the answer any more; null while the job is held.
+  const questions = useRef<AbortController | null>(null)
+  const [held, setHeld] = useState(false)
 
   const ask = useCallback(() => {
+    const signal = questions.current?.signal
+    if (!signal) return
     asked.current = Date.now()
-    get('/v1/jobs/{job_id}', { path: { job_id: id } }).then(
+    get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }).then(
       (answer) => {
+        if (signal.aborted) return
         setJob(answer)
         setError(null)
       },
       (problem: unknown) => {
+        if (signal.aborted) return
         setError(problem)
         // There is nothing to follow, and asking again does not help.
         missing.current = problem instanceof ApiProblem && problem.status === 404
@@ -55,14 +65,24 @@ export function useJob(id: string): LiveJob {
     )
   }, [id])
 
+  const stop = useCallback(() => {
+    questions.current?.abort()
+    questions.current = null
+    stream.current?.close()
+    stream.current = null
+  }, [])
+
   useEffect(() => {
+    if (held) return
+    const abort = new AbortController()
+    const { signal } = abort
+    questions.current = abort
     ask()
-    let left = false
     const show = (iterations: readonly Iteration[]) => {
-      if (!left) setFollowed({ ...NOTHING_YET, iterations })
+      if (!signal.aborted) setFollowed({ ...NOTHING_YET, iterations })
     }
-    committedSoFar(id, show).then((known) => {
-      if (left || missing.current) return
+    committedSoFar(id, show, signal).then((known) => {
+      if (signal.aborted || missing.current) return
       stream.current = new EventStream(browserPorts(id), setFollowed, known)
     })
     const back = () => stream.current?.restart()
@@ -72,11 +92,9 @@ export function useJob(id: string): LiveJob {
     return () => {
       removeEventListener('online', back)
       removeEventListener('offline', gone)
-      left = true
-      stream.current?.close()
-      stream.current = null
+      stop()
     }
-  }, [id])
+  }, [id, held])
 
   // A new state is asked about at once, new iterations now and then.
   useEffect(() => {
@@ -93,13 +111,19 @@ export function useJob(id: string): LiveJob {
     setJob(answer)
     stream.current?.restart()
   }, [])
-  return { job, error, followed, replace, reload: ask }
+  const hold = useCallback((wanted: boolean) => {
+    // At once, not after the next drawing: the answer to what is under way may be that it is gone.
+    if (wanted) stop()
+    setHeld(wanted)
+  }, [])
+  return { job, error, followed, replace, reload: ask, held, hold }
 }
 
 /** Thousands of iterations come faster in pages than as events; if not all come, the stream does. */
 async function committedSoFar(
   id: string,
   show: (iterations: readonly Iteration[]) => void,
+  signal: AbortSignal,
 ): Promise<readonly Iteration[]> {
   const known: Iteration[] = []
   try {
@@ -107,6 +131,7 @@ async function committedSoFar(
       const page = await get('/v1/jobs/{job_id}/iterations', {
         path: { job_id: id },
         query: { after: known.at(-1)?.index, limit: known.length === 0 ? FIRST : FURTHER },
+        signal,
       })
       known.push(...page.items)
       show([...known])

@@ -88,6 +88,7 @@ lock: ## Choose versions anew, after a change of the dependencies in pyproject.t
 	$(COMPILE) pyproject.toml --extra postgres --extra search --extra mujoco --extra telemetry --extra cluster --group build -c requirements/run.lock -o requirements/image.lock
 	sed -n 's/^compiler = \["\(.*\)"\]/\1/p' pyproject.toml | $(COMPILE) - -o requirements/compiler.lock
 	$(COMPILE) --group node -o requirements/node.lock
+	$(COMPILE) --group installer -o requirements/installer.lock
 	$(COMPILE) --group robots -o requirements/robots.lock
 
 clean: ## Remove the virtual environment and caches; jobs in the user's database stay.

@@ -47,7 +47,7 @@ def test_locks_pin_all_that_is_asked_for() -> None:
     engines = {_name(r) for r in extras["mujoco"]}
     assert (asked | development | engines) - set(dev) == set()
     assert (asked | engines | {_name(r) for r in extras["cluster"]}) - set(image) == set()
-    for group in ("node", "robots"):
+    for group in ("node", "installer", "robots"):
         wanted = {_name(r) for r in PROJECT["dependency-groups"][group]}
         assert wanted - set(_pins(ROOT / "requirements" / f"{group}.lock")) == set()
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from sqlalchemy import text
 
 from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.tables import metadata
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import Clock
 from tests.store.postgres_server import PostgresServer, postgres_server, server_binaries
@@ -33,10 +34,23 @@ def postgresql_server() -> Iterator[PostgresServer]:
 
 
 @pytest.fixture(scope="session")
-def migrated_postgresql(postgresql_server: PostgresServer) -> str:
+def emptied_postgresql(postgresql_server: PostgresServer) -> Iterator[Callable[[], str]]:
+    """Empties a database of the newest schema, which it gives the URL of.
+
+    Over one connection, and by deleting: connecting and truncating take twenty times as long.
+    """
     url = f"{postgresql_server.url}/postgres"
     open_store(url).close()
-    return url
+    database = connect(parse_url(url))
+
+    def emptied() -> str:
+        with database.transaction(write=True) as connection:
+            for table in reversed(metadata.sorted_tables):
+                connection.execute(table.delete())
+        return url
+
+    yield emptied
+    database.close()
 
 
 @pytest.fixture(params=_DATABASES)
@@ -46,17 +60,8 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
         path = tmp_path / "jobs.db"
         shutil.copy(request.getfixturevalue("migrated_sqlite"), path)
         return f"sqlite:///{path}"
-    url: str = request.getfixturevalue("migrated_postgresql")
-    database = connect(parse_url(url))
-    with database.transaction(write=True) as connection:
-        connection.execute(
-            text(
-                "TRUNCATE jobs, iterations, evaluations, reevaluations, recordings, tokens, audit,"
-                " notifications"
-            )
-        )
-    database.close()
-    return url
+    emptied: Callable[[], str] = request.getfixturevalue("emptied_postgresql")
+    return emptied()
 
 
 @pytest.fixture(params=_DATABASES)

@@ -46,8 +46,11 @@ def vector_header() -> str:
         C text that defines `vec` of as many reals as a register holds, and its operations.
     """
     folder = resources.files("sim.compiler")
-    vectors, fused = ((folder / name).read_text(encoding="utf-8") for name in ("vec.h", "fma.h"))
-    return vectors.replace('#include "fma.h"\n', fused)
+    vectors = (folder / "vec.h").read_text(encoding="utf-8")
+    for name in ("instructions.h", "fma.h"):
+        included = (folder / name).read_text(encoding="utf-8")
+        vectors = vectors.replace(f'#include "{name}"\n', included)
+    return vectors
 
 
 def load_library(

@@ -1,27 +1,13 @@
 /* a b + c, a b - c and c - a b, rounded once: the bits of the instructions that AVX2, AVX-512 and
    NEON have. Processors without one (x86-64-v2) compute them from sums and products, exactly but
    with some fifty operations in place of one. */
-#if defined(__AVX512F__) && DOUBLES == 8
-#define FUSED(op, a, b, c) (dvec)_mm512_##op##_pd((__m512d)(a), (__m512d)(b), (__m512d)(c))
-#define FUSED_FLOATS(op, a, b, c) (vec)_mm512_##op##_ps((__m512)(a), (__m512)(b), (__m512)(c))
-#elif defined(__FMA__) && DOUBLES == 4
-#define FUSED(op, a, b, c) (dvec)_mm256_##op##_pd((__m256d)(a), (__m256d)(b), (__m256d)(c))
-#define FUSED_FLOATS(op, a, b, c) (vec)_mm256_##op##_ps((__m256)(a), (__m256)(b), (__m256)(c))
-#endif
-
 /* Not in line: a step has thousands of them, and would take minutes to compile. */
 #define CALLED static __attribute__((noinline, unused))
 
-#ifdef FUSED
-OPERATION dvec dvec_fma(dvec a, dvec b, dvec c) { return FUSED(fmadd, a, b, c); }
-OPERATION dvec dvec_fms(dvec a, dvec b, dvec c) { return FUSED(fmsub, a, b, c); }
-OPERATION dvec dvec_fnma(dvec a, dvec b, dvec c) { return FUSED(fnmadd, a, b, c); }
-#else
-#if defined(__aarch64__) && DOUBLES == 2
-OPERATION dvec dvec_fma(dvec a, dvec b, dvec c)
-{
-  return (dvec)vfmaq_f64((float64x2_t)c, (float64x2_t)a, (float64x2_t)b);
-}
+#ifdef FMA_PD
+OPERATION dvec dvec_fma(dvec a, dvec b, dvec c) { return FMA_PD(a, b, c); }
+OPERATION dvec dvec_fms(dvec a, dvec b, dvec c) { return FMS_PD(a, b, c); }
+OPERATION dvec dvec_fnma(dvec a, dvec b, dvec c) { return FNMA_PD(a, b, c); }
 #else
 /* The upper half of a, of 26 bits as the lower one (Veltkamp). */
 OPERATION dvec upper_half(dvec a)
@@ -69,7 +55,6 @@ CALLED dvec dvec_fma(dvec a, dvec b, dvec c)
     if (!fit[k]) r[k] = __builtin_fma(a[k], b[k], c[k]);
   return r;
 }
-#endif
 OPERATION dvec dvec_fms(dvec a, dvec b, dvec c) { return dvec_fma(a, b, -c); }
 OPERATION dvec dvec_fnma(dvec a, dvec b, dvec c) { return dvec_fma(-a, b, c); }
 #endif
@@ -78,16 +63,10 @@ OPERATION dvec dvec_fnma(dvec a, dvec b, dvec c) { return dvec_fma(-a, b, c); }
 OPERATION vec vec_fma(vec a, vec b, vec c) { return dvec_fma(a, b, c); }
 OPERATION vec vec_fms(vec a, vec b, vec c) { return dvec_fms(a, b, c); }
 OPERATION vec vec_fnma(vec a, vec b, vec c) { return dvec_fnma(a, b, c); }
-#elif defined(FUSED_FLOATS)
-OPERATION vec vec_fma(vec a, vec b, vec c) { return FUSED_FLOATS(fmadd, a, b, c); }
-OPERATION vec vec_fms(vec a, vec b, vec c) { return FUSED_FLOATS(fmsub, a, b, c); }
-OPERATION vec vec_fnma(vec a, vec b, vec c) { return FUSED_FLOATS(fnmadd, a, b, c); }
-#else
-#if defined(__aarch64__) && DOUBLES == 2
-OPERATION vec vec_fma(vec a, vec b, vec c)
-{
-  return (vec)vfmaq_f32((float32x4_t)c, (float32x4_t)a, (float32x4_t)b);
-}
+#elif defined(FMA_PS)
+OPERATION vec vec_fma(vec a, vec b, vec c) { return FMA_PS(a, b, c); }
+OPERATION vec vec_fms(vec a, vec b, vec c) { return FMS_PS(a, b, c); }
+OPERATION vec vec_fnma(vec a, vec b, vec c) { return FNMA_PS(a, b, c); }
 #else
 /* A product of floats is exact in doubles, and a sum that is rounded to odd there can be rounded
    again without harm: doubles have more than twice the bits. */
@@ -106,7 +85,6 @@ CALLED vec vec_fma(vec a, vec b, vec c)
   }
   return r;
 }
-#endif
 OPERATION vec vec_fms(vec a, vec b, vec c) { return vec_fma(a, b, -c); }
 OPERATION vec vec_fnma(vec a, vec b, vec c) { return vec_fma(-a, b, c); }
 #endif

@@ -4,12 +4,6 @@
    machine or neighbours. No libm: its last bits differ between systems. */
 #include <stdint.h>
 #include <string.h>
-#ifdef __AVX__
-#include <immintrin.h>
-#endif
-#ifdef __aarch64__
-#include <arm_neon.h>
-#endif
 
 #ifdef SINGLE
 #define LANES (2 * DOUBLES)
@@ -53,13 +47,12 @@ OPERATION dvec dvec_select(divec mask, dvec a, dvec b)
   return (dvec)((mask & (divec)a) | (~mask & (divec)b));
 }
 
+#include "instructions.h"
+
 /* Of a NaN and a number, the second operand: what the instruction does, spelt out elsewhere. */
-#if defined(__AVX512F__) && DOUBLES == 8
-OPERATION dvec dvec_max(dvec a, dvec b) { return (dvec)_mm512_max_pd((__m512d)a, (__m512d)b); }
-OPERATION dvec dvec_min(dvec a, dvec b) { return (dvec)_mm512_min_pd((__m512d)a, (__m512d)b); }
-#elif defined(__AVX__) && DOUBLES == 4
-OPERATION dvec dvec_max(dvec a, dvec b) { return (dvec)_mm256_max_pd((__m256d)a, (__m256d)b); }
-OPERATION dvec dvec_min(dvec a, dvec b) { return (dvec)_mm256_min_pd((__m256d)a, (__m256d)b); }
+#ifdef MAX_PD
+OPERATION dvec dvec_max(dvec a, dvec b) { return MAX_PD(a, b); }
+OPERATION dvec dvec_min(dvec a, dvec b) { return MIN_PD(a, b); }
 #else
 OPERATION dvec dvec_max(dvec a, dvec b) { return dvec_select(a > b, a, b); }
 OPERATION dvec dvec_min(dvec a, dvec b) { return dvec_select(a < b, a, b); }
@@ -68,12 +61,9 @@ OPERATION dvec dvec_min(dvec a, dvec b) { return dvec_select(a < b, a, b); }
 #ifndef SINGLE
 OPERATION vec vec_max(vec a, vec b) { return dvec_max(a, b); }
 OPERATION vec vec_min(vec a, vec b) { return dvec_min(a, b); }
-#elif defined(__AVX512F__) && LANES == 16
-OPERATION vec vec_max(vec a, vec b) { return (vec)_mm512_max_ps((__m512)a, (__m512)b); }
-OPERATION vec vec_min(vec a, vec b) { return (vec)_mm512_min_ps((__m512)a, (__m512)b); }
-#elif defined(__AVX__) && LANES == 8
-OPERATION vec vec_max(vec a, vec b) { return (vec)_mm256_max_ps((__m256)a, (__m256)b); }
-OPERATION vec vec_min(vec a, vec b) { return (vec)_mm256_min_ps((__m256)a, (__m256)b); }
+#elif defined(MAX_PS)
+OPERATION vec vec_max(vec a, vec b) { return MAX_PS(a, b); }
+OPERATION vec vec_min(vec a, vec b) { return MIN_PS(a, b); }
 #else
 OPERATION vec vec_max(vec a, vec b) { return vec_select(a > b, a, b); }
 OPERATION vec vec_min(vec a, vec b) { return vec_select(a < b, a, b); }
@@ -88,14 +78,10 @@ OPERATION vec vec_abs(vec a) { return (vec)((ivec)a & ISPLAT(~SIGN_BIT)); }
 
 OPERATION vec vec_sqrt(vec a)
 {
-#if defined(__AVX512F__) && DOUBLES == 8 && defined(SINGLE)
-  return (vec)_mm512_sqrt_ps((__m512)a);
-#elif defined(__AVX512F__) && DOUBLES == 8
-  return (vec)_mm512_sqrt_pd((__m512d)a);
-#elif defined(__AVX__) && DOUBLES == 4 && defined(SINGLE)
-  return (vec)_mm256_sqrt_ps((__m256)a);
-#elif defined(__AVX__) && DOUBLES == 4
-  return (vec)_mm256_sqrt_pd((__m256d)a);
+#if defined(SQRT_PS) && defined(SINGLE)
+  return SQRT_PS(a);
+#elif defined(SQRT_PD) && !defined(SINGLE)
+  return SQRT_PD(a);
 #else
   vec r = a;
   for (int k = 0; k < LANES; k++) r[k] = (real)__builtin_sqrt(a[k]);
@@ -138,10 +124,8 @@ OPERATION dvec vec_widened(const vec *x, int h)
 {
   hvec half;
   memcpy(&half, (const char *)x + (size_t)h * sizeof half, sizeof half);
-#if defined(SINGLE) && defined(__AVX512F__) && DOUBLES == 8
-  return (dvec)_mm512_cvtps_pd((__m256)half);
-#elif defined(SINGLE) && defined(__AVX__) && DOUBLES == 4
-  return (dvec)_mm256_cvtps_pd((__m128)half);
+#if defined(SINGLE) && defined(WIDENED_PS)
+  return WIDENED_PS(half);
 #else
   return __builtin_convertvector(half, dvec);
 #endif

@@ -47,6 +47,7 @@ TAGS: Final[list[dict[str, str]]] = [
     },
     {"name": "recordings", "description": "Measured walks, to which a robot is fitted."},
     {"name": "simulations", "description": "One design walking on request, outside any job."},
+    {"name": "robots", "description": "Robots of one's own, made of a URDF and looked at."},
     {"name": "catalogue", "description": "What there is to choose from."},
     {"name": "session", "description": "Who is asking, for browsers."},
     {"name": "health", "description": "For load balancers and container engines."},

@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from gaitswarm.robots import standing_scenario
+from gaitswarm.robot_checks import standing_scenario
 from sim.assembly import PHYSICS_RATE
 from sim.kernel.batch import walk_together
 from sim.outcome import Status

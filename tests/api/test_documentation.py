@@ -86,6 +86,8 @@ def test_the_routes_are_these(document: Document) -> None:
         "post /v1/firmware",
         "post /v1/firmware/summary",
         "get /v1/robots",
+        "post /v1/robots/drafts",
+        "post /v1/robots/checks",
         "get /v1/scenarios",
         "get /v1/preferences",
         "get /v1/optimizers",

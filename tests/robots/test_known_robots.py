@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from cli.main import run
-from gaitswarm.robots import init_robot, standing_drive, standing_scenario
+from gaitswarm.robot_checks import standing_drive, standing_scenario
+from gaitswarm.robots import init_robot
 from sim.errors import RobotFileError
 from sim.gait.trajectory import require_reachable
 from sim.kernel.dynamics.physics_step import PhysicsModel, physics_model

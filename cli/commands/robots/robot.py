@@ -112,7 +112,7 @@ def check(
 ) -> None:
     """Load a robot, let it stand for a second, and say what there is to it."""
     from cli.output import note, print_json, print_text
-    from gaitswarm.robots import check_robot
+    from gaitswarm.robot_checks import check_robot
 
     view = check_robot(_files(folder), folder=folder, packages=package_path or [])
     if draw is not None:

@@ -1,0 +1,58 @@
+"""A robot of one's own on request, from its URDF. Knows nothing of HTTP."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from gaitswarm.errors import simulation_errors
+from gaitswarm.robots import check_name
+from gaitswarm.views.robot_draft import RobotDraftView
+from sim.proposal.apart import propose_apart
+from sim.proposal.drive import ActuatorChoice
+from sim.robot.bounds import LONGEST_NAME, LONGEST_URDF, MOST_ELEMENTS, MOST_LINKS
+
+
+class RobotDraftRequest(BaseModel):
+    """A URDF, of which a robot is to be made."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field(
+        default="robot",
+        min_length=1,
+        max_length=LONGEST_NAME,
+        description="Of the robot: begins with a letter or digit, and has no / and no \\.",
+        examples=["a1"],
+    )
+    urdf: str = Field(
+        max_length=LONGEST_URDF,
+        description=f"Text of its URDF: {MOST_LINKS} links and as many joints at most,"
+        f" {MOST_ELEMENTS} elements at most, no document type.",
+    )
+    actuator: ActuatorChoice = Field(
+        default="auto",
+        description="Kind of its actuators: DC motors with gearheads, or torque-controlled ones;"
+        " `auto` decides by the torques and rates of the URDF.",
+    )
+
+
+def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
+    """Find legs, choose a stance, propose actuators and two walks.
+
+    Args:
+        request: The URDF, by anybody.
+
+    Returns:
+        The robot's files, each guess with its reason.
+
+    Raises:
+        InvalidRequest: The URDF cannot be read, has no legs that can be simulated, or takes too
+            much; names the field.
+        EvaluatorUnavailable: No process can be started.
+    """
+    check_name(request.name)
+    with simulation_errors("urdf"):
+        made = propose_apart(request.urdf, request.name, request.actuator)
+    return RobotDraftView(
+        name=request.name, toml=made.toml, urdf=made.urdf, job=made.job, guesses=list(made.guesses)
+    )

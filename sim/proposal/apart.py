@@ -1,0 +1,84 @@
+"""A proposal that is known to walk; for URDFs by anybody made in a process that may be ended."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
+from sim.gait.trajectory import require_reachable
+from sim.limited_process import Document, LimitedProcesses, serve
+from sim.proposal.document import Proposal, propose_robot
+from sim.proposal.drive import ActuatorChoice
+from sim.robot import bounds
+from sim.robot.robot import parse_robot
+from sim.scenario import Scenario
+
+SECONDS: Final = 40.0
+"""That a proposal may take; it takes some tenths of a second, the first a second more."""
+
+CPU_SECONDS: Final = 20
+
+MEMORY: Final = 2 << 30
+"""Address space of a process that proposes [B]; it takes a tenth of that."""
+
+PROCESSES: Final = LimitedProcesses(
+    "sim.proposal.apart", count=1, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
+)
+
+
+def walking_proposal(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Proposal:
+    """Propose a robot, and make sure that it can be used and that its legs reach.
+
+    Args:
+        urdf: Text of the file.
+        name: Of the robot.
+        actuator: Kind of its actuators.
+
+    Returns:
+        Its files.
+
+    Raises:
+        RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
+        SimulationInputError: A proposed walk is out of the legs' reach or limits.
+    """
+    proposal = propose_robot(urdf, name, actuator)
+    robot = parse_robot(proposal.toml, proposal.urdf)
+    for scenario in proposal.job["scenarios"]:
+        require_reachable(robot, Scenario.model_validate(scenario))
+    return proposal
+
+
+def propose_apart(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Proposal:
+    """The same, in another process with limits of time, processor and memory.
+
+    Args:
+        urdf: Text of the file, by anybody.
+        name: Of the robot.
+        actuator: Kind of its actuators.
+
+    Returns:
+        Its files.
+
+    Raises:
+        RobotFileError: As for `walking_proposal`; or it took too much, or ended its process.
+    """
+    bounds.check_urdf(urdf)
+    try:
+        made = PROCESSES.ask({"urdf": urdf, "name": name, "actuator": actuator})
+    except ProcessEnded as error:
+        raise RobotFileError(
+            f"robot.urdf: no robot.toml can be proposed: that {error}; write one by hand, as"
+            " docs/robots.md says"
+        ) from error
+    except SimulationInputError as error:
+        raise RobotFileError(str(error)) from error
+    return Proposal(made["toml"], made["urdf"], made["job"], tuple(made["guesses"]))
+
+
+def _answer(request: Document) -> Document:
+    made = walking_proposal(request["urdf"], request["name"], request["actuator"])
+    return {"toml": made.toml, "urdf": made.urdf, "job": made.job, "guesses": list(made.guesses)}
+
+
+if __name__ == "__main__":
+    serve(_answer)

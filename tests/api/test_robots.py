@@ -1,0 +1,94 @@
+"""Robots of one's own over HTTP: proposed from a URDF by anybody, and looked at."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx2
+import pytest
+
+from sim.errors import ProcessEnded
+from sim.limited_process import LimitedProcesses
+from sim.proposal import apart
+from sim.proposal.document import propose_robot
+from tests.examples.hostile import chain
+from tests.robots.test_proposal import dog
+
+pytestmark = pytest.mark.slow
+
+
+def refused(client: httpx2.Client, path: str, **body: Any) -> dict[str, str]:
+    answer = client.post(f"/v1/robots/{path}", json=body)
+    assert answer.status_code == 422, answer.text
+    (error,) = answer.json()["errors"]
+    return dict(error)
+
+
+def test_a_urdf_becomes_a_robot_that_stands_and_can_be_submitted(client: httpx2.Client) -> None:
+    body = {"name": "dog", "urdf": dog(foot="cylinder"), "actuator": "torque"}
+    answer = client.post("/v1/robots/drafts", json=body)
+    assert answer.status_code == 200, answer.text
+    draft = answer.json()
+    mine = propose_robot(dog(foot="cylinder"), "dog", "torque")
+    assert (draft["toml"], draft["urdf"], draft["job"]) == (mine.toml, mine.urdf, mine.job)
+    assert draft["guesses"] == list(mine.guesses)
+
+    robot = {"toml": draft["toml"], "urdf": draft["urdf"]}
+    answer = client.post("/v1/robots/checks", json=robot)
+    assert answer.status_code == 200, answer.text
+    found = answer.json()
+    assert (found["name"], found["joints"], len(found["legs"])) == ("dog", 12, 4)
+    standing = found["standing"]
+    assert standing["normal_forces"] == pytest.approx(standing["weight"], rel=0.02)
+    assert standing["weight"] == pytest.approx(9.81 * found["mass"], rel=0.001)
+    assert found["meshes"] == []
+
+    job = {"robot": robot, **draft["job"], "iterations": 2}
+    assert client.post("/v1/estimates", json=job).status_code == 200
+
+
+def test_what_no_body_has_is_told_by_a_check(client: httpx2.Client) -> None:
+    made = propose_robot(dog().replace('ixx="1e-3"', 'ixx="1e-2"'), "dog")
+    found = client.post("/v1/robots/checks", json={"toml": made.toml, "urdf": made.urdf}).json()
+    assert "no body of" in found["warnings"][0]
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "said"),
+    [
+        ({"urdf": "<robot"}, "urdf", "not well-formed XML"),
+        ({"urdf": chain(4500)}, "urdf", "more than 256 links"),
+        ({"urdf": '<robot name="r"><link name="a"/></robot>'}, "urdf", "no joint of it moves"),
+        ({"urdf": dog(joints=2)}, "urdf", "3 joints|three joints"),
+        ({"urdf": dog().replace("-2.7", "-120")}, "urdf", "are degrees"),
+        ({"urdf": "x" * 800_001}, "urdf", "800000 characters"),
+        ({"name": "../dog"}, "name", "cannot name a robot"),
+        ({"actuator": "steam"}, "actuator", "auto"),
+    ],
+)
+def test_a_draft_is_refused_by_field_with_the_way_out(
+    client: httpx2.Client, change: dict[str, str], field: str, said: str
+) -> None:
+    error = refused(client, "drafts", **{"name": "dog", "urdf": dog(), **change})
+    assert error["field"] == field
+    assert any(part in error["message"] for part in said.split("|")), error
+
+
+def test_a_check_is_refused_with_file_and_line(client: httpx2.Client) -> None:
+    made = propose_robot(dog(), "dog")
+    error = refused(client, "checks", toml=made.toml.replace("[contact]", "["), urdf=made.urdf)
+    assert error["field"] == "robot.toml" and "at line 37" in error["message"]
+
+
+def test_a_proposal_that_takes_too_much_is_ended(
+    client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    processes = LimitedProcesses(
+        "sim.proposal.apart", count=1, seconds=0.01, cpu_seconds=1, memory=2 << 30
+    )
+    monkeypatch.setattr(apart, "PROCESSES", processes)
+    with pytest.raises(ProcessEnded):
+        processes.ask({"urdf": dog(), "name": "dog", "actuator": "auto"})
+    error = refused(client, "drafts", name="dog", urdf=dog())
+    assert error["field"] == "urdf" and "took more than 0.01 s; write one" in error["message"]
+    processes.close()

@@ -11,7 +11,7 @@ import numpy as np
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.meshes import find_mesh, mesh_names
-from gaitswarm.views.robot_check import CheckedLegView, MeshView, RobotCheckView, StandingView
+from gaitswarm.views.robot_check import CheckedLegView, MeshView, RobotCheckView, StandingStillView
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.outcome import Status
 from sim.proposal.drive import GRAVITY
@@ -144,14 +144,14 @@ def standing_drive(robot: Robot) -> tuple[str, dict[str, float]]:
     return "joint-pd", {"Kp": stiffness, "Kd": _DAMPED * stiffness, "feed_forward": 0.0}
 
 
-def _standing(robot: Robot, stood: Simulation) -> tuple[StandingView, list[str]]:
+def _standing(robot: Robot, stood: Simulation) -> tuple[StandingStillView, list[str]]:
     log = stood.logs[0]
     if log is None:
         raise RuntimeError("a reachable walk has a log")
     weight = robot.mass * GRAVITY
     last = len(log.time) // 5
     carried = float(np.nan_to_num(log.foot_force[-last:, :, 2]).sum(axis=1).mean())
-    view = StandingView(
+    view = StandingStillView(
         seconds=_SECONDS,
         normal_forces=carried,
         weight=weight,

@@ -22,7 +22,7 @@ class CheckedLegView(View):
     )
 
 
-class StandingView(View):
+class StandingStillView(View):
     """What came of standing still, simulated with all joints held as stiffly as they can be."""
 
     seconds: float = Field(description="For how long [s].")
@@ -51,6 +51,6 @@ class RobotCheckView(View):
     centre_of_mass: tuple[float, float, float] = Field(
         description="In the body's frame when it stands [m]."
     )
-    standing: StandingView = Field(description="How it stands.")
+    standing: StandingStillView = Field(description="How it stands.")
     meshes: list[MeshView] = Field(description="That the URDF names, in its order.")
     warnings: list[str] = Field(description="What is unphysical or was guessed badly.")

@@ -126,6 +126,8 @@ def check_urdf(text: str) -> None:
         RobotFileError: It is no XML, or breaks a bound; names line and bound.
     """
     _check_text("robot.urdf", text, LONGEST_URDF)
+    if not text.strip():
+        raise RobotFileError("robot.urdf: is empty; it must hold the URDF of a robot")
     parser = expat.ParserCreate()
     scan = _UrdfScan(parser)
     parser.StartElementHandler = scan.start

@@ -57,6 +57,7 @@ def test_what_no_body_has_is_told_by_a_check(client: httpx2.Client) -> None:
     ("change", "field", "said"),
     [
         ({"urdf": "<robot"}, "urdf", "not well-formed XML"),
+        ({"urdf": " "}, "urdf", "is empty; it must hold the URDF"),
         ({"urdf": chain(4500)}, "urdf", "more than 256 links"),
         ({"urdf": '<robot name="r"><link name="a"/></robot>'}, "urdf", "no joint of it moves"),
         ({"urdf": dog(joints=2)}, "urdf", "3 joints|three joints"),

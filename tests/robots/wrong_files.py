@@ -136,7 +136,7 @@ WRONG_URDFS: Final = (
     Wrong("too long", SOURCE + " " * 800_000, "800000 characters"),
     Wrong("JSON", '{"links": []}', "line 1: not well-formed XML: "),
     Wrong("broken off", SOURCE[: len(SOURCE) // 2], "line "),
-    Wrong("empty", "", "line 1: not well-formed XML: no element found"),
+    Wrong("empty", "", "is empty; it must hold the URDF of a robot"),
     Wrong("SDF", "<sdf><model/></sdf>", "its root is <sdf>.*convert SDF"),
     Wrong("xacro", '<robot><link_of name="a"/></robot>', "no <link>.*xacro FILE.xacro"),
     _urdf(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from playwright.sync_api import expect
 from tests.examples.meshes import DAE, OBJ, tetrahedron, with_mesh
 from tests.examples.paths import QUADRUPED
 from tests.examples.servers import ServerProcess
+from tests.robots.test_proposal import dog
 from tests.web.pixels import painted
 from tests.web.visit import Visit
 
@@ -67,3 +69,49 @@ def test_meshes_of_a_robot_of_ones_own_are_drawn_and_can_be_switched_off(
     page.goto(f"{server.url}/jobs/{job_id}/scenarios")
     expect(page.get_by_text("This robot has no published design.")).to_be_visible()
     expect(page.get_by_label("Compare with")).to_have_value("nothing")
+
+
+def test_a_urdf_is_seen_walking_and_becomes_a_job(
+    server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
+) -> None:
+    def file(name: str, text: str) -> Path:
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return tmp_path / name
+
+    page = visit(server.url, allowed="422").go("/jobs/new")
+    page.get_by_role("link", name="a robot of your own").click()
+    urdf = page.get_by_label("URDF", exact=True)
+    urdf.set_input_files(file("broken.urdf", dog().replace("-2.7", "-120")))
+    refused = page.get_by_role("alert").filter(has_text="No robot can be made of broken.urdf.")
+    expect(refused).to_contain_text(re.compile("urdf: .*line .*are degrees"))
+
+    urdf.set_input_files(file("dog.urdf", dog(foot="cylinder")))
+    found = page.get_by_role("region", name="What was found")
+    expect(found).to_contain_text("dog: 4 legs, 12 joints, 11.60 kg")
+    expect(found.get_by_role("row").filter(has_text="FL_calf_joint")).to_contain_text("0.480")
+    expect(refused).to_have_count(0)
+    start = page.get_by_role("region", name="Start design")
+    start.get_by_label("Walk to look at").select_option("fast")
+    start.get_by_role("button", name="Let it walk").click()
+    expect(start.locator("[data-ended='ok']")).to_be_visible()
+    expect(start.get_by_role("img", name="The start design walking")).to_be_visible()
+
+    toml = page.get_by_label("Text of robot.toml")
+    proposed = toml.input_value()
+    toml.fill(proposed.replace("load_height", "load_hight"))
+    expect(found).to_have_count(0)
+    page.get_by_role("button", name="Check the robot again").click()
+    missing = page.get_by_role("alert").filter(has_text="load_height: is missing")
+    expect(missing.first).to_be_visible()
+    toml.fill(proposed.replace("load_height = 0.05", "load_height = 0.07"))
+    page.get_by_role("button", name="Check the robot again").click()
+    expect(found).to_be_visible()
+
+    page.get_by_label("Particles").fill("2")
+    page.get_by_label("Iterations").fill("1")
+    expect(page.locator("[data-walks='4']")).to_be_visible()
+    page.get_by_role("button", name="Submit the job").click()
+    expect(page).to_have_url(re.compile(r"/jobs/(?!new)[^/?]+$"))
+    spec = server.job(page.url.rsplit("/", 1)[1])["spec"]
+    assert "load_height = 0.07" in spec["robot"]["toml"]
+    assert [scenario["name"] for scenario in spec["scenarios"]] == ["slow", "fast"]

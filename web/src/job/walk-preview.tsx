@@ -6,8 +6,9 @@ import type { Job } from '../api/types'
 import { lazyPage } from '../components/lazy-page'
 import { withQuery } from '../router/routes'
 import { useVisible } from '../walk/use-visible'
+import '../walk/walk-stage.css'
 
-const WalkStage = lazyPage('the walk', () => import('./walk-stage'))
+const BestWalk = lazyPage('the walk', () => import('./best-walk'))
 
 /** After what comes first [ms]. */
 const REST_MS = 1200
@@ -27,7 +28,7 @@ export function WalkPreview({ job }: { job: Job }) {
   return (
     <div class="walk-preview" ref={box} data-wanted={wanted}>
       {wanted ? (
-        <WalkStage job={job} best={best} visible={visible} />
+        <BestWalk job={job} best={best} visible={visible} />
       ) : (
         <div class="walk-preview-stage">
           <button type="button" onClick={() => setWanted(true)}>

@@ -68,6 +68,12 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
         ? [{ key: words, label: words, kind: 'page', run: () => navigate(action.href) }]
         : [],
     ),
+    {
+      key: 'own robot',
+      label: 'A robot of your own, from its URDF',
+      kind: 'page',
+      run: () => navigate('/jobs/new?robot=own'),
+    },
     { key: 'compare', label: 'Tournaments', kind: 'page', run: () => navigate('/tournaments') },
     { key: 'api', label: 'API', kind: 'page', run: () => location.assign('/docs') },
     ...(manual ? [MANUAL] : []),

@@ -15,6 +15,7 @@ import { type Draft, draftOf, emptyDraft, preferenceOf, withScenarios } from './
 import { FitPage, OtherKinds } from './fit/page'
 import { JobForm } from './form'
 import { JsonForm } from './json-form'
+import { ofKind } from './robot/job'
 import './submission.css'
 import { widened } from './widen'
 
@@ -43,6 +44,11 @@ function NewTuning({ query }: { query: URLSearchParams }) {
         <div>
           <h1>New job</h1>
           {query.get('clone') === null && <OtherKinds kind="tuning" />}
+          {query.get('clone') === null && query.get('robot') !== 'own' && (
+            <p class="muted">
+              or see <a href="/jobs/new?robot=own">a robot of your own</a> walk, from its URDF
+            </p>
+          )}
           {from && (
             <p class="muted">
               from <a href={`/jobs/${from.id}`}>{from.name || from.id}</a>
@@ -73,7 +79,7 @@ function NewTuning({ query }: { query: URLSearchParams }) {
 }
 
 /**
- * `clone` names a job; `seed` and `preference` replace its own; `scenarios` names those of its
+ * `robot=own` begins with a URDF; `clone` names a job; `seed` and `preference` replace its own; `scenarios` names those of its
  * scenarios that stay; `widen` gives variables other bounds, as `P:0:2`; `start` names jobs whose best designs the search begins with; `iteration`, `particle` name a design to stay near.
  */
 async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Start> {
@@ -84,7 +90,7 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   ])
   const from = cloned && withSeed(cloned, query.get('seed'))
   if (!from || isDocument(from, catalogue)) {
-    return { catalogue, draft: startingFrom(emptyDraft(catalogue), query), from }
+    return { catalogue, draft: startingFrom(blank(catalogue, query), query), from }
   }
   let draft = startingFrom(draftOf(from.spec as JobSpec, catalogue), query)
   const preference = preferenceOf(preferenceIn(query), catalogue)
@@ -96,6 +102,11 @@ async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Sta
   const design = await designIn(query, from.id, signal)
   if (design) draft = around(draft, design, wholeVariables(catalogue, draft.controller))
   return { catalogue, draft, from }
+}
+
+function blank(catalogue: Catalogue, query: URLSearchParams): Draft {
+  const empty = emptyDraft(catalogue)
+  return query.get('robot') === 'own' ? { ...empty, ...ofKind(empty, 'files', empty) } : empty
 }
 
 function startingFrom(draft: Draft, query: URLSearchParams): Draft {

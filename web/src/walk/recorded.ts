@@ -5,6 +5,11 @@ import type { Scenario } from '../api/types'
 import { parseReplay, type Replay } from './replay'
 import type { ResolvedDesign } from './resolve-design'
 
+/** As much of a design as a walk needs. */
+export type WalkingDesign = Pick<ResolvedDesign, 'label' | 'robot' | 'design' | 'world'> & {
+  readonly controller: { readonly name: string }
+}
+
 export interface Recorded {
   readonly label: string
   readonly replay: Replay
@@ -21,7 +26,7 @@ export function replaysOf(walks: readonly Recorded[]): Replay[] {
 
 /** Let a design walk through a scenario, a preset's name or one of one's own. */
 export async function recordWalk(
-  { label, robot, controller, design, world = {} }: ResolvedDesign,
+  { label, robot, controller, design, world = {} }: WalkingDesign,
   scenario: string | Scenario,
   rate: number,
   signal: AbortSignal,

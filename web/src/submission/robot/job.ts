@@ -1,16 +1,20 @@
 /** What a robot's own folder says of its jobs: `job.json`, as `gaitswarm robot init` writes it. */
 
-import type { JobSpec } from '../api/types'
-import { specOf } from './build-spec'
-import type { Catalogue } from './catalogue'
-import { type Draft, draftOf } from './draft'
+import type { JobSpec } from '../../api/types'
+import { specOf } from '../build-spec'
+import type { Catalogue } from '../catalogue'
+import { type Draft, draftOf } from '../draft'
 
 /**
  * The draft with what the robot says of scenarios, controller, variables and all else; its name and
  * robot stay. Throws with what is wrong with the text.
  */
 export function withRobotJob(draft: Draft, catalogue: Catalogue, text: string): Draft {
-  const own = objectIn(text)
+  return withJob(draft, catalogue, objectIn(text))
+}
+
+/** The same of what was read already. Throws where its controller is not known here. */
+export function withJob(draft: Draft, catalogue: Catalogue, own: Partial<JobSpec>): Draft {
   const controller = own.controller ?? draft.controller
   if (!catalogue.controllers.some(({ name }) => name === controller)) {
     throw new Error(`job.json names a controller ${String(controller)} that is not known here`)

@@ -3,19 +3,18 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
 import { useResource } from '../api/resource'
-import type { Job } from '../api/types'
 import { useTheme } from '../theme'
-import { extentOf } from '../walk/extent'
-import { Playback } from '../walk/playback'
-import { recordWalk } from '../walk/recorded'
-import type { Replay } from '../walk/replay'
-import { ReplayDriver } from '../walk/replay-driver'
-import { resolveDesign } from '../walk/resolve-design'
-import type { WalkScene } from '../walk/scene/walk-scene'
-import { usePlaybackState } from '../walk/use-playback'
+import { extentOf } from './extent'
+import { Playback } from './playback'
+import type { Recorded } from './recorded'
+import type { Replay } from './replay'
+import { ReplayDriver } from './replay-driver'
+import type { WalkScene } from './scene/walk-scene'
+import { usePlaybackState } from './use-playback'
+import './walk-stage.css'
 
 /** Recorded frames a second [Hz]. */
-const RATE = 50
+export const RATE = 50
 const OPTIONS = {
   arrangement: 'ghost',
   follow: true,
@@ -24,20 +23,27 @@ const OPTIONS = {
   meshes: true,
 } as const
 
-export default function WalkStage({
-  job,
-  best,
+export function WalkStage({
+  name,
+  record,
+  label,
   visible,
+  onWalked,
 }: {
-  job: Job
-  /** Iteration of the best design that is to be seen. */
-  best: number
+  /** Of the walk; of another name it is another one, and asked for. */
+  name: string
+  record: (signal: AbortSignal) => Promise<Recorded>
+  /** What is seen, in words. */
+  label: string
   visible: boolean
+  /** Told of the walk when it is there. */
+  onWalked?: (replay: Replay) => void
 }) {
-  const walk = useResource(`walk ${job.id} ${best}`, async (signal) => {
-    const design = await resolveDesign({ kind: 'best', job: job.id }, signal)
-    return recordWalk(design, design.scenarios[0] ?? 'normal-fast', RATE, signal)
-  })
+  const walk = useResource(name, record)
+  const { data } = walk
+  useEffect(() => {
+    if (data) onWalked?.(data.replay)
+  }, [data])
   if (walk.error) {
     return (
       <div class="walk-preview-stage" role="alert">
@@ -59,10 +65,10 @@ export default function WalkStage({
       </div>
     )
   }
-  return <Stage key={best} replay={walk.data.replay} visible={visible} />
+  return <Stage key={name} replay={walk.data.replay} label={label} visible={visible} />
 }
 
-function Stage({ replay, visible }: { replay: Replay; visible: boolean }) {
+function Stage({ replay, label, visible }: { replay: Replay; label: string; visible: boolean }) {
   const box = useRef<HTMLDivElement>(null)
   const [wanted, setWanted] = useState(
     () => !matchMedia('(prefers-reduced-motion: reduce)').matches,
@@ -70,7 +76,7 @@ function Stage({ replay, visible }: { replay: Replay; visible: boolean }) {
   const [failure, setFailure] = useState<string | null>(null)
   const playback = useMemo(() => new Playback(replay.end, RATE), [replay])
   const { playing } = usePlaybackState(playback)
-  useScene(box, replay, playback, setFailure)
+  useScene(box, replay, label, playback, setFailure)
   useEffect(() => {
     // Out of view nothing is drawn; at the end it begins anew.
     if (wanted && visible && !playing) playback.play()
@@ -98,6 +104,7 @@ function Stage({ replay, visible }: { replay: Replay; visible: boolean }) {
 function useScene(
   box: { readonly current: HTMLDivElement | null },
   replay: Replay,
+  label: string,
   playback: Playback,
   onFailure: (reason: string) => void,
 ) {
@@ -114,13 +121,13 @@ function useScene(
       scene.current?.resize(stage.clientWidth, stage.clientHeight)
       drive.request()
     })
-    import('../walk/scene/walk-scene')
+    import('./scene/walk-scene')
       .then(({ WalkScene }) => {
         if (left) return
         const built = new WalkScene([replay], extentOf([replay]), 1, OPTIONS, () => drive.request())
         scene.current = built
         built.canvas.setAttribute('role', 'img')
-        built.canvas.setAttribute('aria-label', 'The best design walking')
+        built.canvas.setAttribute('aria-label', label)
         stage.append(built.canvas)
         observer.observe(stage)
         drive.attach(built)

@@ -1,0 +1,88 @@
+/** The robot: as it is, a variant of it, or one's own from its files. */
+
+import { Segmented } from '../../components/segmented'
+import { errorsUnder } from '../build-spec'
+import { emptyDraft, type RobotDraft } from '../draft'
+import { ChoiceField, NumberField, Problems } from '../number-field'
+import type { SectionProps } from '../section'
+import { ofKind } from './job'
+import { OwnRobot } from './own-robot'
+
+const KINDS = [
+  ['shipped', 'as it ships'],
+  ['variant', 'a variant'],
+  ['files', 'a robot of one’s own'],
+] as const
+
+const LINKS = ['coxa', 'femur', 'tibia']
+
+export function RobotSection(props: SectionProps) {
+  const { draft, catalogue, errors, onChange } = props
+  const { robot } = draft
+  const { variant } = catalogue.fields
+  const shipped = catalogue.robots.find(({ name }) => name === robot.name)
+  const change = (changes: Partial<RobotDraft>) => onChange({ robot: { ...robot, ...changes } })
+  return (
+    <section class="card" aria-labelledby="part-robot">
+      <h2 id="part-robot">Robot</h2>
+      <div class="stack">
+        <Segmented
+          roomy
+          label="Robot"
+          value={robot.kind}
+          options={KINDS}
+          onChoose={(kind) => onChange(ofKind(draft, kind, emptyDraft(catalogue)))}
+        />
+        {robot.kind !== 'files' && (
+          <ChoiceField
+            label="Robot that ships"
+            choices={catalogue.robots.map(({ name }) => name)}
+            value={robot.name}
+            hint={shipped?.description}
+            onChange={(name) => change({ name })}
+          />
+        )}
+        {robot.kind === 'variant' && (
+          <div class="fields">
+            <ChoiceField
+              label="Law of friction"
+              choices={['', ...(variant.get('contact_law')?.choices ?? [])]}
+              value={robot.contact_law}
+              error={errors.get('robot.contact_law')}
+              hint={variant.get('contact_law')?.description}
+              onChange={(contact_law) => change({ contact_law })}
+            />
+            <ChoiceField
+              label="Soles that gaits are planned for"
+              choices={['', ...(variant.get('planned_soles')?.choices ?? [])]}
+              value={robot.planned_soles}
+              error={errors.get('robot.planned_soles')}
+              hint={variant.get('planned_soles')?.description}
+              onChange={(planned_soles) => change({ planned_soles })}
+            />
+            {LINKS.map((link, index) => (
+              <NumberField
+                key={link}
+                label={`Backlash of the ${link}`}
+                field={{ ...variant.get('backlash')!, unit: 'deg' }}
+                value={robot.backlash[index]}
+                error={errors.get(`robot.backlash.${index}`)}
+                onChange={(value) =>
+                  change({ backlash: robot.backlash.map((old, k) => (k === index ? value : old)) })
+                }
+              />
+            ))}
+          </div>
+        )}
+        {robot.kind === 'files' && <OwnRobot {...props} />}
+        <Problems
+          messages={errorsUnder(errors, 'robot').filter((message) =>
+            robot.kind === 'files'
+              ? robot.urdf !== ''
+              : robot.kind !== 'variant' || !/^(backlash|contact_law|planned_soles)/.test(message),
+          )}
+        />
+      </div>
+    </section>
+  )
+}

@@ -42,6 +42,13 @@ def test_a_log_is_recorded_once_fitted_and_judged(
     recording = recorded.out.strip()
     assert gaitswarm("record", log, *WALK, scenario, "--db", db).out.strip() == recording
 
+    listed = gaitswarm("recordings", "--search", "BRIEF", "--db", db)
+    assert all(part in listed.out for part in (recording, "brief", "SYNTHETIC", "18 over 1.6 s"))
+    (entry,) = gaitswarm("recordings", "--db", db, "--json").json
+    assert (entry["id"], entry["joints"], entry["seconds"]) == (recording, 18, 1.6)
+    none = gaitswarm("recordings", "--search", "other", "--db", db)
+    assert (none.code, none.out) == (0, "") and "no recording fits" in none.err
+
     fitted = gaitswarm(
         "identify", recording, "--variables", "body_mass,battery_voltage", "--runs", "2",
         "--truth", truth, "--db", db, *FIT,

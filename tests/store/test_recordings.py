@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
+from sqlalchemy import Connection
 
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.kinds.identification import IdentificationSpec
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
+from services.optimizer.store.statements import recordings as statements
+from services.optimizer.store.statements.recordings import _words
 from sim.identification.recorded_walk import RecordedWalk
 from sim.robot import load_robot
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
@@ -79,6 +84,27 @@ def test_recordings_are_listed_by_pages_and_searched(store: SqlStore, clock: Clo
     with pytest.raises(InvalidRequest, match="not a cursor") as refused:
         store.recording_list(after="yesterday")
     assert refused.value.field == "after"
+
+
+@pytest.mark.parametrize("most", [1, 100])
+def test_a_document_is_looked_into_once_however_often_it_is_searched(
+    store: SqlStore, monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    ids = {store.add_recording(recording(first_tick=20 + k)) for k in range(3)}
+    looked: list[str] = []
+
+    def look(connection: Connection, wanted: Sequence[str]) -> dict[str, str]:
+        looked.extend(wanted)
+        return _words(connection, wanted)
+
+    monkeypatch.setattr(statements, "_words", look)
+    monkeypatch.setattr(statements, "_MOST_KNOWN", most)
+    for _ in range(2):
+        assert {entry.id for entry in store.recording_list(search="FUZZY").items} == ids
+    ids.add(store.add_recording(recording(first_tick=30)))
+    assert {entry.id for entry in store.recording_list(search="fuzzy").items} == ids
+    assert sorted(looked) == sorted(ids)
+    assert {entry.id for entry in store.recording_list(search="fuzzy").items} == ids
 
 
 def test_a_claim_brings_the_recordings_that_the_job_names(store: SqlStore) -> None:

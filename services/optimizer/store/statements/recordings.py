@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime
+from itertools import islice
 from typing import Any, Final
 
 from pydantic import ValidationError
@@ -18,7 +19,6 @@ from sqlalchemy import (
     Row,
     Text,
     cast,
-    false,
     func,
     insert,
     select,
@@ -33,6 +33,12 @@ from services.optimizer.store.rows.tables import recordings
 from services.optimizer.store.statements.documents import length_at, text_at
 from services.optimizer.store.statements.job_cursors import time_of, to_cursor
 from sim.identification.recorded_walk import RecordedWalk, Recordings
+
+_SEARCHED_AT_ONCE: Final = 200
+"""Walks whose words are read by one statement."""
+
+_MOST_KNOWN: Final = 100_000
+"""Walks whose words are remembered; some hundred bytes each."""
 
 _CURSOR: Final = re.compile(r"([0-9]{1,18})\.([0-9a-f]{32})", re.ASCII)
 
@@ -93,7 +99,7 @@ def load_recordings(connection: Connection, ids: Sequence[str]) -> Recordings:
 
 
 def recording_page(
-    connection: Connection, search: str, after: str | None, limit: int
+    connection: Connection, search: str, after: str | None, limit: int, known: dict[str, str]
 ) -> Page[RecordingEntry]:
     """Read a page of the list of recorded walks, the newest first.
 
@@ -102,6 +108,7 @@ def recording_page(
         search: Only walks whose id, scenario or controller contain this, whatever its case.
         after: `next` of the page before; None for the first page.
         limit: Most walks on the page.
+        known: Words by id of walks that were searched before; gets those that are searched now.
 
     Returns:
         The page.
@@ -110,25 +117,21 @@ def recording_page(
         InvalidRequest: `after` is no cursor of this list.
     """
     document = recordings.c.document
-    scenario = text_at(connection, document, "scenario", "name")
-    controller = text_at(connection, document, "controller")
     place = (recordings.c.created_at, recordings.c.id)
-    among: list[ColumnElement[bool]] = []
-    if search:
-        words = scenario + "\n" + controller + "\n" + recordings.c.id
-        # A zero byte is in no text, and PostgreSQL refuses it.
-        among.append(words.icontains(search, autoescape=True) if "\0" not in search else false())
+    newest = select(recordings.c.id).order_by(*(c.desc() for c in place))
     if after is not None:
-        among.append(tuple_(*place) < _from_cursor(after))
+        newest = newest.where(tuple_(*place) < _from_cursor(after))
     # Which walks the page has is told first: their documents alone are looked into.
-    newest = select(recordings.c.id).where(*among).order_by(*(c.desc() for c in place))
-    ids = connection.execute(newest.limit(limit + 1)).scalars().all()
+    if search:
+        every = connection.execute(newest).scalars().all()
+        ids = list(islice(_searched(connection, every, search, known), limit + 1))
+    else:
+        ids = list(connection.execute(newest.limit(limit + 1)).scalars())
     columns = (
         recordings.c.id,
         recordings.c.created_at,
         func.length(cast(document, Text)).label("size"),
-        scenario.label("scenario"),
-        controller.label("controller"),
+        *_names(connection),
         length_at(connection, document, "joints").label("joints"),
         length_at(connection, document, "current").label("rows"),
         text_at(connection, document, "synthetic").label("synthetic"),
@@ -138,6 +141,46 @@ def recording_page(
     found = tuple(by_id[name] for name in ids[:limit])
     more = len(ids) > limit
     return Page(found, to_cursor(found[-1].created_at, found[-1].id) if more else None)
+
+
+def _searched(
+    connection: Connection, ids: Sequence[str], search: str, known: dict[str, str]
+) -> Iterator[str]:
+    """Those ids whose words contain a text, in their order.
+
+    A database reads a document in full to find a name in it; as walks never change, that is done
+    once for each, and only as far as the page asks.
+    """
+    wanted = search.lower()
+    for begin in range(0, len(ids), _SEARCHED_AT_ONCE):
+        some = ids[begin : begin + _SEARCHED_AT_ONCE]
+        # Other threads search meanwhile, and may forget what is known.
+        words = {name: text for name in some if (text := known.get(name)) is not None}
+        new = _words(connection, [name for name in some if name not in words])
+        if new and len(known) + len(new) > _MOST_KNOWN:
+            known.clear()
+        known.update(new)
+        words |= new
+        yield from (name for name in some if wanted in words[name])
+
+
+def _words(connection: Connection, ids: Sequence[str]) -> dict[str, str]:
+    """What a search looks into, in small letters."""
+    if not ids:
+        return {}
+    query = select(recordings.c.id, *_names(connection)).where(recordings.c.id.in_(ids))
+    return {
+        row.id: f"{row.scenario}\n{row.controller}\n{row.id}".lower()
+        for row in connection.execute(query)
+    }
+
+
+def _names(connection: Connection) -> tuple[ColumnElement[str], ...]:
+    document = recordings.c.document
+    return (
+        text_at(connection, document, "scenario", "name").label("scenario"),
+        text_at(connection, document, "controller").label("controller"),
+    )
 
 
 def _from_cursor(text: str) -> tuple[datetime, str]:

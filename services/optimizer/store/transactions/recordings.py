@@ -32,6 +32,8 @@ class SqlRecordings:
     def __init__(self, database: Database, clock: Clock) -> None:
         self._database = database
         self._clock = clock
+        # Words of walks that were searched: a walk never changes.
+        self._known: dict[str, str] = {}
 
     def add_recording(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
         """Keep a recorded walk, once."""
@@ -57,4 +59,4 @@ class SqlRecordings:
     ) -> Page[RecordingEntry]:
         """Read a page of the list of recorded walks."""
         with self._database.transaction(write=False) as connection:
-            return recording_page(connection, search, after, checked_limit(limit))
+            return recording_page(connection, search, after, checked_limit(limit), self._known)

@@ -55,7 +55,7 @@ export function OwnRobot({ draft, catalogue, onChange }: SectionProps) {
         <FileField
           label="job.json"
           accept=".json"
-          hint="optional; its scenarios, controller and variables"
+          hint={own.job?.name ?? 'optional; its scenarios, controller and variables'}
           onFile={own.chooseJob}
         />
       </div>

@@ -20,6 +20,8 @@ export interface OwnRobot {
   readonly urdf: Chosen | null
   /** One's own; null where it is proposed. */
   readonly toml: Chosen | null
+  /** One's own; null where its fields are proposed. */
+  readonly job: Chosen | null
   readonly actuator: ActuatorChoice
   /** What the API does now. */
   readonly busy: 'proposing' | 'checking' | null
@@ -38,11 +40,15 @@ export interface OwnRobot {
 }
 
 interface State
-  extends Pick<OwnRobot, 'urdf' | 'toml' | 'actuator' | 'busy' | 'problem' | 'guesses' | 'seen'> {}
+  extends Pick<
+    OwnRobot,
+    'urdf' | 'toml' | 'job' | 'actuator' | 'busy' | 'problem' | 'guesses' | 'seen'
+  > {}
 
 const NOTHING: State = {
   urdf: null,
   toml: null,
+  job: null,
   actuator: 'auto',
   busy: null,
   problem: null,
@@ -84,7 +90,7 @@ export function useOwnRobot(
     set({ busy, problem: null })
     try {
       await work(signal)
-      return true
+      return !signal.aborted
     } catch (error) {
       if (!signal.aborted) set({ problem: { what, error } })
       return false
@@ -109,7 +115,8 @@ export function useOwnRobot(
     const made = await ask('proposing', `No robot can be made of ${urdf.name}.`, async (signal) => {
       const answer = await post('/v1/robots/drafts', { body, signal })
       if (signal.aborted) return
-      const next = withJob(now.current.draft, catalogue, answer.job)
+      const { draft: last, state: chosen } = now.current
+      const next = chosen.job ? last : withJob(last, catalogue, answer.job)
       const robot = { ...next.robot, toml: answer.toml, urdf: answer.urdf }
       change({ ...next, robot })
       set({ guesses: answer.guesses })
@@ -144,9 +151,9 @@ export function useOwnRobot(
         return now.current.draft.robot.urdf === '' ? undefined : check()
       }),
     chooseJob: (file) =>
-      read(file, ({ text }) => {
-        change(withRobotJob(now.current.draft, catalogue, text))
-        set({ problem: null })
+      read(file, (job) => {
+        change(withRobotJob(now.current.draft, catalogue, job.text))
+        set({ job, problem: null })
       }),
     chooseActuator: (actuator) => {
       set({ actuator })

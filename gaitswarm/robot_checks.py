@@ -12,9 +12,11 @@ import numpy as np
 from gaitswarm.errors import simulation_errors
 from gaitswarm.meshes import find_mesh, mesh_names
 from gaitswarm.views.robot_check import CheckedLegView, MeshView, RobotCheckView, StandingStillView
+from sim.controllers.joint_pd import LARGEST_GAIN
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.outcome import Status
 from sim.proposal.drive import GRAVITY
+from sim.proposal.gait import walk_of_robot
 from sim.proposal.legs import reach_below
 from sim.robot import Robot, RobotFiles, load_robot
 from sim.robot.legs import ChainLeg
@@ -110,6 +112,9 @@ def standing_scenario(robot: Robot) -> Scenario:
     Returns:
         A walk of no stride to speak of, at the height and width of the stance, or of the thesis's
         scenarios for legs without one.
+
+    Raises:
+        RobotFileError: It is larger than scenarios may be; names file and field.
     """
     radius, height = 0.16, 0.15
     stances = [leg for leg in robot.legs if isinstance(leg, ChainLeg)]
@@ -118,15 +123,16 @@ def standing_scenario(robot: Robot) -> Scenario:
         radius = max(1e-6, float(np.abs(feet[:, 1]).mean()))
         hips = max(leg.hip[2] for leg in robot.legs)
         height = hips - float(feet[:, 2].mean()) + float(np.mean(robot.planned_soles()))
-    return Scenario(
-        name="standing",
-        cycle_time=_SECONDS,
-        cycles=1.0,
-        radius=radius,
-        hip_height=height,
-        stride=1e-9,
-        height=0.0,
-    )
+    standing = {
+        "name": "standing",
+        "cycle_time": _SECONDS,
+        "cycles": 1.0,
+        "radius": radius,
+        "hip_height": height,
+        "stride": 1e-9,
+        "height": 0.0,
+    }
+    return walk_of_robot(standing, "robot.toml")
 
 
 def standing_drive(robot: Robot) -> tuple[str, dict[str, float]]:
@@ -140,7 +146,7 @@ def standing_drive(robot: Robot) -> tuple[str, dict[str, float]]:
     """
     if not robot.is_torque_controlled:
         return "p", {"P": 1.0}
-    stiffness = _STIFF * float(np.median(robot.actuators().torque_limit))
+    stiffness = min(_STIFF * float(np.median(robot.actuators().torque_limit)), LARGEST_GAIN)
     return "joint-pd", {"Kp": stiffness, "Kd": _DAMPED * stiffness, "feed_forward": 0.0}
 
 

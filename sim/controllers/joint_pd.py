@@ -10,7 +10,7 @@ from sim.controllers.base import ControlLaw, Inference, JointPd
 from sim.controllers.fixed_point import required
 from sim.variables import Variable
 
-_LARGEST: Final = 1e5
+LARGEST_GAIN: Final = 1e5
 """Of a gain that can be simulated [N m/rad], [N m s/rad]."""
 
 
@@ -50,7 +50,7 @@ class JointPdController:
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         """Its gains; nothing is left to the control tick."""
-        stiffness, damping = (required(design, k, low=0.0, high=_LARGEST) for k in ("Kp", "Kd"))
+        stiffness, damping = (required(design, k, low=0.0, high=LARGEST_GAIN) for k in ("Kp", "Kd"))
         share = required(design, "feed_forward", low=-10.0, high=10.0)
         return ControlLaw(joint_pd=JointPd(stiffness, damping, share))
 

@@ -9,9 +9,9 @@ from sim.gait.trajectory import require_reachable
 from sim.limited_process import Document, LimitedProcesses, serve
 from sim.proposal.document import Proposal, propose_robot
 from sim.proposal.drive import ActuatorChoice
+from sim.proposal.gait import walk_of_robot
 from sim.robot import bounds
 from sim.robot.robot import parse_robot
-from sim.scenario import Scenario
 
 SECONDS: Final = 40.0
 """That a proposal may take; it takes some tenths of a second, the first a second more."""
@@ -44,7 +44,7 @@ def walking_proposal(urdf: str, name: str, actuator: ActuatorChoice = "auto") ->
     proposal = propose_robot(urdf, name, actuator)
     robot = parse_robot(proposal.toml, proposal.urdf)
     for scenario in proposal.job["scenarios"]:
-        require_reachable(robot, Scenario.model_validate(scenario))
+        require_reachable(robot, walk_of_robot(scenario, "robot.urdf"))
     return proposal
 
 

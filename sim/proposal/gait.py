@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from pydantic import ValidationError
+
+from sim.errors import RobotFileError
 from sim.gait.gaits import GAITS, lags_of
 from sim.proposal.drive import GRAVITY
 from sim.proposal.stance import Stance
 from sim.robot.legs import ChainLeg
+from sim.scenario import Scenario
 
 _WALKS: Final = {"slow": (0.9, 0.25), "fast": (0.6, 0.35)}
 """Cycle time in units of a pendulum's of the hips' height, stride in units of the height; of robots
@@ -64,3 +68,29 @@ def propose_scenarios(stance: Stance, sole: float, legs: int) -> list[dict[str, 
         }
         for name, (cycle, stride) in walks.items()
     ]
+
+
+def walk_of_robot(values: Mapping[str, Any], file: str) -> Scenario:
+    """A scenario whose lengths are a robot's own.
+
+    Args:
+        values: Of the scenario's fields.
+        file: Of the robot, that the lengths come from.
+
+    Returns:
+        The scenario.
+
+    Raises:
+        RobotFileError: The robot is larger than scenarios may be, or its feet are over its hips;
+            names file and field.
+    """
+    try:
+        return Scenario.model_validate(dict(values))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = str(first["loc"][0]) if first["loc"] else "scenario"
+        raise RobotFileError(
+            f"{file}: a walk of this robot has a {field} of {first['input']:.4g}, which"
+            f" {first['msg'].removeprefix('Input ')}; lengths are metres: look at those of the"
+            " legs, at the stance and at contact.sole"
+        ) from error

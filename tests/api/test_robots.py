@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import httpx2
@@ -79,6 +80,16 @@ def test_a_check_is_refused_with_file_and_line(client: httpx2.Client) -> None:
     made = propose_robot(dog(), "dog")
     error = refused(client, "checks", toml=made.toml.replace("[contact]", "["), urdf=made.urdf)
     assert error["field"] == "robot.toml" and "at line 37" in error["message"]
+
+
+def test_a_robot_that_is_larger_than_walks_may_be_is_refused(client: httpx2.Client) -> None:
+    made = propose_robot(dog(), "dog")
+    tall = re.sub("sole = .*", "sole = 1.0", made.toml)
+    error = refused(client, "checks", toml=tall, urdf=made.urdf)
+    assert "robot.toml: a walk of this robot has a hip_height of 1.28" in error["message"]
+    giant = dog().replace("0 0 -0.2", "0 0 -20")
+    error = refused(client, "drafts", name="dog", urdf=giant)
+    assert "should be less than or equal to 1; lengths are metres" in error["message"]
 
 
 def test_a_proposal_that_takes_too_much_is_ended(

@@ -42,7 +42,7 @@ test('a start design is the middle of what is searched, with what is fixed', () 
     variables: [
       { name: 'P', low: 0, high: 0.5 },
       { name: 'N', low: 1, high: 4 },
-      { name: 'gait', choices: ['trot', 'pace'] },
+      { name: 'gait', kind: 'categorical', choices: ['trot', 'pace'] },
       'feed_forward',
     ],
     fixed: { stride: 0.1 },

@@ -257,7 +257,8 @@ function defaults(fields: ReadonlyMap<string, SchemaField>): Record<string, stri
   return Object.fromEntries([...fields].map(([name, field]) => [name, text(field.default)]))
 }
 
-function middle({ low, high, kind, choices }: Variable): number | string {
+/** Of its bounds, or the first of its choices. */
+export function middle({ low, high, kind, choices }: Variable): number | string {
   if (kind === 'categorical') return choices?.[0] ?? ''
   const value = Number(((low + high) / 2).toPrecision(4))
   return kind === 'integer' ? Math.round(value) : value

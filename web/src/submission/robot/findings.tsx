@@ -2,7 +2,7 @@
 
 import type { CheckedLeg, RobotCheck } from '../../api/types'
 import { type Column, Table } from '../../components/table'
-import { formatExact, formatNumber, quantity } from '../../format/number'
+import { exactQuantity, formatExact, formatNumber, quantity } from '../../format/number'
 
 const COLUMNS: readonly Column<CheckedLeg>[] = [
   { key: 'name', label: 'Leg', value: ({ name }) => name, header: true },
@@ -19,7 +19,7 @@ export function Findings({ check, guesses }: { check: RobotCheck; guesses: reado
     <section class="stack" aria-label="What was found" data-warnings={check.warnings.length}>
       <p>
         <strong>{check.name}</strong>: {check.legs.length} legs, {check.joints} joints,{' '}
-        {quantity(check.mass, 'kg')}. Standing for {quantity(standing.seconds, 's')}, its soles
+        {quantity(check.mass, 'kg')}. Standing for {exactQuantity(standing.seconds, 's')}, its soles
         carry {quantity(standing.normal_forces, 'N')} of {quantity(standing.weight, 'N')}; its body
         is at {quantity(standing.height, 'm', 3)}.
         {held.length > 0 &&

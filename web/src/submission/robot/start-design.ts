@@ -2,6 +2,7 @@
 
 import type { JobSpec, Variable } from '../../api/types'
 import type { Design } from '../../format/value'
+import { middle } from '../draft'
 
 /** What is fixed stays; of a choice the first. known: by name, for whole numbers. */
 export function startDesign(spec: JobSpec, known: readonly Variable[]): Design {
@@ -13,10 +14,4 @@ export function startDesign(spec: JobSpec, known: readonly Variable[]): Design {
     return [name, variable ? middle(variable as Variable) : Number.NaN] as const
   })
   return { ...Object.fromEntries(searched), ...spec.fixed } as Design
-}
-
-function middle({ low, high, kind, choices }: Variable): number | string {
-  if (choices && choices.length > 0) return choices[0]
-  const value = Number(((low + high) / 2).toPrecision(4))
-  return kind === 'integer' ? Math.round(value) : value
 }

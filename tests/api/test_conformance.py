@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import Any, cast
+from typing import Any
 
 import pytest
 import schemathesis
@@ -17,11 +17,10 @@ from schemathesis.generation.meta import CoveragePhaseData
 from schemathesis.pytest.lazy import get_all_tests
 from schemathesis.schemas import APIOperation
 
-from api.app import create_app
-from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 from tests.api.conformance import CHECKS, Found, schema_of, sequences, served
+from tests.examples.api_document import api_document
 from tests.examples.servers import Server
 
 
@@ -32,7 +31,7 @@ def _document() -> dict[str, Any]:
     tune a drive where jobs are submitted, and of all by `python -m tests.api.conformance`.
     """
     # The parameters of a test are needed before there is a server: the document is the same.
-    document = create_app(cast(JobService, None), settings=Settings()).openapi()
+    document = api_document()
     models = document["components"]["schemas"]
     for path, made in (("/v1/jobs", "JobSpec"), ("/v1/estimates", "")):
         content = document["paths"][path]["post"]["requestBody"]["content"]["application/json"]

@@ -107,6 +107,14 @@ def test_a_urdf_is_seen_walking_and_becomes_a_job(
     page.get_by_role("button", name="Check the robot again").click()
     expect(found).to_be_visible()
 
+    slow = page.locator("[data-own='0']")
+    drop = slow.get_by_label(re.compile("^drop"))
+    expect(drop).to_be_hidden()
+    slow.get_by_text(re.compile("more settings, at their defaults")).click()
+    drop.fill("0.01")
+    drop.fill("")
+    expect(drop).to_be_visible()
+
     page.get_by_label("Particles").fill("2")
     page.get_by_label("Iterations").fill("1")
     expect(page.locator("[data-walks='4']")).to_be_visible()

@@ -1,5 +1,6 @@
 /** The walks in which designs are judged: presets with their numbers, and one's own. */
 
+import { useRef, useState } from 'preact/hooks'
 import type { ScenarioPreset } from '../api/types'
 import { formatExact } from '../format/number'
 import { inWords } from '../format/words'
@@ -11,6 +12,9 @@ import type { SchemaField } from './schema-fields'
 import type { SectionProps } from './section'
 
 type Own = Readonly<Record<string, string>>
+
+/** What tells the thesis's walks apart. */
+const COMMON: ReadonlySet<string> = new Set(['cycle_time', 'load', 'slope', 'turn'])
 
 export function ScenariosSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { presets, own } = draft
@@ -155,9 +159,40 @@ function OwnScenario({
   onChange: (scenario: Own | null) => void
 }) {
   const at = `own.${index}`
-  const field = (name: string) => catalogue.fields.scenario.get(name)!
+  const fields = [...catalogue.fields.scenario.values()].filter(({ name }) => name !== 'name')
   const change = (name: string) => (value: string) => onChange({ ...scenario, [name]: value })
   const error = (name: string) => errors.get(`${at}.${name}`)
+  const usual = scenarioDraft(catalogue.fields.scenario, null, '')
+  // What is left empty has its default, too.
+  const isSet = ({ name }: SchemaField) => !['', usual[name]].includes(scenario[name] ?? '')
+  // Those of the beginning: no field may move while somebody types.
+  const [shown] = useState(() => new Set(fields.filter(isSet).map(({ name }) => name)))
+  const isFirst = ({ name }: SchemaField) => COMMON.has(name) || shown.has(name)
+  const further = fields.filter((field) => !isFirst(field))
+  const asUsual = !further.some(isSet)
+  // It is not shut again while somebody empties a field in it.
+  const opened = useRef(false)
+  opened.current ||= !asUsual || further.some(({ name }) => error(name) !== undefined)
+  const input = (field: SchemaField) =>
+    field.choices ? (
+      <ChoiceField
+        key={field.name}
+        label={inWords(field.name)}
+        choices={field.choices}
+        value={scenario[field.name]}
+        error={error(field.name)}
+        onChange={change(field.name)}
+      />
+    ) : (
+      <NumberField
+        key={field.name}
+        label={inWords(field.name)}
+        field={field}
+        value={scenario[field.name] ?? ''}
+        error={error(field.name)}
+        onChange={change(field.name)}
+      />
+    )
   return (
     <fieldset class="own-scenario" data-own={index}>
       <legend>Scenario of one’s own</legend>
@@ -173,30 +208,14 @@ function OwnScenario({
           />
           {error('name') !== undefined && <span class="wrong">{error('name')}</span>}
         </div>
-        {[...catalogue.fields.scenario.keys()]
-          .filter((name) => name !== 'name')
-          .map((name) =>
-            field(name).choices ? (
-              <ChoiceField
-                key={name}
-                label={inWords(name)}
-                choices={field(name).choices!}
-                value={scenario[name]}
-                error={error(name)}
-                onChange={change(name)}
-              />
-            ) : (
-              <NumberField
-                key={name}
-                label={inWords(name)}
-                field={field(name)}
-                value={scenario[name] ?? ''}
-                error={error(name)}
-                onChange={change(name)}
-              />
-            ),
-          )}
+        {fields.filter(isFirst).map(input)}
       </div>
+      <details open={opened.current}>
+        <summary>
+          {further.length} more settings{asUsual && ', at their defaults'}
+        </summary>
+        <div class="fields">{further.map(input)}</div>
+      </details>
       <button type="button" class="compact" onClick={() => onChange(null)}>
         Remove {scenario.name}
       </button>

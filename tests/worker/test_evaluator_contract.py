@@ -89,19 +89,24 @@ def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
 def test_whether_to_stop_is_asked_at_least_once_a_second(
     evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """In one of some tries: what else the machine does can only make a pause longer."""
     # A kernel that takes a second and a half, and then walks for as long.
     monkeypatch.setattr(simulate, "prepare", lambda _, precision: time.sleep(1.5))
     long = Scenario(name="long", cycle_time=2.0, radius=0.16, hip_height=0.15, cycles=5)
-    asked = [time.monotonic()]
 
-    def stop_after_three_seconds() -> bool:
+    def longest_pause() -> float:
+        asked = [time.monotonic()]
+
+        def stop_after_three_seconds() -> bool:
+            asked.append(time.monotonic())
+            return asked[-1] - asked[0] > 3.0
+
+        with pytest.raises(EvaluationStopped):
+            evaluator.evaluate(request(8000, scenarios=(long,)), stop_after_three_seconds)
         asked.append(time.monotonic())
-        return asked[-1] - asked[0] > 3.0
+        return max(later - earlier for earlier, later in pairwise(asked))
 
-    with pytest.raises(EvaluationStopped):
-        evaluator.evaluate(request(8000, scenarios=(long,)), stop_after_three_seconds)
-    asked.append(time.monotonic())
-    assert max(later - earlier for earlier, later in pairwise(asked)) < 1.0
+    assert any(longest_pause() < 1.0 for _ in range(3))
 
 
 def test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_not_told_to_stop(

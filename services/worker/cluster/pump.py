@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -23,6 +24,14 @@ _GLANCE_AHEAD: Final = 0.1
 
 _IDLE: Final = 0.5
 """Seconds between looks at whether it is time to end."""
+
+GRACE_SECONDS: Final = 1.0
+"""That a task which nobody waits for any more has to end by itself, before it is cancelled.
+
+Ray ends the process that cancels a task in the instant in which its answer comes. Tasks of a batch
+that fails, fail together, so that those which remain must not be cancelled at once. Most end in
+this time.
+"""
 
 PULSE_SECONDS: Final = 4.0
 """Seconds between looks at whether the cluster's head is alive; three misses count as lost."""
@@ -54,7 +63,8 @@ class Pump:
         self._shares = None if session.directory is not None else Shares(session)
         self._held: deque[tuple[Work, Wanted]] = deque()
         self._flying: dict[Any, tuple[Work, Node]] = {}
-        self._cancelled: set[Any] = set()
+        # When tasks that nobody waits for are cancelled; never again once they were.
+        self._cancelled_at: dict[Any, float] = {}
         self._absent: dict[Wanted, float] = {}
         self._session = session
         self._misses = 0
@@ -86,7 +96,7 @@ class Pump:
             gone = [ref for ref, (_, node) in self._flying.items() if node is lost]
             for reference in gone:
                 work, _ = self._flying.pop(reference)
-                self._cancelled.discard(reference)
+                self._cancelled_at.pop(reference, None)
                 self._dispatcher.again(work, suspect=False)
         slots = self._nodes.slots
         if self._shares is not None:
@@ -158,14 +168,17 @@ class Pump:
         for reference in done:
             work, node = self._flying.pop(reference)
             node.flying -= 1
-            self._cancelled.discard(reference)
+            self._cancelled_at.pop(reference, None)
             self._settle(reference, work, node)
 
     def _cancel_dropped(self) -> None:
         """What nobody waits for any more, or another worker was quicker with, takes no slot."""
+        now = time.monotonic()
         for reference, (work, _) in self._flying.items():
-            if not work.batch.awaits(work.chunk) and reference not in self._cancelled:
-                self._cancelled.add(reference)
+            if work.batch.awaits(work.chunk):
+                continue
+            if now >= self._cancelled_at.setdefault(reference, now + GRACE_SECONDS):
+                self._cancelled_at[reference] = math.inf
                 self._ray.cancel(reference, force=False)
 
     def _feel_pulse(self) -> None:

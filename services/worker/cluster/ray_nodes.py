@@ -316,12 +316,16 @@ class ClusterNodes:
             _, self._demand = self._ray.wait(
                 self._demand, num_returns=len(self._demand), timeout=0.0
             )
+        now = time.monotonic()
         if not wanted or any(node.room > 0.0 for node in self._nodes.values()):
-            for reference in self._demand:
-                with suppress(self._ray.exceptions.RayError):
-                    self._ray.cancel(reference)
-            self._demand = []
-        elif time.monotonic() >= self._next_demand:
-            self._next_demand = time.monotonic() + LOOK_SECONDS
+            # What has a slot now ends by itself, and must not be cancelled in that instant: Ray
+            # would end this process. What has none after a while is cancelled.
+            if now >= self._next_demand + LOOK_SECONDS:
+                for reference in self._demand:
+                    with suppress(self._ray.exceptions.RayError):
+                        self._ray.cancel(reference)
+                self._demand = []
+        elif now >= self._next_demand:
+            self._next_demand = now + LOOK_SECONDS
             lacking = min(max(self.slots, 1), _LARGEST_DEMAND) - len(self._demand)
             self._demand += [self._any_cpu.remote() for _ in range(lacking)]

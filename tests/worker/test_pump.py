@@ -1,0 +1,101 @@
+"""What a cluster is asked to drop, and when. The cluster is made up."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+import ray.exceptions
+
+from services.optimizer.run.evaluator import EvaluationStopped
+from services.worker.cluster import pump
+from services.worker.cluster.nodes import OwnNode
+from services.worker.cluster.pump import Pump
+from services.worker.dispatch import Dispatcher
+from services.worker.ray_session import RaySession
+from tests.examples.processes import eventually
+from tests.worker.requests import request
+
+SLOTS = 2
+
+
+class MadeUpRay:
+    """Runs nothing: tasks end when a test says so."""
+
+    exceptions = ray.exceptions
+
+    def __init__(self) -> None:
+        self.sent: list[object] = []
+        self.ended: set[object] = set()
+        self.cancelled: dict[object, float] = {}
+
+    def remote(self, **_: object) -> Any:
+        return lambda _function: SimpleNamespace(remote=self._send)
+
+    def _send(self, *_: object) -> object:
+        self.sent.append(reference := object())
+        return reference
+
+    def put(self, _value: object) -> object:
+        return object()
+
+    def wait(
+        self, references: list[object], num_returns: int, timeout: float
+    ) -> tuple[list[object], list[object]]:
+        time.sleep(min(timeout, 0.01))
+        done = [reference for reference in references if reference in self.ended]
+        return done, [reference for reference in references if reference not in self.ended]
+
+    def get(self, reference: object) -> object:
+        raise ray.exceptions.TaskCancelledError
+
+    def cancel(self, reference: object, *, force: bool) -> None:
+        assert not force
+        assert reference not in self.cancelled
+        self.cancelled[reference] = time.monotonic()
+
+
+@pytest.fixture
+def made_up() -> MadeUpRay:
+    return MadeUpRay()
+
+
+@pytest.fixture
+def dispatcher(made_up: MadeUpRay) -> Iterator[Dispatcher]:
+    """Of a pump that runs."""
+    opened = Dispatcher(slots=SLOTS, lanes=lambda _: 4)
+    session = SimpleNamespace(ray=made_up, directory=Path(), head_answers=lambda: True)
+    pumped = Pump(cast(RaySession, session), opened, OwnNode(SLOTS), threading.Event())
+    with ThreadPoolExecutor(1) as pool:
+        running = pool.submit(pumped.run)
+        yield opened
+        opened.close("the test has ended")
+        running.result()
+
+
+def test_tasks_that_nobody_waits_for_may_end_before_they_are_cancelled_once(
+    made_up: MadeUpRay, dispatcher: Dispatcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pump, "GRACE_SECONDS", 2.0)
+    stop = threading.Event()
+    with ThreadPoolExecutor(1) as pool:
+        evaluated: Future[Any] = pool.submit(dispatcher.evaluate, request(64), stop.is_set)
+        warmed = SLOTS
+        eventually(lambda: len(made_up.sent) > warmed + 1)
+        stop.set()
+        with pytest.raises(EvaluationStopped):
+            evaluated.result()
+    dropped = time.monotonic()
+    ending, *lasting = made_up.sent[warmed:]
+    made_up.ended.add(ending)
+    eventually(lambda: set(made_up.cancelled) >= set(lasting))
+    assert min(made_up.cancelled.values()) - dropped > 1.0
+    time.sleep(0.2)
+    assert set(made_up.cancelled) == set(lasting)
+    made_up.ended.update(lasting)

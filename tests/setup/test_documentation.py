@@ -50,6 +50,14 @@ def test_every_route_is_documented_and_no_other() -> None:
     assert {f"{method} {path}" for method, path in rows} == routes
 
 
+def test_pages_of_the_manual_that_the_page_leads_to_exist() -> None:
+    sources = [*(ROOT / "web" / "src").rglob("*.tsx"), *(ROOT / "web" / "src").rglob("*.ts")]
+    texts = [source.read_text(encoding="utf-8") for source in sources]
+    named = {name for text in texts for name in re.findall(r"/manual/([\w/-]+)\.html", text)}
+    assert named
+    assert [name for name in named if not (ROOT / f"{name}.md").is_file()] == []
+
+
 @pytest.mark.parametrize("scenario", PRESETS, ids=lambda s: s.name)
 def test_every_scenario_is_documented(scenario: object) -> None:
     assert f"`{getattr(scenario, 'name', '')}`" in documentation()

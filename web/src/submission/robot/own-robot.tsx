@@ -68,7 +68,7 @@ export function OwnRobot({ draft, catalogue, onChange }: SectionProps) {
           <ErrorNotice {...own.problem} />
           <p class="small">
             Choose another URDF, bring a robot.toml of your own, or change the one below and check
-            again. {manual && <a href="/manual/robots.html">What a robot needs</a>}
+            again. {manual && <a href="/manual/docs/robots.html">What a robot needs</a>}
           </p>
         </>
       )}

@@ -86,6 +86,10 @@ _READINGS: Final = 2
 """Frequent questions that are read for at once. More threads would take turns as well, and spread
 over more connections, each of which has to read anew what another one knows."""
 
+_WAITING: Final = 8
+"""The same where a server is asked: as many as connections to it stay open. More threads would take
+turns with the event loop's, and open connections for a question each."""
+
 
 @dataclass(frozen=True, slots=True)
 class Component:
@@ -106,7 +110,8 @@ class State(TypedDict):
     """`request.state` of every request: what the lifespan of the application yields.
 
     slots: for walks. analyses: for what reads whole histories. validations: threads that validate
-    bodies. readings: threads that read for frequent questions. draining: set by the server on the
+    bodies. readings: threads that read for frequent questions. waiting_readings: those of them
+    that wait for a server. draining: set by the server on the
     first signal to end; it still answers then. stopping: set when it begins to stop; event streams
     end then. topics: jobs that these streams follow. streams: that are open, by asker. components:
     parts of the process beside the database. metrics: of this process. activity: what happens to
@@ -119,6 +124,7 @@ class State(TypedDict):
     analyses: ComputingSlots
     validations: anyio.CapacityLimiter
     readings: anyio.CapacityLimiter
+    waiting_readings: anyio.CapacityLimiter
     draining: asyncio.Event
     streams: OpenStreams
     stopping: asyncio.Event
@@ -162,6 +168,7 @@ def lifespan(
             analyses=ComputingSlots("analyses", analysts, waiting),
             validations=anyio.CapacityLimiter(_VALIDATIONS),
             readings=anyio.CapacityLimiter(_READINGS),
+            waiting_readings=anyio.CapacityLimiter(_WAITING),
             draining=asyncio.Event(),
             stopping=stopping,
             topics=topics,

@@ -127,9 +127,10 @@ async def _page(scope: Scope, query: bytes, listed: JobList) -> Encoded:
     return await run_sync(answer, limiter=_room(scope, prompt=version is not None))
 
 
-def _room(scope: Scope, *, prompt: bool) -> CapacityLimiter | None:
-    """Few threads where none of them waits; as many as usual (None) where a server is asked."""
-    return cast(CapacityLimiter, scope["state"]["readings"]) if prompt else None
+def _room(scope: Scope, *, prompt: bool) -> CapacityLimiter:
+    """Few threads where none of them waits; some more where a server is asked."""
+    name = "readings" if prompt else "waiting_readings"
+    return cast(CapacityLimiter, scope["state"][name])
 
 
 def _question(match: re.Match[str], query: bytes) -> tuple[_Route, JobQuestion] | None:

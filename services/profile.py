@@ -20,8 +20,9 @@ from services.worker import EvaluatorKind
 from services.worker.in_process import InProcessEvaluator
 from services.worker.ray_evaluator import RayEvaluator
 from services.worker.tasks import TaskTotals
-from sim.benchmark import measure_control
+from sim.assembly import kernel_of
 from sim.kernel.walk import Precision
+from sim.robot import DEFAULT_ROBOT, load_robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ def profile_job(
     """Run the job of chapter 4 in a database of its own, and say what its time goes into.
 
     Workers time their tasks, and in them kernels and tables; this process times evaluations and the
-    store. The kernel's time is divided into physics and control as `measure_control` finds it.
+    store. The kernel times some of its rounds, and in them control ticks.
 
     Args:
         evaluator: Threads of this process; or a Ray cluster of its own, from the first task on.
@@ -86,7 +87,7 @@ def profile_job(
         EvaluatorUnavailable: Ray cannot be started.
         SimulationInputError: There is no compiled kernel on this machine.
     """
-    control = measure_control(precision=precision)
+    kernel_of(load_robot(DEFAULT_ROBOT), "native", precision=precision)
     spec = JobSpec(
         optimizer=PsoSettings(particles=particles),
         iterations=iterations,
@@ -112,7 +113,7 @@ def profile_job(
             workers.close()
             store.close()
     walks = particles * len(spec.cases({})) * (len(readings) - 1)
-    return _profile(evaluator, precision, slots, walks, control, readings[0], readings[-1])
+    return _profile(evaluator, precision, slots, walks, readings[0], readings[-1])
 
 
 def _profile(
@@ -120,17 +121,16 @@ def _profile(
     precision: Precision,
     slots: int,
     walks: int,
-    control: float,
     first: _Reading,
     last: _Reading,
 ) -> JobProfile:
-    """control: share of the kernel's time."""
     wall = last.at - first.at
     evaluated, stored = last.evaluated - first.evaluated, last.stored - first.stored
     tasks = last.tasks.since(first.tasks)
+    control = tasks.lane_use.control_share * tasks.kernel_seconds
     seconds = {
-        "physics": (1.0 - control) * tasks.kernel_seconds,
-        "control": control * tasks.kernel_seconds,
+        "physics": tasks.kernel_seconds - control,
+        "control": control,
         "tables": tasks.table_seconds,
         "preparation": tasks.seconds - tasks.kernel_seconds - tasks.table_seconds,
         "workers": slots * evaluated - tasks.seconds,

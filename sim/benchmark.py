@@ -97,36 +97,6 @@ def measure(
     )
 
 
-def measure_control(
-    *, repeats: int = 3, robot: str = DEFAULT_ROBOT, precision: Precision = "double"
-) -> float:
-    """What control ticks take of the compiled kernel's time.
-
-    The same walks at twice the physics rate have twice the steps between as many ticks, so that a
-    kernel's time is t = control + physics, and t' = control + 2 physics.
-
-    Args:
-        repeats: Passes of both, in turns, of which the fastest of each count.
-        robot: A shipped robot.
-        precision: Of the physics' numbers.
-
-    Returns:
-        2 - t'/t [1], with the error of both times.
-
-    Raises:
-        SimulationInputError: There is no compiled kernel here.
-    """
-    seconds: dict[int, list[float]] = {PHYSICS_RATE: [], 2 * PHYSICS_RATE: []}
-    for _ in range(repeats):
-        for rate, measured in seconds.items():
-            _, spent = _walk(
-                SCENARIOS[:1], 32, backend="native", robot=robot, precision=precision, rate=rate
-            )
-            measured.append(spent.seconds)
-    usual, doubled = (min(measured) for measured in seconds.values())
-    return min(max(2.0 - doubled / usual, 0.0), 1.0)
-
-
 def _walk(
     scenarios: Sequence[Scenario],
     walkers: int,
@@ -134,7 +104,6 @@ def _walk(
     backend: Backend,
     robot: str,
     precision: Precision,
-    rate: int = PHYSICS_RATE,
 ) -> tuple[float, KernelTime]:
     """Wall time of a pass [s], and what of it the kernel took."""
     design = CONTROLLERS["fuzzy-pi"].published["A"]
@@ -150,7 +119,6 @@ def _walk(
                 designs,
                 robot=robot,
                 backend=backend,
-                physics_rate=rate,
                 precision=precision,
             )
             for scenario in scenarios

@@ -167,10 +167,7 @@ class TaskTotals:
             self.seconds - earlier.seconds,
             self.kernel_seconds - earlier.kernel_seconds,
             self.table_seconds - earlier.table_seconds,
-            LaneUse(
-                self.lane_use.walked - earlier.lane_use.walked,
-                self.lane_use.computed - earlier.lane_use.computed,
-            ),
+            self.lane_use - earlier.lane_use,
         )
 
 

@@ -310,18 +310,40 @@ class LaneUse:
     Attributes:
         walked: rounds of physics steps, summed over lanes, that belonged to a walk.
         computed: rounds of physics steps, summed over lanes, in all.
+        timed: what some of the rounds took, control ticks and all [ns].
+        control: what the control ticks took of that [ns].
     """
 
     walked: int = 0
     computed: int = 0
+    timed: int = field(default=0, compare=False)
+    control: int = field(default=0, compare=False)
 
     @property
     def share(self) -> float:
         """Of the lanes' time that was walked [1]; 1 where nothing was computed."""
         return self.walked / self.computed if self.computed else 1.0
 
+    @property
+    def control_share(self) -> float:
+        """Of the kernel's time that control ticks took [1]; 0 where nothing was timed."""
+        return self.control / self.timed if self.timed else 0.0
+
     def __add__(self, other: LaneUse) -> LaneUse:
-        return LaneUse(self.walked + other.walked, self.computed + other.computed)
+        return LaneUse(
+            self.walked + other.walked,
+            self.computed + other.computed,
+            self.timed + other.timed,
+            self.control + other.control,
+        )
+
+    def __sub__(self, other: LaneUse) -> LaneUse:
+        return LaneUse(
+            self.walked - other.walked,
+            self.computed - other.computed,
+            self.timed - other.timed,
+            self.control - other.control,
+        )
 
 
 class WalkResults(Sequence[WalkResult]):

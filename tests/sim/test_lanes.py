@@ -139,6 +139,16 @@ def test_a_call_tells_how_many_rounds_were_walked_and_how_many_computed() -> Non
     assert kernel.walk([], coding, log=False).lane_use.share == 1.0
 
 
+def test_a_call_tells_what_control_ticks_took_of_some_rounds_of_each_call() -> None:
+    kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
+    first = lane_use(kernel, coding, [7])
+    assert 0 < first.control < first.timed
+    both = first + lane_use(kernel, coding, [7])
+    assert (both - first).timed == both.timed - first.timed > 0
+    assert 0.0 < both.control_share < 1.0
+    assert kernel.walk([], coding, log=False).lane_use.control_share == 0.0
+
+
 def test_a_lane_takes_the_next_walk_when_one_ends_the_longest_first() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
     n = kernel.lanes

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
 from typing import Any
 
 import pytest
@@ -134,13 +135,35 @@ def test_the_list_is_sorted_anew_once_another_process_or_this_one_has_changed_a_
     other.close()
 
 
-def test_while_nothing_is_committed_sqlite_reads_the_jobs_that_are_sorted_once(
-    migrated_sqlite: Any,
+def test_while_nothing_is_committed_the_jobs_that_are_sorted_are_read_once(
+    store: SqlStore, database_url: str
 ) -> None:
-    store = open_store(f"sqlite:///{migrated_sqlite}")
+    store.create_job(spec(name="a"))
+    other = open_store(database_url)
     with statements() as sent:
         for _ in range(3):
             store.jobs(order=JobOrder.NAME, search="a", limit=1)
-    store.close()
-    whole = [s for s, _ in sent if s.startswith("SELECT") and "labels" in s and " IN " not in s]
-    assert len(whole) == 1, sent
+        assert len(_whole_lists(sent)) == 1, sent
+        other.create_job(spec(name="ab"))
+        for _ in range(3):
+            assert len(store.jobs(order=JobOrder.NAME, search="a", limit=5).items) == 2
+        assert len(_whole_lists(sent)) == 2, sent
+    other.close()
+
+
+@pytest.mark.slow
+def test_of_all_who_ask_a_server_at_once_one_reads_the_jobs_that_are_sorted(
+    emptied_postgresql: Callable[[], str],
+) -> None:
+    with (
+        closing(open_store(emptied_postgresql())) as store,
+        ThreadPoolExecutor(4) as threads,
+        statements() as sent,
+    ):
+        asked = [threads.submit(store.jobs, order=JobOrder.NAME, search="a") for _ in range(8)]
+        assert all(not future.result().items for future in asked)
+    assert len(_whole_lists(sent)) == 1, sent
+
+
+def _whole_lists(sent: list[tuple[str, Any]]) -> list[str]:
+    return [s for s, _ in sent if s.startswith("SELECT") and "labels" in s and " IN " not in s]

@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import closing
+from typing import Any
 
 import pytest
 from sqlalchemy import text
@@ -113,6 +114,42 @@ def test_a_missing_server_fails_these_tests_where_they_must_run(
     monkeypatch.setattr("tests.store.postgres_server.postgres_binaries", lambda: None)
     with pytest.raises(outcome, match="PostgreSQL is not installed"):
         server_binaries()
+
+
+def test_a_connection_that_was_cut_is_replaced_before_it_is_used_and_others_are_not_tried(
+    database: Database, postgresql_server: PostgresServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pings: list[object] = []
+    ping = database.engine.dialect.do_ping
+
+    def noted(driver: Any) -> bool:
+        pings.append(driver)
+        return ping(driver)
+
+    monkeypatch.setattr(database.engine.dialect, "do_ping", noted)
+
+    def backend() -> int:
+        with database.transaction(write=False) as connection:
+            return int(connection.execute(text("SELECT pg_backend_pid()")).scalar_one())
+
+    first = backend()
+    assert backend() == first and not pings
+    other = connect(parse_url(f"{postgresql_server.url}/postgres"))
+    with other.transaction(write=True) as connection:
+        connection.execute(text("SELECT pg_terminate_backend(:pid, 5000)"), {"pid": first})
+    other.close()
+    assert backend() != first
+    assert len(pings) == 1
+
+
+def test_what_is_only_read_holds_no_transaction(database: Database) -> None:
+    with database.transaction(write=False) as connection:
+        started = text("SELECT now()")
+        first = connection.execute(started).scalar_one()
+        assert connection.execute(started).scalar_one() > first
+    with database.transaction(write=True) as connection:
+        first = connection.execute(started).scalar_one()
+        assert connection.execute(started).scalar_one() == first
 
 
 def test_both_ends_notice_within_a_lease_that_the_other_has_gone(database: Database) -> None:

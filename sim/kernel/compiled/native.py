@@ -290,7 +290,7 @@ class NativeKernel:
                 WalkResult(Status(int(w.status)), sums[k], end[k], float(w.peak_current), logs[k])
                 for k, w in ended
             ),
-            LaneUse(walked=int(use.walked), computed=int(use.computed)),
+            LaneUse(use.walked, use.computed, use.timed, use.control),
             waited,
         )
 

@@ -30,7 +30,7 @@ class _Pool(ctypes.Structure):
 class LaneCounts(ctypes.Structure):
     """As `sim.kernel.walk.LaneUse`, of the lanes of one thread."""
 
-    _fields_ = [("walked", ctypes.c_int64), ("computed", ctypes.c_int64)]
+    _fields_ = [(name, ctypes.c_int64) for name in ("walked", "computed", "timed", "control")]
 
 
 STRUCTURES: Final = {"call": _Call, "pool": _Pool, "lane_use": LaneCounts}

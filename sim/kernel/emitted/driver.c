@@ -30,10 +30,19 @@ typedef struct {
   Sensors sensors; /* the largest, and mostly not used: last */
 } Lanes;
 
-/* Rounds of physics steps that were walked for a walker, and all that were computed. */
+/* Rounds of physics steps that were walked for a walker, and all that were computed; and what rounds
+   took of which one in TIMED_EACH is timed, and what their control ticks took of that [ns]. */
+enum { TIMED_EACH = 64 };
 typedef struct {
-  int64_t walked, computed;
+  int64_t walked, computed, timed, control;
 } LaneUse;
+
+static int64_t nanoseconds(void)
+{
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
 
 /* A walker at its start, and nothing left of who was in the lane before. */
 static void enter(Lanes *s, int k, Call *call, Walker *w)
@@ -321,14 +330,18 @@ int64_t gaitswarm_walk(Pool *pool, Call *own, const Coding *coding, LaneUse *use
   memset(&s, 0, sizeof s);
   offer(pool, own);
   for (int k = 0; k < LANES; k++) fill(&s, k, pool, own, bound);
-  while (walking) {
+  for (int64_t n = 0; walking; n++) {
+    const int timed = n % TIMED_EACH == 0;
+    const int64_t begun = timed ? nanoseconds() : 0;
     begin_ticks(&s, coding);
     if (s.filtered) unfiltered(s.sensed, s.current, s.smoothing);
     control_tick(&s, coding);
     write_log(&s);
+    if (timed) use->control += nanoseconds() - begun;
     round_of_steps(&s, coding);
     use->walked += end_round(&s);
     use->computed += LANES;
+    if (timed) use->timed += nanoseconds() - begun;
     if (bound == INT64_MAX && !gaitswarm_left(own))
       bound = __atomic_load_n(&pool->calls, __ATOMIC_RELAXED);
     walking = 0;

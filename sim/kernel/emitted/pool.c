@@ -3,6 +3,7 @@
    NP (parameters); before driver.c. */
 
 #include <sched.h>
+#include <time.h>
 
 #define NQ (7 + NJ)
 #define NV (6 + NJ)

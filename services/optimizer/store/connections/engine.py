@@ -126,8 +126,10 @@ class Database:
         Args:
             write: Whether anything will be written. On SQLite a transaction that only reads never
                 waits for a writer, and sees one state of the database throughout; on PostgreSQL
-                (READ COMMITTED) each of its statements sees what is committed when it begins.
-            before: Called with the connection before the transaction begins.
+                each of its statements sees what is committed when it begins (READ COMMITTED), so
+                that each is a transaction by itself, and the server is asked once for it.
+            before: Called with the connection before the transaction begins; one that only reads is
+                one transaction then, as this sets it.
 
         Yields:
             A connection inside the transaction.
@@ -139,6 +141,8 @@ class Database:
             connection.execution_options(**{_WRITE: write})
             if before is not None:
                 before(connection)
+            elif not write and connection.dialect.name == "postgresql":
+                connection.execution_options(isolation_level="AUTOCOMMIT")
             with connection.begin():
                 yield connection
 

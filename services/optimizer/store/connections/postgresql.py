@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import select
 import socket
 from typing import Any, Final
 
-from sqlalchemy import URL, Engine, create_engine
+from sqlalchemy import URL, Engine, create_engine, event
+from sqlalchemy.exc import InvalidatePoolError
 
 from services.optimizer.errors import StoreUnavailable
 
@@ -59,12 +61,31 @@ def postgresql_engine(
     given = own if isinstance(own, str) else " ".join(own)
     connect_args["options"] = " ".join([*(f"-c {k}={v}" for k, v in settings.items()), given])
     try:
-        # A connection that a restart of the server has cut is replaced before it is used.
-        return create_engine(url, connect_args=connect_args, pool_pre_ping=True, **options)
+        engine = create_engine(url, connect_args=connect_args, **options)
     except ModuleNotFoundError as error:
         raise StoreUnavailable(
             f"PostgreSQL needs {error.name}: install gaitswarm[postgres]"
         ) from error
+    _replace_cut_connections(engine)
+    return engine
+
+
+def _replace_cut_connections(engine: Engine) -> None:
+    """A connection that a restart of the server has cut is replaced before it is used.
+
+    The end of a connection comes to its socket, as do notices. So the server is asked whether it is
+    there only where something has come to a connection that was idle, and not each time.
+    """
+
+    @event.listens_for(engine, "checkout")
+    def _look(connection: Any, _record: object, _proxy: object) -> None:
+        poll = select.poll()
+        try:
+            poll.register(connection.fileno(), select.POLLIN)
+            if poll.poll(0):
+                engine.dialect.do_ping(connection)
+        except engine.dialect.loaded_dbapi.Error as error:
+            raise InvalidatePoolError from error
 
 
 def _session(lock_seconds: float, *, maintenance: bool) -> dict[str, int]:

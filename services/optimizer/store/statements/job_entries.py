@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime
 from functools import cached_property
@@ -93,16 +94,35 @@ _known: Final = WeakKeyDictionary[Engine, RowMemory["JobEntry"]]()
 _AT_ONCE: Final = 500
 """Jobs whose names are read by one statement."""
 
+_QUESTIONS: Final = 8
+"""Conditions on jobs for which the entries are remembered."""
+
+
+class _Memory:
+    """Entries by question, as long as nothing is committed. Whoever asks first reads for all."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self._version: Hashable = None
+        self._entries: dict[Hashable, Sequence[JobEntry]] = {}
+
+    def entries(self, connection: Connection) -> dict[Hashable, Sequence[JobEntry]]:
+        """What is known of what is committed by now; with the lock held."""
+        version = _version(connection)
+        if version != self._version:
+            self._version, self._entries = version, {}
+        return self._entries
+
+
 _REMEMBERED: Final = "gaitswarm_job_entries"
 
-_QUESTIONS: Final = 8
-"""Conditions on jobs for which a connection remembers the entries."""
+_of_servers: Final = WeakKeyDictionary[Engine, _Memory]()
 
 
 def job_entries(connection: Connection, among: Among, kind: str | None) -> Sequence[JobEntry]:
     """Read what jobs are found and sorted by.
 
-    Of SQLite a connection remembers it while nothing is committed to the file.
+    It is remembered while nothing is committed: to the file on SQLite, to the server on PostgreSQL.
 
     Args:
         connection: An open transaction that only reads.
@@ -115,26 +135,30 @@ def job_entries(connection: Connection, among: Among, kind: str | None) -> Seque
     query = _ENTRIES.where(*among)
     if kind is not None:
         query = query.where(spec_field(connection, "kind") == kind)
-    version = _version(connection)
-    if version is None:
-        return _read_all(connection, query)
-    before, known = connection.info.get(_REMEMBERED, (None, {}))
-    if before != version:
-        known = {}
-        connection.info[_REMEMBERED] = (version, known)
-    key = (among, kind)
-    if key not in known:
-        if len(known) >= _QUESTIONS:
-            known.clear()
-        known[key] = _read_all(connection, query)
-    found: Sequence[JobEntry] = known[key]
+    memory, key = _memory(connection), (among, kind)
+    with memory.lock:
+        known = memory.entries(connection)
+        found = known.get(key)
+        if found is None:
+            if len(known) >= _QUESTIONS:
+                known.clear()
+            found = known[key] = _read_all(connection, query)
     return found
 
 
-def _version(connection: Connection) -> tuple[int, int] | None:
-    """What is another after any commit to an SQLite file; None for other databases."""
+def _memory(connection: Connection) -> _Memory:
+    """Of the connection, or of all connections to a server."""
+    if connection.dialect.name == "sqlite":
+        found: _Memory = connection.info.setdefault(_REMEMBERED, _Memory())
+        return found
+    return _of_servers.setdefault(connection.engine, _Memory())
+
+
+def _version(connection: Connection) -> Hashable:
+    """What is another after any commit, to the same memory."""
     if connection.dialect.name != "sqlite":
-        return None
+        # The transactions that are seen; those that only read are none of them.
+        return str(connection.exec_driver_sql("SELECT pg_current_snapshot()::text").scalar_one())
     # The first counts what others have committed, the second what this connection has changed.
     others = connection.exec_driver_sql("PRAGMA data_version").scalar_one()
     driver: Any = connection.connection.driver_connection

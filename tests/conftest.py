@@ -8,7 +8,7 @@ from __future__ import annotations
 import gc
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,13 +25,33 @@ settings.register_profile("gaitswarm", deadline=None)
 settings.load_profile("gaitswarm")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the tests that start Ray clusters.
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Begin reading each folder elsewhere in every process of a test run.
 
-    The processes of a test run are dealt consecutive tests, so that one of them runs all of these:
-    two clusters at a time would wait for each other's processors until their time is out. And they
-    wait often, while the other processes compute.
+    Reading a test module for the first time, with its assertions rewritten, takes longer than all
+    else of it: each process finds most of them as another one has left them.
     """
+    report = yield
+    input_of_worker = getattr(collector.config, "workerinput", None)
+    if input_of_worker and isinstance(collector, pytest.Directory):
+        of_worker = int(input_of_worker["workerid"].removeprefix("gw"))
+        first = len(report.result) * of_worker // input_of_worker["workercount"]
+        report.result = report.result[first:] + report.result[:first]
+    return report
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Put tests into the order that all processes of a test run must agree on.
+
+    It begins with the tests that start Ray clusters. The processes are dealt consecutive tests, so
+    that one of them runs all of these: two clusters at a time would wait for each other's
+    processors until their time is out. And they wait often, while the other processes compute.
+    """
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: item.path.parts)
     items.sort(key=lambda item: item.path.parent.name != "worker")
 
 

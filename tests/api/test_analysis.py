@@ -9,7 +9,6 @@ import httpx2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import spearmanr
 
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.identification import IdentificationSpec
@@ -209,6 +208,8 @@ def test_a_ranking_by_another_preference_lists_both_places(
     # Particle 0 falls; the fitness of the others grows with their number and falls by iteration.
     ranked = [(100 - k + particle, particle) for k in range(3) for particle in (1, 2, 3)]
     before, after = zip(*ranked, strict=True)
+    from scipy.stats import spearmanr
+
     assert found["correlation"] == pytest.approx(spearmanr(before, after).statistic)
 
 

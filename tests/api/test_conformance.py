@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import Any
+from functools import cache
+from typing import Any, cast
 
 import pytest
 import schemathesis
+from fastapi.routing import iter_route_contexts
 from hypothesis import HealthCheck, Phase, settings
 from requests import Session
 from schemathesis.config import SchemathesisConfig
@@ -15,8 +17,10 @@ from schemathesis.core.parameters import ParameterLocation
 from schemathesis.core.result import Ok
 from schemathesis.generation.meta import CoveragePhaseData
 from schemathesis.pytest.lazy import get_all_tests
-from schemathesis.schemas import APIOperation
+from schemathesis.schemas import APIOperation, BaseSchema
 
+from api.app import create_app
+from gaitswarm.settings import Settings
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import open_store
 from tests.api.conformance import CHECKS, Found, schema_of, sequences, served
@@ -24,13 +28,13 @@ from tests.examples.api_document import api_document
 from tests.examples.servers import Server
 
 
+@cache
 def _document() -> dict[str, Any]:
     """The server's own, but for most kinds of specs, of which there are the document's examples.
 
     Making all cases of specs takes minutes. All kinds are read alike: cases are made of those that
     tune a drive where jobs are submitted, and of all by `python -m tests.api.conformance`.
     """
-    # The parameters of a test are needed before there is a server: the document is the same.
     document = api_document()
     models = document["components"]["schemas"]
     for path, made in (("/v1/jobs", "JobSpec"), ("/v1/estimates", "")):
@@ -40,9 +44,6 @@ def _document() -> dict[str, Any]:
         whole = [kind for name, kind in kinds.items() if name == made]
         content["schema"] = {"anyOf": [*whole, {"enum": examples}]}
     return document
-
-
-_DOCUMENT = _document()
 
 
 def _config() -> SchemathesisConfig:
@@ -55,13 +56,20 @@ def _config() -> SchemathesisConfig:
     return config
 
 
-_SCHEMA = schemathesis.openapi.from_dict(_DOCUMENT, config=_config())
-# Streams end with their jobs only, and are tested apart.
+@cache
+def _schema() -> BaseSchema:
+    schema = schemathesis.openapi.from_dict(_document(), config=_config())
+    schema.hook(filter_case)
+    return schema
+
+
+# Of the routes, as the document takes seconds, in every process that collects tests. Streams end
+# with their jobs only, and are tested apart.
 _OPERATIONS = [
-    f"{method.upper()} {path}"
-    for path, methods in _DOCUMENT["paths"].items()
-    for method, operation in methods.items()
-    if operation["operationId"] != "stream_events"
+    f"{method} {route.path}"
+    for route in iter_route_contexts(create_app(cast(JobService, None), settings=Settings()).routes)
+    if (route.path or "").startswith("/v1/") and route.name != "stream_events"
+    for method in sorted(route.methods or ())
 ]
 
 _SETTINGS = settings(
@@ -77,7 +85,6 @@ _NAMES = re.compile(r"Object with valid '(\w+)' value: ")
 _seen: set[object] = set()
 
 
-@_SCHEMA.hook
 def filter_case(_: schemathesis.HookContext, case: schemathesis.Case[Any]) -> bool:
     """Whether a case has something in it that none of its operation had before.
 
@@ -110,13 +117,13 @@ def _within_model(operation: APIOperation[Any, Any, Any, Any], location: str) ->
 
     The model's name is "" where the place is in none.
     """
-    body = _DOCUMENT["paths"][operation.path][operation.method]["requestBody"]["content"]
+    body = _document()["paths"][operation.path][operation.method]["requestBody"]["content"]
     node: Any = body["application/json"]["schema"]
     place: tuple[str, ...] = ("",)
     for step in location.split("/")[1:]:
         while isinstance(node, dict) and "$ref" in node:
             name = node["$ref"].rpartition("/")[2]
-            node, place = _DOCUMENT["components"]["schemas"][name], (name,)
+            node, place = _document()["components"]["schemas"][name], (name,)
         place = (*place, step)
         if isinstance(node, list):
             node = node[int(step)] if step.isdigit() else None
@@ -165,7 +172,7 @@ def test_every_answer_is_as_documented(operation: str, url: str) -> None:
     # Cases are made here: `schema.parametrize` makes those of all operations, which takes half a
     # minute, in every process that collects tests.
     (made,) = get_all_tests(
-        schema=_SCHEMA.include(name=operation),
+        schema=_schema().include(name=operation),
         test_func=is_as_documented,
         settings=_SETTINGS,
         given_kwargs={},
@@ -176,6 +183,16 @@ def test_every_answer_is_as_documented(operation: str, url: str) -> None:
     with Session() as connected:
         connected.trust_env = False
         send_all(url=url, connected=connected)
+
+
+@pytest.mark.slow
+def test_every_operation_of_the_document_is_among_them() -> None:
+    assert {
+        f"{method.upper()} {path}"
+        for path, methods in _document()["paths"].items()
+        for method, operation in methods.items()
+        if operation["operationId"] != "stream_events"
+    } == set(_OPERATIONS)
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest, spearmanr
 
 from services.optimizer.analysis.robustness.certificate import (
     Certificate,
@@ -37,6 +36,8 @@ def summary(values: list[list[float]], statuses: list[list[int]] | None = None) 
 @pytest.mark.parametrize(("count", "of"), [(0, 20), (3, 20), (20, 20), (1, 1000)])
 def test_intervals_of_proportions_are_exact(count: int, of: int) -> None:
     found = proportion(np.arange(of) < count)
+    from scipy.stats import binomtest
+
     expected = binomtest(count, of).proportion_ci(0.95, method="exact")
     assert (found.count, found.worlds, found.share) == (count, of, count / of)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high), rel=1e-9)
@@ -113,6 +114,8 @@ def test_what_goes_with_bad_worlds_is_named_by_rank_correlation() -> None:
     found = certificate(spec, columns(spec, np.stack([worth, worth], axis=1)))
     first = found.influences[0]
     assert first.name == "friction_factor"
+    from scipy.stats import spearmanr
+
     assert first.correlation == pytest.approx(spearmanr(friction, worth[1:]).statistic)
     assert -1.0 < first.low < first.correlation < first.high < -0.8
     sizes = [abs(influence.correlation) for influence in found.influences]

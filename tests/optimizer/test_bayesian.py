@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from services.optimizer.search.model.gaussian_process import GaussianProcess
 from services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, designs_asked, mixed_bowl
 
-pytest.importorskip("sklearn")
+pytestmark = pytest.mark.skipif(find_spec("sklearn") is None, reason="scikit-learn is missing")
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, differential_evolution
 
 from services.optimizer.tournament.functions import ACCEPTANCE, FUNCTIONS, BenchmarkFunction, draw
 from tests.examples.paths import ROOT
@@ -226,6 +225,8 @@ def test_the_minimum_is_reached_at_the_minimizer_by_every_draw(function: Benchma
 
 
 def test_nothing_is_found_below_the_minimum(function: BenchmarkFunction) -> None:
+    from scipy.optimize import Bounds, differential_evolution
+
     generator = np.random.default_rng(3)
 
     def population(x: Numbers) -> Any:

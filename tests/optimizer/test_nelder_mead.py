@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 
 from services.optimizer.search.local.nelder_mead import simplex_search
 from services.optimizer.search.local.walk import Axes, Floats, Point
@@ -28,6 +27,8 @@ def point(unit: Floats) -> Point:
 
 def test_the_path_is_that_of_scipys_adaptive_simplex() -> None:
     """The same vertices to begin with, the same number of evaluations, the same end."""
+    from scipy.optimize import minimize
+
     path: list[Floats] = []
 
     def record(x: Floats) -> float:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import binom, mannwhitneyu
 
 from services.optimizer.analysis.ratio import MedianInterval, median_interval, median_ratio
 
 
 def test_the_interval_of_ten_runs_lies_between_the_second_and_the_ninth() -> None:
+    from scipy.stats import binom
+
     found = median_interval([7.0, 1.0, 3.0, 10.0, 5.0, 2.0, 9.0, 4.0, 8.0, 6.0])
     assert (found.median, found.low, found.high) == (5.5, 2.0, 9.0)
     assert found.coverage == pytest.approx(1.0 - 2.0 * binom.cdf(1, 10, 0.5))
@@ -25,6 +26,8 @@ def test_the_ratio_is_the_median_of_all_ratios() -> None:
 
 
 def test_the_interval_of_a_ratio_is_that_of_mann_and_whitney() -> None:
+    from scipy.stats import mannwhitneyu
+
     """A factor is inside just where the exact test at 5 % does not reject it."""
     draws = np.random.default_rng(1)
     pi, fuzzy = draws.lognormal(0.3, 0.5, 8), draws.lognormal(0.0, 0.5, 10)

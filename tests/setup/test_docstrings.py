@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -28,11 +29,16 @@ FILES = (
 )
 """Without the API's routes, whose parameters are described to clients."""
 
-TREES = {
-    path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
-    for pattern in FILES
-    for path in ROOT.glob(pattern)
-}
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """All files, by path."""
+    return {
+        path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
+        for pattern in FILES
+        for path in ROOT.glob(pattern)
+    }
+
 
 ALGEBRA = "sim/kernel/dynamics/spatial.py"
 """Here a formula of its arguments says what a function does."""
@@ -67,16 +73,18 @@ def is_port(node: ast.ClassDef) -> bool:
     return any(isinstance(base, ast.Name) and base.id in ("Protocol", "ABC") for base in node.bases)
 
 
-PORTS = {
-    (method.name, name)
-    for tree in TREES.values()
-    for port in classes(tree)
-    if is_port(port)
-    for method in functions(port)
-    for name in arguments(method, is_method=True)
-    if is_listed(name, method)
-}
-"""Methods and arguments that a port documents, so that a line is enough for an implementation."""
+@cache
+def in_ports() -> set[tuple[str, str]]:
+    """Methods and arguments that a port documents: a line is enough for an implementation."""
+    return {
+        (method.name, name)
+        for tree in trees().values()
+        for port in classes(tree)
+        if is_port(port)
+        for method in functions(port)
+        for name in arguments(method, is_method=True)
+        if is_listed(name, method)
+    }
 
 
 def undocumented(function: Function, *, is_method: bool, is_algebra: bool) -> list[str]:
@@ -85,7 +93,7 @@ def undocumented(function: Function, *, is_method: bool, is_algebra: bool) -> li
     silent = [x for x in arguments(function, is_method=is_method) if not is_listed(x, function)]
     if text and "\n" not in text:
         if is_method:
-            return [name for name in silent if (function.name, name) not in PORTS]
+            return [name for name in silent if (function.name, name) not in in_ports()]
         if is_algebra:
             return [name for name in silent if not re.search(rf"\b{name}\b", text)]
     return silent
@@ -93,7 +101,7 @@ def undocumented(function: Function, *, is_method: bool, is_algebra: bool) -> li
 
 def test_every_argument_of_a_public_function_is_documented() -> None:
     silent = []
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         owners: list[ast.Module | ast.ClassDef] = [tree]
         owners += [node for node in classes(tree) if not node.name.startswith("_")]
         for owner in owners:
@@ -108,7 +116,7 @@ def test_every_argument_of_a_public_function_is_documented() -> None:
 def test_no_docstring_only_sends_its_reader_elsewhere() -> None:
     senders = [
         f"{path}: {node.name}"
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         for node in ast.walk(tree)
         if isinstance(node, Function | ast.ClassDef)
         and (ast.get_docstring(node) or "").startswith("See `")

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from sim.case import run_together
 from sim.controllers import ControllerName
@@ -290,6 +289,8 @@ def test_a_robot_begins_on_its_soles_however_it_is_tilted(robot: RobotSource) ->
     weight = (load_robot(robot).mass + 1.0) * GRAVITY
     assert log.foot_force[0, :, 2].sum() == pytest.approx(weight, rel=1e-9)
     roll, pitch = np.radians([4.0, -3.0])
+    from scipy.spatial.transform import Rotation
+
     turned = Rotation.from_quat(log.base_orientation[0]).apply([[0, 1, 0], [1, 0, 0]])
     assert turned[0, 2] == pytest.approx(math.cos(pitch) * math.sin(roll))
     assert turned[1, 2] == pytest.approx(-math.sin(pitch))

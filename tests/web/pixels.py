@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from io import BytesIO
 
-import matplotlib.image
 import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Locator
@@ -18,7 +17,9 @@ Image = NDArray[np.uint8]
 
 def pixels(element: Locator) -> Image:
     """An element as it is painted: (height, width, 3)."""
-    image = matplotlib.image.imread(BytesIO(element.screenshot()), format="png")
+    from matplotlib.image import imread
+
+    image = imread(BytesIO(element.screenshot()), format="png")
     return np.round(image[..., :3] * 255).astype(np.uint8)
 
 

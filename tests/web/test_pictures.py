@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import matplotlib.image
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
@@ -63,6 +62,8 @@ def test_pictures(
     part.screenshot(path=file, animations="disabled")
 
     assert file.stat().st_size < LARGEST_BYTES
-    image = matplotlib.image.imread(file)[..., :3]
+    from matplotlib.image import imread
+
+    image = imread(file)[..., :3]
     assert colours((image * 255).astype("uint8")) > 100
     assert (image.mean() > 0.5) == (scheme == "light")

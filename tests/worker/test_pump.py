@@ -11,7 +11,6 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
-import ray.exceptions
 
 from services.optimizer.run.evaluator import EvaluationStopped
 from services.worker.cluster import pump
@@ -28,9 +27,11 @@ SLOTS = 2
 class MadeUpRay:
     """Runs nothing: tasks end when a test says so."""
 
-    exceptions = ray.exceptions
-
     def __init__(self) -> None:
+        # Ray takes long to load, and is not when tests are collected.
+        from ray import exceptions
+
+        self.exceptions = exceptions
         self.sent: list[object] = []
         self.ended: set[object] = set()
         self.cancelled: dict[object, float] = {}
@@ -53,7 +54,7 @@ class MadeUpRay:
         return done, [reference for reference in references if reference not in self.ended]
 
     def get(self, reference: object) -> object:
-        raise ray.exceptions.TaskCancelledError
+        raise self.exceptions.TaskCancelledError
 
     def cancel(self, reference: object, *, force: bool) -> None:
         assert not force

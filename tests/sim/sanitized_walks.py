@@ -118,6 +118,14 @@ def digest_of_odd_batches(kernel: NativeKernel, robot: Robot) -> str:
     return digest.hexdigest()
 
 
+def digests(kernel: NativeKernel, robot: Robot) -> str:
+    """Of walks and of odd batches: what is compared with a build with sanitizers."""
+    # With backlash a walk has sixteen times as many steps.
+    scenarios = SCENARIOS[: 2 if robot.has_backlash else 6]
+    walks = digest_of_walks(kernel, robot, scenarios=scenarios)
+    return walks + digest_of_odd_batches(kernel, robot)
+
+
 BRIEFEST = {"cycles": 1.0, "cycle_time": 0.2}
 """Changes of a scenario that leave a hundred control ticks."""
 
@@ -125,7 +133,7 @@ BRIEFEST = {"cycles": 1.0, "cycle_time": 0.2}
 def sanitized_walks(name: str, precision: Precision) -> str:
     robot, kernel = ROBOTS[name], NativeKernel(ROBOTS[name], _sanitized_library())
     assert kernel.precision == precision
-    return digest_of_walks(kernel, robot) + digest_of_odd_batches(kernel, robot)
+    return digests(kernel, robot)
 
 
 def digest_of_tables(library: ctypes.CDLL | None) -> str:

@@ -17,10 +17,10 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page manual wheel bench test unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev page-if-possible
+.PHONY: help demo serve page manual wheel bench test test-firefox unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev page-if-possible
 
 help: ## Show this list.
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
 
 demo: setup page-if-possible ## Optimize the chapter-4 job (625 designs, six scenarios); compare with the thesis's optimum and swarm.
 	@$(BIN)/gaitswarm optimize --name "chapter 4, preference A" --particles 25 --iterations 25 \
@@ -52,6 +52,10 @@ test: setup-dev ## Run all tests; those of the page need node with npm, and Chro
 	@scripts/npm.sh --if-possible test
 	@scripts/page.sh --if-possible
 	@$(BIN)/python -m pytest $(WORKERS) $(ARGS)
+
+test-firefox: setup-dev page ## Go the page's main path in Firefox; installs Debian's where there is none.
+	@scripts/browser.sh firefox
+	@GAITSWARM_REQUIRE_FIREFOX=1 $(BIN)/python -m pytest tests/web/test_firefox.py $(ARGS)
 
 unit: setup-dev ## Run the fast tests only.
 	@$(BIN)/python -m pytest $(WORKERS) -m "not slow" $(ARGS)

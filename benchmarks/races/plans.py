@@ -57,9 +57,8 @@ PLANS: Final = {
     "chapter-4-anchors": Plan(ANCHORS, ROBOT, 5, 625),
     "chapter-4-local": Plan(LOCAL, ROBOT, 5, 625),
     "chapter-4-others": Plan(OTHERS, ROBOT, 5, 625),
-    "chapter-4-rivals": Plan(
-        ("pymoo-pso", "cma", "scipy-de", "optuna-cma-es", "optuna-tpe"), ROBOT, 5, 625
-    ),
+    "chapter-4-rivals": Plan(("pymoo-pso", "cma", "scipy-de", "optuna-cma-es"), ROBOT, 5, 625),
+    "chapter-4-tpe": Plan(("optuna-tpe",), ROBOT, 20, 625),
     "chapter-4-bayesian": Plan(("bayesian",), ROBOT, 3, 625),
     "chapter-4-long": Plan(
         ("cma-es", "de", "pso-ps", "tlbo", "pso-thesis", "pymoo-pso"), ROBOT, 5, 2500

@@ -9,9 +9,10 @@
 
    It asks Linux itself: a C library for another architecture takes a minute to build. */
 #include <sched.h>
+#include <time.h>
 
 enum { ARGUMENTS = 8, POINTERS = 1 << 16, SIZE = 1 << 28 };
-enum { READ = 63, WRITE = 64, EXIT = 93, YIELD = 124 };
+enum { READ = 63, WRITE = 64, EXIT = 93, CLOCK_GETTIME = 113, YIELD = 124 };
 
 typedef int64_t (*Function)(int64_t, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
 
@@ -37,8 +38,8 @@ static void pass(int64_t number, int64_t file, void *at, size_t size)
   }
 }
 
-/* What compilers call by themselves, and what the kernel's threads do while they wait. Volatile:
-   else a compiler sees in the loop what it is, and calls it. */
+/* What compilers call by themselves, what the kernel's threads do while they wait, and its clock.
+   Volatile: else a compiler sees in the loop what it is, and calls it. */
 void *memcpy(void *restrict to, const void *restrict from, size_t size)
 {
   for (size_t k = 0; k < size; k++) ((volatile char *)to)[k] = ((const char *)from)[k];
@@ -62,6 +63,11 @@ void *memset(void *to, int value, size_t size)
 }
 
 int sched_yield(void) { return (int)ask(YIELD, 0, 0, 0); }
+
+int clock_gettime(clockid_t clock, struct timespec *now)
+{
+  return (int)ask(CLOCK_GETTIME, clock, (int64_t)now, 0);
+}
 
 __attribute__((noreturn)) void _start(void)
 {

@@ -16,6 +16,8 @@ from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.rows.job_rows import JobDocuments
 from services.optimizer.store.rows.job_views import RowMemory
 from services.optimizer.store.sql_store import SqlStore, open_store
+from services.optimizer.store.statements import job_entries
+from services.optimizer.store.statements.job_entries import _Memory
 from tests.store.examples import completed, spec
 from tests.store.test_job_list import with_fitness
 
@@ -163,6 +165,18 @@ def test_of_all_who_ask_a_server_at_once_one_reads_the_jobs_that_are_sorted(
         asked = [threads.submit(store.jobs, order=JobOrder.NAME, search="a") for _ in range(8)]
         assert all(not future.result().items for future in asked)
     assert len(_whole_lists(sent)) == 1, sent
+
+
+def test_nobody_waits_long_for_another_that_reads_the_jobs(
+    store: SqlStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    created = store.create_job(spec(name="a"))[0]
+    memory = _Memory()
+    monkeypatch.setattr(job_entries, "_memory", lambda _: memory)
+    monkeypatch.setattr(job_entries, "_PATIENCE", 0.01)
+    with memory.lock:
+        assert [job.id for job in store.jobs(order=JobOrder.NAME).items] == [created.id]
+    assert [job.id for job in store.jobs(order=JobOrder.NAME).items] == [created.id]
 
 
 def _whole_lists(sent: list[tuple[str, Any]]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import select
+import selectors
 import socket
 from typing import Any, Final
 
@@ -79,11 +79,11 @@ def _replace_cut_connections(engine: Engine) -> None:
 
     @event.listens_for(engine, "checkout")
     def _look(connection: Any, _record: object, _proxy: object) -> None:
-        poll = select.poll()
         try:
-            poll.register(connection.fileno(), select.POLLIN)
-            if poll.poll(0):
-                engine.dialect.do_ping(connection)
+            with selectors.DefaultSelector() as selector:
+                selector.register(connection, selectors.EVENT_READ)
+                if selector.select(0):
+                    engine.dialect.do_ping(connection)
         except engine.dialect.loaded_dbapi.Error as error:
             raise InvalidatePoolError from error
 

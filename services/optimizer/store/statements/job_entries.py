@@ -97,6 +97,9 @@ _AT_ONCE: Final = 500
 _QUESTIONS: Final = 8
 """Conditions on jobs for which the entries are remembered."""
 
+_PATIENCE: Final = 1.0
+"""Seconds that are waited for entries that another thread reads."""
+
 
 class _Memory:
     """Entries by question, as long as nothing is committed. Whoever asks first reads for all."""
@@ -135,15 +138,20 @@ def job_entries(connection: Connection, among: Among, kind: str | None) -> Seque
     query = _ENTRIES.where(*among)
     if kind is not None:
         query = query.where(spec_field(connection, "kind") == kind)
-    memory, key = _memory(connection), (among, kind)
-    with memory.lock:
-        known = memory.entries(connection)
+    memory = _memory(connection)
+    # Whoever reads may wait for a server that is out of reach; that is not passed on.
+    if not memory.lock.acquire(timeout=_PATIENCE):
+        return _read_all(connection, query)
+    try:
+        known, key = memory.entries(connection), (among, kind)
         found = known.get(key)
         if found is None:
             if len(known) >= _QUESTIONS:
                 known.clear()
             found = known[key] = _read_all(connection, query)
-    return found
+        return found
+    finally:
+        memory.lock.release()
 
 
 def _memory(connection: Connection) -> _Memory:

@@ -19,12 +19,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 from benchmarks.large_store import fill
 from services.runtime import open_store
 from tests.examples.servers import ServerProcess
 from tests.web.chromium import ARGUMENTS, find_chromium
+from tests.web.pages import Pages
 from tests.web.visit import Visit
 
 _COUNT_PICTURES: Final = """() => {
@@ -39,9 +40,9 @@ _COUNT_PICTURES: Final = """() => {
 _PICTURES: Final = "() => { cancelAnimationFrame(window.counting); return window.pictures }"
 
 
-def first_view(browser: Browser, url: str, path: str, shown: str) -> dict[str, Any]:
+def first_view(pages: Pages, url: str, path: str, shown: str) -> dict[str, Any]:
     """One visit: seconds to what is looked for, bytes received until then."""
-    with Visit(browser, url) as visit:
+    with Visit(pages, url, fresh=True) as visit:
         begun = time.perf_counter()
         visit.page.goto(path, wait_until="commit")
         visit.page.locator(shown).first.wait_for()
@@ -92,12 +93,13 @@ def measure(url: str, job: str, rounds: int) -> dict[str, Any]:
     with sync_playwright() as playwright:
         path = str(find_chromium())
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        pages = Pages(browser)
         for name, (address, shown) in views.items():
-            runs = [first_view(browser, url, address, shown) for _ in range(rounds)]
+            runs = [first_view(pages, url, address, shown) for _ in range(rounds)]
             found[name] = {
                 key: statistics.median(run[key] for run in runs) for key in ("seconds", "kilobytes")
             }
-        with Visit(browser, url) as visit:
+        with Visit(pages, url, fresh=True) as visit:
             page = visit.go("/")
             page.locator("[data-job]").first.wait_for()
             found["scrolling the list"] = pictures(page, lambda: scroll(page))

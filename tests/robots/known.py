@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import Final
 
-import pytest
+from tests.examples import requirements
 
 FOLDER: Final = Path(sys.prefix) / "robots"
 """Where scripts/robots.sh puts the package's URDFs."""
-
-# Read here: the tests themselves see none of the user's settings.
-REQUIRED: Final = bool(os.environ.get("GAITSWARM_REQUIRE_ROBOTS"))
 
 QUADRUPEDS: Final = {
     "a1": "a1_description/urdf/a1.urdf",
@@ -37,9 +33,7 @@ BIPED: Final = "bolt_description/robots/bolt.urdf"
 def urdf_of(file: str) -> Path:
     """A file of the package; the test is skipped, or fails if it must run, where it is missing."""
     path = FOLDER / file
-    if not path.is_file():
-        said = "the URDFs of example-robot-data are missing: run scripts/robots.sh"
-        if REQUIRED:
-            pytest.fail(f"the tests of known robots must run here, but {said}")
-        pytest.skip(f"KNOWN ROBOTS ARE NOT TESTED: {said}")
+    requirements.ROBOTS.check(
+        "" if path.is_file() else "their URDFs are missing: run scripts/robots.sh"
+    )
     return path

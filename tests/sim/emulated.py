@@ -22,7 +22,7 @@ import pytest
 
 from sim.compiler.target import ARM, ARM_TARGET, Target, host_architecture
 from sim.compiler.toolchain import find_compiler
-from sim.kernel.compiled.native import Walker
+from sim.kernel.compiled.structures import Walker
 from tests.examples.paths import ROOT
 
 TOOLS: Final = Path(sys.prefix) / "cross"

@@ -14,10 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-# Read here: the tests themselves see none of the user's settings.
-REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_POSTGRES"))
+from tests.examples import requirements
 
 
 def postgres_binaries() -> Path | None:
@@ -31,25 +28,12 @@ def postgres_binaries() -> Path | None:
     return Path(on_path).parent if on_path else None
 
 
-def missing_postgres() -> str:
-    """What tests say that cannot have a server; "" where PostgreSQL is installed.
-
-    Raises pytest's failure where they must run, as in continuous integration.
-    """
-    if postgres_binaries() is not None:
-        return ""
-    missing = "PostgreSQL is not installed (Debian: apt install postgresql)"
-    if REQUIRED:
-        pytest.fail(f"the tests on PostgreSQL must run here, but {missing}")
-    return f"NOT TESTED ON POSTGRESQL: {missing}"
-
-
 def server_binaries() -> Path:
     """Folder of initdb and pg_ctl; skips the test where there is none, or fails it."""
-    missing = missing_postgres()
-    if missing:
-        pytest.skip(missing)
     binaries = postgres_binaries()
+    requirements.POSTGRES.check(
+        "" if binaries else "PostgreSQL is not installed (Debian: apt install postgresql)"
+    )
     assert binaries is not None
     return binaries
 

@@ -22,6 +22,7 @@ from services.optimizer.run.runner import Runner
 from services.optimizer.store.connections import postgresql
 from services.optimizer.store.connections.engine import Database, connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
+from tests.examples import requirements
 from tests.examples.jobs import Bits, history
 from tests.examples.paths import ROOT
 from tests.examples.processes import eventually
@@ -110,7 +111,7 @@ def test_a_crash_of_the_server_in_mid_run_changes_no_bit_of_a_history(
 def test_a_missing_server_fails_these_tests_where_they_must_run(
     required: bool, outcome: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tests.store.postgres_server.REQUIRED", required)
+    monkeypatch.setattr(requirements.POSTGRES, "must_run", required)
     monkeypatch.setattr("tests.store.postgres_server.postgres_binaries", lambda: None)
     with pytest.raises(outcome, match="PostgreSQL is not installed"):
         server_binaries()

@@ -14,6 +14,7 @@ from playwright.sync_api import sync_playwright
 from api.page import FOLDER, is_built
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
+from tests.examples import requirements
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import QUICK_EVENTS, Server, ServerProcess
 from tests.examples.walks import SHORT_WALK
@@ -22,7 +23,6 @@ from tests.web.pages import Pages
 from tests.web.visit import Visit
 
 # Read here: the tests themselves see none of the user's settings.
-REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_PAGE"))
 SCREENSHOTS = os.environ.get("GAITSWARM_SCREENSHOTS", "")
 
 HERE = Path(__file__).parent
@@ -40,15 +40,10 @@ SMALL_JOB: dict[str, Any] = SMALL_SPEC | {
 def _chromium() -> str:
     """Path of the browser; skips all tests of the page where browser or page are missing."""
     found = find_chromium()
-    missing = []
-    if found is None:
-        missing.append("Chromium is not installed (Debian: apt install chromium)")
-    if not is_built():
-        missing.append("the page is not built (make page)")
-    if missing and REQUIRED:
-        pytest.fail("the tests of the page must run here, but " + " and ".join(missing))
-    if missing:
-        pytest.skip("THE PAGE IS NOT TESTED: " + " and ".join(missing))
+    requirements.PAGE.check(
+        "" if found else "Chromium is not installed (Debian: apt install chromium)",
+        "" if is_built() else "the page is not built (make page)",
+    )
     return str(found)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from tests.examples import requirements
 from tests.examples.paths import ROOT
 from tests.examples.servers import ServerProcess
 
@@ -17,25 +17,17 @@ pytestmark = pytest.mark.slow
 MAIN_PATH = ROOT / "web" / "browsers" / "main-path.mjs"
 NAMES = ("firefox-esr", "firefox")
 
-# Read here: the tests themselves see none of the user's settings.
-REQUIRED = bool(os.environ.get("GAITSWARM_REQUIRE_FIREFOX"))
-
 
 @pytest.fixture
 def firefox() -> str:
     """Path of the browser; skips its tests where it, or what drives it, is missing."""
     found = next(filter(None, map(shutil.which, NAMES)), None)
-    missing = []
-    if found is None:
-        missing.append("Firefox is not installed (Debian: apt install firefox-esr)")
-    if shutil.which("node") is None:
-        missing.append("node is not installed (Debian: apt install nodejs)")
-    if not (ROOT / "web" / "node_modules" / "ws").is_dir():
-        missing.append("what drives Firefox is not installed (make page)")
-    if missing and REQUIRED:
-        pytest.fail("the page must be tested in Firefox here, but " + " and ".join(missing))
-    if missing:
-        pytest.skip("THE PAGE IS NOT TESTED IN FIREFOX: " + " and ".join(missing))
+    driver = ROOT / "web" / "node_modules" / "ws"
+    requirements.FIREFOX.check(
+        "" if found else "Firefox is not installed (Debian: apt install firefox-esr)",
+        "" if shutil.which("node") else "node is not installed (Debian: apt install nodejs)",
+        "" if driver.is_dir() else "what drives Firefox is not installed (make page)",
+    )
     return str(found)
 
 

@@ -9,18 +9,23 @@ import threading
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.compiler.compilation import load_library
 from sim.compiler.target import Target
-from sim.controllers.base import ControlLaw, JointPd, LookupTable, Response
-from sim.errors import KernelBuildError, SimulationInputError
+from sim.errors import KernelBuildError
 from sim.kernel.compiled.derivation import derived_source
 from sim.kernel.compiled.lanes import plan_lanes
-from sim.kernel.compiled.sharing import STRUCTURES, Pool
+from sim.kernel.compiled.sharing import SHARED_STRUCTURES, Pool
+from sim.kernel.compiled.structures import (
+    STRUCTURES,
+    Addresses,
+    CodingStructure,
+    SensorErrorsStructure,
+    Walker,
+)
 from sim.kernel.dynamics.kinds import robot_constants
 from sim.kernel.emitted.source import kernel_identity
 from sim.kernel.gains import check_gains
@@ -36,142 +41,7 @@ from sim.kernel.walk import (
 from sim.outcome import Status
 from sim.robot import Robot
 
-Floats = NDArray[np.float64]
-
-
-class _Coding(ctypes.Structure):
-    _fields_ = [
-        ("angle_counts", ctypes.c_double),
-        ("current_counts", ctypes.c_double),
-        ("duty_per_count", ctypes.c_double),
-        ("angle_step", ctypes.c_int64),
-        ("current_step", ctypes.c_int64),
-        ("pwm_step", ctypes.c_int64),
-        ("pwm_counts", ctypes.c_int64),
-        ("substeps", ctypes.c_int64),
-        ("refinement", ctypes.c_int64),
-        ("inner_ticks", ctypes.c_int64),
-        ("robot", ctypes.c_void_p),
-    ]
-
-
-class _Table(ctypes.Structure):
-    _fields_ = [
-        ("values", ctypes.c_void_p),
-        ("n_error", ctypes.c_int64),
-        ("n_current", ctypes.c_int64),
-        ("n_velocity", ctypes.c_int64),
-        ("error_gain", ctypes.c_int64),
-        ("current_gain", ctypes.c_int64),
-        ("velocity_gain", ctypes.c_int64),
-        ("output_gain", ctypes.c_int64),
-    ]
-
-
-class _Law(ctypes.Structure):
-    _fields_ = [
-        ("proportional_gain", ctypes.c_int64),
-        ("integral_gain", ctypes.c_int64),
-        ("derivative_gain", ctypes.c_int64),
-        ("direct", _Table),
-        ("integrated", _Table),
-        ("stiffness", ctypes.c_double),
-        ("damping", ctypes.c_double),
-        ("feed_forward", ctypes.c_double),
-    ]
-
-
-class _SensorErrors(ctypes.Structure):
-    _fields_ = [
-        ("noise", 2 * ctypes.c_double),
-        ("delay", 2 * ctypes.c_int64),
-        ("seed", ctypes.c_uint64),
-    ]
-
-
-class Walker(ctypes.Structure):
-    """A walk as the kernel reads it, with where its results go and what they are."""
-
-    _fields_ = [
-        ("q0", ctypes.c_void_p),
-        ("internal_state", ctypes.c_void_p),
-        ("parameters", ctypes.c_void_p),
-        ("desired", ctypes.c_void_p),
-        ("disturbance", ctypes.c_void_p),
-        ("feed_forward", ctypes.c_void_p),
-        ("sensors", _SensorErrors),
-        ("shove", 2 * ctypes.c_int64),
-        ("law", _Law),
-        ("ticks", ctypes.c_int64),
-        ("fall_height", ctypes.c_double),
-        ("fall_cosine", ctypes.c_double),
-        ("smoothing", 2 * ctypes.c_double),
-        ("sums", ctypes.c_void_p),
-        ("end", ctypes.c_void_p),
-        ("log", ctypes.c_void_p),
-        ("peak_current", ctypes.c_double),
-        ("status", ctypes.c_int64),
-    ]
-
-
-_STRUCTURES: Final = {"coding": _Coding, "table": _Table, "walker": Walker, **STRUCTURES}
-"""By their names in the library's functions that tell their sizes."""
-
-
 _CODED: Final = tuple(field.name for field in dataclasses.fields(Coding))
-
-
-class _Addresses:
-    """Addresses of arrays, which stay where they are as long as this object lives.
-
-    Walks share most of them: those of a scenario all but the law, those of a design the law.
-    """
-
-    def __init__(self) -> None:
-        self._arrays: dict[int, tuple[int, NDArray[Any], NDArray[Any]]] = {}
-        self._laws: dict[int, tuple[_Law, ControlLaw]] = {}
-
-    def of(self, array: NDArray[Any], dtype: Any) -> int:
-        """An array is always asked for with the same dtype."""
-        known = self._arrays.get(id(array))
-        if known is None:
-            contiguous = np.ascontiguousarray(array, dtype=dtype)
-            known = int(contiguous.ctypes.data), contiguous, array
-            self._arrays[id(array)] = known
-        return known[0]
-
-    def if_any(self, array: Floats | None) -> int | None:
-        return None if array is None else self.of(array, np.float64)
-
-    def law(self, law: ControlLaw) -> _Law:
-        known = self._laws.get(id(law))
-        if known is None:
-            packed = _Law(
-                law.proportional_gain,
-                law.integral_gain,
-                law.derivative_gain,
-                self._table(law.direct),
-                self._table(law.integrated),
-                *dataclasses.astuple(law.joint_pd or JointPd()),
-            )
-            known = self._laws[id(law)] = packed, law
-        return known[0]
-
-    def _table(self, table: Response | None) -> _Table:
-        if table is None:
-            return _Table()
-        if not isinstance(table, LookupTable):
-            raise SimulationInputError(
-                "the native kernel runs tables only; an inference needs backend='reference'"
-            )
-        return _Table(
-            self.of(table.values, np.int8),
-            *table.values.shape,
-            table.error_gain,
-            table.current_gain,
-            table.velocity_gain,
-            table.output_gain,
-        )
 
 
 class NativeKernel:
@@ -203,9 +73,8 @@ class NativeKernel:
 
     def _check(self, robot: str) -> None:
         """What is passed across the border must mean the same on both sides."""
-        sizes = {
-            f"size_of_{name}": ctypes.sizeof(structure) for name, structure in _STRUCTURES.items()
-        }
+        structures = STRUCTURES | SHARED_STRUCTURES
+        sizes = {f"size_of_{name}": ctypes.sizeof(kind) for name, kind in structures.items()}
         sizes |= {
             "joints": self._joints,
             "parameters": self.layout.size,
@@ -257,7 +126,7 @@ class NativeKernel:
         sums, end = np.empty((n, self._integrands)), np.empty((n, 7 + self._joints))
         logs = [np.full((s.ticks, self._log_width), np.nan) if log else None for s in setups]
         walkers = (Walker * n)()
-        addresses = _Addresses()
+        addresses = Addresses()
         sums_at, end_at = int(sums.ctypes.data), int(end.ctypes.data)
         order = _order(tuple(setup.ticks for setup in setups), self.lanes)
         for walker, k in zip(walkers, order, strict=True):
@@ -269,7 +138,7 @@ class NativeKernel:
             walker.disturbance = addresses.if_any(setup.disturbance)
             walker.feed_forward = addresses.if_any(setup.feed_forward)
             errors = setup.sensors
-            walker.sensors = _SensorErrors(errors.scales, errors.delays, errors.seed)
+            walker.sensors = SensorErrorsStructure(errors.scales, errors.delays, errors.seed)
             walker.shove[:] = setup.shove_ticks
             walker.law = addresses.law(setup.control_law)
             walker.ticks = setup.ticks
@@ -280,7 +149,7 @@ class NativeKernel:
             walker.end = end_at + k * end.strides[0]
             walker.log = None if record is None else record.ctypes.data
         coded = (getattr(coding, name) for name in _CODED)
-        packed = _Coding(*coded, self._constants.ctypes.data)
+        packed = CodingStructure(*coded, self._constants.ctypes.data)
         # Somebody waits for a log, as a rule: it is not held up by other walks.
         pool = Pool(self._library) if log else self._pools.setdefault(coding, Pool(self._library))
         use, waited = pool.walk(walkers, packed, (addresses, sums, end, logs))

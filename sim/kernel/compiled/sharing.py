@@ -33,7 +33,7 @@ class LaneCounts(ctypes.Structure):
     _fields_ = [(name, ctypes.c_int64) for name in ("walked", "computed", "timed", "control")]
 
 
-STRUCTURES: Final = {"call": _Call, "pool": _Pool, "lane_use": LaneCounts}
+SHARED_STRUCTURES: Final = {"call": _Call, "pool": _Pool, "lane_use": LaneCounts}
 """By their names in the library's functions that tell their sizes."""
 
 

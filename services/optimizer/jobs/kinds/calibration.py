@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field, model_validator
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.design_space import DesignSpace
 from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.kinds.misfit import difference, quantity, root_mean_square
+from services.optimizer.jobs.kinds.misfit import difference, reached, root_mean_square
 from services.optimizer.jobs.spec import Spec
 from sim.calibration.catalogue import robot_variables, varied_robot, walk_variables
 from sim.calibration.targets import QUANTITIES, Target, TargetWalk
@@ -299,14 +299,8 @@ class CalibrationSpec(Spec):
         Returns:
             (n, T) values of `targets`, in their units, NaN where a walk failed.
         """
-        of_walk, columns = self.layout().of_walk, []
-        for target in self.targets:
-            values = _of_walk(target, objectives, failed, of_walk[target.walk])
-            if target.relative_to is not None:
-                other = _of_walk(target, objectives, failed, of_walk[target.relative_to])
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    values = values / other
-            columns.append(values)
+        of_walk = self.layout().of_walk
+        columns = [reached(target, objectives, failed, of_walk) for target in self.targets]
         return np.stack(columns, axis=1)
 
     def differences(self, simulated: Floats) -> Floats:
@@ -394,9 +388,3 @@ class CalibrationSpec(Spec):
 
 def _is_nan(value: float | None) -> bool:
     return value is not None and math.isnan(value)
-
-
-def _of_walk(
-    target: Target, objectives: Floats, failed: NDArray[np.bool_], cases: tuple[int, ...]
-) -> Floats:
-    return quantity(target.quantity, objectives[:, cases], failed[:, cases])

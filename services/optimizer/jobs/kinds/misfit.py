@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from services.optimizer.jobs.preference import (
     figure_of_merit,
     judge,
 )
-from sim.calibration.targets import QUANTITIES, QuantityName, Target
+from sim.calibration.targets import QUANTITIES, Target
 from sim.calibration.walk import RESULTS
 
 Floats = NDArray[np.float64]
@@ -22,20 +23,35 @@ Floats = NDArray[np.float64]
 _COLUMNS: Final = {result.name: column for column, result in enumerate(RESULTS)}
 
 
-def quantity(name: QuantityName, results: Floats, failed: NDArray[np.bool_]) -> Floats:
-    """What designs come to in one walk.
+def reached(
+    target: Target,
+    objectives: Floats,
+    failed: NDArray[np.bool_],
+    of_walk: Mapping[str, Sequence[int]],
+) -> Floats:
+    """What designs come to where a target is set.
 
     Args:
-        name: of the quantity.
-        results: (n, k, m) raw results in the walk's k scenarios, in their units.
-        failed: (n, k), true for a scenario without a result.
+        target: which quantity of which walk, and relative to which other one, if to any.
+        objectives: (n, K, m) raw results of walks, in their units.
+        failed: (n, K), true for a walk without a result.
+        of_walk: indices of a walk's cases among the K, by the walk's name.
 
     Returns:
-        (n,) values, NaN where any scenario failed.
+        (n,) values, NaN where any of a walk's cases failed.
     """
-    values = _of_all(name, results, failed)
-    values[failed.any(axis=1)] = np.nan
-    return values
+
+    def of(walk: str) -> Floats:
+        cases = list(of_walk[walk])
+        values = _of_all(target.quantity, objectives[:, cases], failed[:, cases])
+        values[failed[:, cases].any(axis=1)] = np.nan
+        return values
+
+    values = of(target.walk)
+    if target.relative_to is None:
+        return values
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return values / of(target.relative_to)
 
 
 def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:

@@ -19,6 +19,13 @@ from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
 
+PASTE = """(field, text) => {
+  const clipboardData = new DataTransfer()
+  clipboardData.setData('text', text)
+  const how = { clipboardData, cancelable: true, bubbles: true }
+  field.dispatchEvent(new ClipboardEvent('paste', how))
+}"""
+
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -68,6 +75,10 @@ def test_a_log_is_uploaded_read_and_identified_from(
     field.fill(recording)
     expect(page.get_by_text("Nothing fits.")).to_be_visible()
     field.press("Escape")
+    page.get_by_role("button", name=f"Remove {recording[:12]}").click()
+    expect(chosen).to_have_count(0)
+    field.evaluate(PASTE, f"{recording}\n{recording}")
+    expect(chosen).to_have_count(1)
 
     page.get_by_label("Parameters").fill("body_mass=3:5, battery_voltage")
     page.get_by_label("Particles").fill("4")

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest'
 import type { OptimizerPreset, RecordingView } from '../src/api/types'
 import { EMPTY_FIT, errorsByPart } from '../src/submission/fit/fit'
-import { choiceOf } from '../src/submission/fit/found-recordings'
+import { choiceOf, idsIn } from '../src/submission/fit/found-recordings'
 import { identificationSpec } from '../src/submission/fit/identification'
 import { emptyWalk, measuredRequest, walkErrors } from '../src/submission/fit/measured-walk'
 import { calibrationSpec, nextKey, withRecordings } from '../src/submission/fit/targets'
@@ -18,6 +18,15 @@ test('a kept recording is offered by what it is of, and refused if it cannot be 
   const broken = choiceOf({ ...kept, ...nothing, rate: 500, synthetic: false })
   expect(broken.refused).toContain('cannot be read')
 })
+
+test.each([
+  ['one', 'a'.repeat(32), ['a'.repeat(32)]],
+  ['as JSON', `["${'a'.repeat(32)}", "${'b'.repeat(32)}"]`, ['a'.repeat(32), 'b'.repeat(32)]],
+  ['one twice, by lines', `${'0'.repeat(32)}\n${'0'.repeat(32)}\n`, ['0'.repeat(32)]],
+  ['with a word between', `${'a'.repeat(32)} and ${'b'.repeat(32)}`, []],
+  ['cut short', 'a'.repeat(12), []],
+  ['none', ' ', []],
+])('ids of recordings are pasted: %s', (_, text, ids) => expect(idsIn(text)).toEqual(ids))
 
 const METHODS = [
   { settings: { name: 'pso', particles: 25 } },

@@ -27,6 +27,8 @@ interface Props {
   /** Finds on the server, under a heading. */
   readonly found?: { readonly label: string; readonly search: Search }
   readonly onChoose: (value: string) => void
+  /** Takes what is pasted; false where it is to be searched for, as what is typed. */
+  readonly onPaste?: (text: string) => boolean
 }
 
 export function Combobox({
@@ -38,6 +40,7 @@ export function Combobox({
   groups = [],
   found,
   onChoose,
+  onPaste,
 }: Props) {
   const id = useId()
   const [open, setOpen] = useState(false)
@@ -143,6 +146,11 @@ export function Combobox({
             setAt(0)
           }}
           onKeyDown={press}
+          onPaste={(event) => {
+            if (!onPaste?.(event.clipboardData?.getData('text') ?? '')) return
+            event.preventDefault()
+            close()
+          }}
         />
         {/* biome-ignore lint/a11y/noStaticElementInteractions: a press must not take the focus */}
         <div class="choices" hidden={!open} onMouseDown={(event) => event.preventDefault()}>

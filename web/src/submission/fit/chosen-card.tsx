@@ -6,7 +6,7 @@ import { ChosenList } from '../../components/chosen-list'
 import { Combobox } from '../../components/combobox'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { formatNumber } from '../../format/number'
-import { foundRecordings, shortId } from './found-recordings'
+import { foundRecordings, idsIn, shortId } from './found-recordings'
 
 export function ChosenCard({
   ids,
@@ -40,7 +40,13 @@ export function ChosenCard({
           shown=""
           placeholder="scenario, controller or id"
           found={{ label: 'Recordings, the newest first', search: foundRecordings(ids) }}
+          hint="Ids of several can be pasted at once."
           onChoose={(id) => onChange([...ids, id])}
+          onPaste={(text) => {
+            const pasted = idsIn(text).filter((id) => !ids.includes(id))
+            if (pasted.length > 0) onChange([...ids, ...pasted])
+            return pasted.length > 0
+          }}
         />
       </div>
     </section>

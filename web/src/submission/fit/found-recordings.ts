@@ -9,9 +9,18 @@ import { formatMoment } from '../../format/time'
 /** Recordings of one page of the picker. */
 const PAGE = 20
 
+/** Of a recording, in full. */
+const ID = /^[0-9a-f]{32}$/
+
 /** As much of an id as is shown. */
 export function shortId(id: string): string {
   return id.slice(0, 12)
+}
+
+/** The ids that a text consists of, each once; none if there is anything else in it. */
+export function idsIn(text: string): string[] {
+  const words = text.split(/[\s,;"'[\]]+/).filter((word) => word !== '')
+  return words.every((word) => ID.test(word)) ? [...new Set(words)] : []
 }
 
 /** without: ids of recordings that are not offered. */

@@ -47,6 +47,7 @@ class Plan:
 
 ROBOT: Final = ("chapter-4.A", "chapter-4.B", "chapter-4.C")
 CHAPTER_3: Final = ("chapter-3.pi", "chapter-3.fuzzy-pi")
+BETWEEN: Final = ("chapter-3.fuzzy-pi-fixed-gait", "chapter-4.A-straight", "chapter-4.A-gait")
 FUNCTION: Final = ("D7C0R0I1",)
 GLOBALS: Final = ("global-unirandi", "global-nelder-mead", "global-bfgs")
 ANCHORS: Final = ("cma-es", "pso", "pso-thesis", "random")
@@ -64,6 +65,7 @@ PLANS: Final = {
         ("cma-es", "de", "pso-ps", "tlbo", "pso-thesis", "pymoo-pso"), ROBOT, 5, 2500
     ),
     "chapter-3": Plan(("cma-es", "de", "pso-ps", "pso-thesis", "tlbo"), CHAPTER_3, 20, 625),
+    "between": Plan(("cma-es", "de"), BETWEEN, 20, 625),
     "function": Plan(
         (*ANCHORS, *LOCAL, *OTHERS, "pymoo-pso", "scipy-de", "cma"), FUNCTION, 30, 5000
     ),

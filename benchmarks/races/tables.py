@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.races.plans import CHAPTER_3, FUNCTION, PLANS, ROBOT
+from benchmarks.races.plans import BETWEEN, CHAPTER_3, FUNCTION, PLANS, ROBOT
 from benchmarks.races.records import EARLIER, Record
 from benchmarks.races.statistics import (
     MEASURE,
@@ -61,6 +61,7 @@ def all_tables(records: Iterable[Record], earlier: Path = EARLIER) -> list[str]:
     for problems, budget, looked_at in (
         (ROBOT, _LONG, (625, 1250, 2500)),
         (CHAPTER_3, _BUDGET, _LOOKED_AT),
+        (BETWEEN, _BUDGET, _LOOKED_AT),
     ):
         if results := results_of(records, problems, budget):
             found.append(medians_table(medians_of(results, looked_at), problems, looked_at))

@@ -79,14 +79,26 @@ class Size:
         return looked_at(self.evaluations)
 
 
+_CHAPTER_3: Final = {"preference": "chapter-3", "scenarios": ["straight"]}
+
 _ROBOT: Final[dict[str, dict[str, Any]]] = {
     **{f"chapter-4.{name}": {"controller": "fuzzy-pi", "preference": name} for name in "ABC"},
-    "chapter-3.pi": {"controller": "pi", "preference": "chapter-3"},
-    "chapter-3.fuzzy-pi": {"controller": "fuzzy-pi-3", "preference": "chapter-3"},
+    "chapter-3.pi": {"controller": "pi", **_CHAPTER_3},
+    "chapter-3.fuzzy-pi": {"controller": "fuzzy-pi-3", **_CHAPTER_3},
 }
-"""Jobs that tune the robot's drive; those of chapter 3 walk straight, and search the gait, too."""
+"""Jobs that tune the robot's drive."""
 
-PROBLEMS: Final = (*FUNCTIONS, *_ROBOT)
+_BETWEEN: Final[dict[str, dict[str, Any]]] = {
+    "chapter-3.fuzzy-pi-fixed-gait": _ROBOT["chapter-3.fuzzy-pi"],
+    "chapter-4.A-straight": {**_ROBOT["chapter-4.A"], "scenarios": ["straight"]},
+    "chapter-4.A-gait": _ROBOT["chapter-4.A"],
+}
+"""Jobs that differ from one of those in one thing only: for questions of what it matters for."""
+
+_SEARCHING_GAIT: Final = {"chapter-3.pi", "chapter-3.fuzzy-pi", "chapter-4.A-gait"}
+"""Jobs in which the gait is searched beside the controller."""
+
+PROBLEMS: Final = (*FUNCTIONS, *_ROBOT, *_BETWEEN)
 """Names of all problems."""
 
 
@@ -207,9 +219,9 @@ def _is_installed(name: str) -> bool:
 def _problem(name: str, precision: str) -> dict[str, Any]:
     if name in FUNCTIONS:
         return {"function": name}
-    job: dict[str, Any] = {**_ROBOT[name], "precision": precision}
-    if name.startswith("chapter-3"):
-        searching = JobSpec.model_validate({**job, "scenarios": ["straight"]}).with_gait_searched()
+    job: dict[str, Any] = {**(_ROBOT | _BETWEEN)[name], "precision": precision}
+    if name in _SEARCHING_GAIT:
+        searching = JobSpec.model_validate(job).with_gait_searched()
         job = searching.model_dump(exclude={"optimizer", "iterations", "seed", "start"})
     return {"name": name, "job": job}
 

@@ -5,13 +5,14 @@ Commands import what they need when they run, so that `gaitswarm --help` answers
 
 from __future__ import annotations
 
+import gc
 import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from copy import copy
 from functools import cache
-from typing import Annotated, Any, TextIO, cast
+from typing import Annotated, Any, Final, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
@@ -178,9 +179,15 @@ for _module in (
 
 def main() -> None:
     """Entry point of the console script."""
+    gc.set_threshold(*_COLLECTED)
     replace_closed_streams()
     warnings_as_notes()
     sys.exit(run(sys.argv[1:]))
+
+
+_COLLECTED: Final = (5_000, 10, 20)
+"""When objects in cycles are looked for, as of `gc.set_threshold`. A search among all stops every
+thread of a server for a tenth of a second, and Python's own setting has one every few seconds."""
 
 
 @cache

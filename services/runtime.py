@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from services.optimizer.analysis.reference import note_reference
 from services.optimizer.deletion import Housekeeping
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from services.monitoring.tracing import Tracing
 
 
+_NICENESS: Final = 10
+"""Of walks beside a server: people wait for its answers."""
+
+
 def open_evaluator(
     kind: EvaluatorKind = "ray",
     *,
@@ -40,6 +44,7 @@ def open_evaluator(
     cpus: int | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     patient: bool = False,
+    niceness: int = 0,
 ) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
     """Open workers for walks.
 
@@ -51,6 +56,7 @@ def open_evaluator(
         cpus: Walks to compute at once on this machine; all of its cores by default.
         should_stop: Polled several times a second while a cluster is connected.
         patient: Whether a cluster that is away is waited for by whoever wants walks of it.
+        niceness: Of walks in threads of this process, as for `InProcessEvaluator`.
 
     Returns:
         The workers; whoever opens them closes them.
@@ -67,9 +73,9 @@ def open_evaluator(
             field="ray_address",
         )
     if kind == "in-process":
-        return InProcessEvaluator(cpus)
+        return InProcessEvaluator(cpus, niceness=niceness)
     if address is None:
-        return HybridEvaluator(cpus)
+        return HybridEvaluator(cpus, niceness=niceness)
     cluster = RayEvaluator(address, cpus=cpus)
     if patient:
         cluster.stay_connected(should_stop)
@@ -184,7 +190,12 @@ def open_runtime(
             yield Runtime(service, None, None)
             return
         workers = open_evaluator(
-            evaluator, address=ray_address, cpus=cpus, should_stop=should_stop, patient=True
+            evaluator,
+            address=ray_address,
+            cpus=cpus,
+            should_stop=should_stop,
+            patient=True,
+            niceness=_NICENESS,
         )
         stack.callback(workers.close)
         if metrics is not None:

@@ -1,7 +1,8 @@
 """Latency of the API before a large store, and what a running job loses by it.
 
     python -m benchmarks.load [--databases sqlite postgresql] [--store jobs.db] [--quick]
-        [--pairs 8] [--seconds 20] [--slots 2] [--apart] [--rate 100] [--streams 200] [--json]
+        [--pairs 8] [--seconds 20] [--slots 2] [--apart] [--evaluator ray] [--rate 100]
+        [--streams 200] [--json]
 
 A store of a million evaluations is filled, served by `gaitswarm serve` on SQLite, and then on a
 PostgreSQL server. A job runs, alone and under load in turns: requests are due at a fixed rate,
@@ -20,12 +21,13 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from benchmarks.load.filled import fill_with
 from benchmarks.load.trial import Found, Load, run
 from services.optimizer.store.schema.backup import backup, restore
 from services.runtime import open_store
+from services.worker import EvaluatorKind
 from tests.store.postgres_server import postgres_server, server_binaries
 
 
@@ -126,6 +128,9 @@ def main() -> None:
     parser.add_argument("--streams", type=int, default=usual.streams)
     parser.add_argument("--slots", type=int, default=usual.slots, help="of the job; 0: no job")
     parser.add_argument("--apart", action="store_true", help="the job runs in another process")
+    parser.add_argument(
+        "--evaluator", choices=get_args(EvaluatorKind), default=usual.evaluator, help="of the job"
+    )
     parser.add_argument("--quick", action="store_true", help="a small store, two short windows")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
@@ -138,6 +143,7 @@ def main() -> None:
         pairs=options.pairs,
         slots=options.slots,
         apart=options.apart,
+        evaluator=options.evaluator,
     )
 
     def say(line: str) -> None:

@@ -76,11 +76,16 @@ async def ask_at_rate(
 
     async def ask(kind: str, text: bytes, due: float) -> None:
         async with free:
-            connection = idle.pop() if idle else Connection(target)
             status, length = 0, 0
-            with suppress(OSError, EOFError):
-                status, length = await connection.ask(text)
-                idle.append(connection)
+            while status == 0:
+                kept = bool(idle)
+                connection = idle.pop() if kept else Connection(target)
+                with suppress(OSError, EOFError):
+                    status, length = await connection.ask(text)
+                    idle.append(connection)
+                # As browsers do: the server ends a connection that was idle for long.
+                if not kept:
+                    break
             answers.append(Answer(kind, time.perf_counter() - due, status, length))
 
     async with asyncio.timeout(seconds + _PATIENCE), asyncio.TaskGroup() as group:

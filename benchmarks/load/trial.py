@@ -17,6 +17,7 @@ import httpx2
 import numpy as np
 
 from benchmarks.load.client import Answer, Streams, Target, ask_at_rate
+from services.worker import EvaluatorKind
 from tests.examples.processes import COMMAND_LINE, line_with, start_python
 from tests.examples.servers import ServerProcess
 
@@ -24,6 +25,9 @@ T = TypeVar("T")
 
 _JOB: Final = {"name": "measured", "iterations": 1_000_000, "optimizer": "pso-thesis"}
 """The thesis's swarm: 25 designs an iteration in six scenarios."""
+
+_BEGUN: Final[dict[EvaluatorKind, int]] = {"in-process": 10, "ray": 40}
+"""Iterations of the job before anything is measured: then Ray has long taken over."""
 
 _SETTLE: Final = 2.0
 """Between windows [s]."""
@@ -45,6 +49,7 @@ class Load:
         pairs: Windows under load, and as many without.
         slots: Walks that are computed at once; 0: no job is run.
         apart: Whether a runner in a process of its own runs the job, in place of the server's.
+        evaluator: Where it walks: in threads of that process, or on Ray once it has begun there.
         seed: Of what is asked for.
     """
 
@@ -54,6 +59,7 @@ class Load:
     pairs: int = 8
     slots: int = 2
     apart: bool = False
+    evaluator: EvaluatorKind = "ray"
     seed: int = 1
 
 
@@ -107,7 +113,7 @@ def run(database: str, load: Load, say: Callable[[str], None] = lambda _: None) 
         wanted = requests_to(server.client, target, np.random.default_rng(load.seed))
         job, idle = server.submit(_JOB), waiting_jobs(server.client)
         if load.slots:
-            _wait_for_iterations(server, job, 10)
+            _wait_for_iterations(server, job, _BEGUN[load.evaluator])
         trial = _Trial(server, target, wanted, [job, *idle] if load.slots else idle, load)
         # Code that is loaded with the first request of a kind is no part of it.
         asyncio.run(ask_at_rate(target, wanted, per_second=load.per_second, seconds=_SETTLE))
@@ -131,7 +137,7 @@ def run(database: str, load: Load, say: Callable[[str], None] = lambda _: None) 
 
 def _serve(database: str, load: Load, opened: ExitStack) -> ServerProcess:
     environment = {"GAITSWARM_CPUS": str(load.slots or 1), "GAITSWARM_CONCURRENT_JOBS": "1"}
-    runs = ("--evaluator", "in-process")
+    runs = ("--evaluator", load.evaluator)
     alone = load.apart or not load.slots
     options = ("--no-runner",) if alone else runs
     server = ServerProcess(database, *options, environment=environment)

@@ -39,17 +39,22 @@ class HybridEvaluator:
     Args:
         cpus: Walks to compute at once; all processors by default.
         long_job_seconds: Ray is started for a job that is expected to take longer yet [s].
+        niceness: Of the threads, as for `InProcessEvaluator`; Ray's workers have one of their own.
 
     Raises:
         ValueError: cpus is less than 1.
     """
 
     def __init__(
-        self, cpus: int | None = None, *, long_job_seconds: float = LONG_JOB_SECONDS
+        self,
+        cpus: int | None = None,
+        *,
+        long_job_seconds: float = LONG_JOB_SECONDS,
+        niceness: int = 0,
     ) -> None:
         self._long_job_seconds = long_job_seconds
         self._kernels = KernelBuilder()
-        self._threads = InProcessEvaluator(cpus)
+        self._threads = InProcessEvaluator(cpus, niceness=niceness)
         self._changing = threading.Lock()
         self._ray: RayEvaluator | None = None
         self._without_ray = False

@@ -62,54 +62,61 @@ def pictures(page: Page, move: Callable[[], None]) -> dict[str, float]:
     }
 
 
-def scroll(page: Page) -> None:
+def scroll(page: Page, steps: int) -> None:
     """Up and down, as a wheel does."""
     page.mouse.move(640, 400)
-    for step in range(90):
+    for step in range(steps):
         page.mouse.wheel(0, 120 if step % 60 < 30 else -120)
         page.wait_for_timeout(16)
 
 
-def brush(page: Page) -> None:
+def brush(page: Page, steps: int) -> None:
     """Draw a stroke along an axis and lengthen it, bit by bit."""
     axis = page.locator(".axis").nth(1).bounding_box()
     assert axis is not None
     x, top = axis["x"] + axis["width"] / 2, axis["y"]
     page.mouse.move(x, top + 5)
     page.mouse.down()
-    for step in range(90):
-        page.mouse.move(x, top + 5 + (axis["height"] - 10) * step / 90)
+    for step in range(steps):
+        page.mouse.move(x, top + 5 + (axis["height"] - 10) * step / steps)
         page.wait_for_timeout(16)
     page.mouse.up()
 
 
-def measure(url: str, job: str, rounds: int) -> dict[str, Any]:
-    """All numbers, from one browser."""
+def measure(pages: Pages, url: str, job: str, *, rounds: int, steps: int = 90) -> dict[str, Any]:
+    """All numbers, from one browser.
+
+    Args:
+        pages: Of the browser.
+        url: Of the server.
+        job: Id of the one of 100 000 evaluations.
+        rounds: First views, of which the median counts.
+        steps: Of a wheel or a stroke, one a picture.
+
+    Returns:
+        By what was looked at: seconds and kilobytes of first views; pictures a second, and the
+        longest time between two [ms], of what moves.
+    """
     views = {
         "list of 1000 jobs": ("/", "[data-job]"),
         "job of 100 000 evaluations": (f"/jobs/{job}", "main canvas"),
     }
     found: dict[str, Any] = {}
-    with sync_playwright() as playwright:
-        path = str(find_chromium())
-        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
-        pages = Pages(browser)
-        for name, (address, shown) in views.items():
-            runs = [first_view(pages, url, address, shown) for _ in range(rounds)]
-            found[name] = {
-                key: statistics.median(run[key] for run in runs) for key in ("seconds", "kilobytes")
-            }
-        with Visit(pages, url, fresh=True) as visit:
-            page = visit.go("/")
-            page.locator("[data-job]").first.wait_for()
-            found["scrolling the list"] = pictures(page, lambda: scroll(page))
-            page.goto(f"/jobs/{job}/iterations")
-            page.locator('[data-iteration="3999"] table').wait_for()
-            found["scrolling the iterations"] = pictures(page, lambda: scroll(page))
-            page.goto(f"/jobs/{job}/variables")
-            page.locator('canvas[data-rows="100000"]').wait_for()
-            found["brushing 100 000 designs"] = pictures(page, lambda: brush(page))
-        browser.close()
+    for name, (address, shown) in views.items():
+        runs = [first_view(pages, url, address, shown) for _ in range(rounds)]
+        found[name] = {
+            key: statistics.median(run[key] for run in runs) for key in ("seconds", "kilobytes")
+        }
+    with Visit(pages, url, fresh=True) as visit:
+        page = visit.go("/")
+        page.locator("[data-job]").first.wait_for()
+        found["scrolling the list"] = pictures(page, lambda: scroll(page, steps))
+        page.goto(f"/jobs/{job}/iterations")
+        page.locator('[data-iteration="3999"] table').wait_for()
+        found["scrolling the iterations"] = pictures(page, lambda: scroll(page, steps))
+        page.goto(f"/jobs/{job}/variables")
+        page.locator('canvas[data-rows="100000"]').wait_for()
+        found["brushing 100 000 designs"] = pictures(page, lambda: brush(page, steps))
     return found
 
 
@@ -129,7 +136,11 @@ def main() -> None:
         server = ServerProcess(path, "--no-runner")
         try:
             newest = server.client.get("/v1/jobs", params={"search": "long"}).json()["items"][0]
-            found = measure(server.url, newest["id"], options.rounds)
+            with sync_playwright() as playwright:
+                chromium = str(find_chromium())
+                browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+                found = measure(Pages(browser), server.url, newest["id"], rounds=options.rounds)
+                browser.close()
         finally:
             server.close()
     if options.json:

@@ -28,6 +28,7 @@ from sqlalchemy import (
 
 from api.page import FOLDER
 from benchmarks.large_store import PARTICLES, fill
+from benchmarks.page import measure
 from services.optimizer.service import JobService
 from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.rows.tables import evaluations, iterations, jobs
@@ -35,6 +36,7 @@ from services.optimizer.store.statements.records import ID_ALPHABET
 from services.runtime import open_store
 from tests.examples.servers import Server
 from tests.web.job_page import wait_for_iteration
+from tests.web.pages import Pages
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
@@ -156,6 +158,20 @@ def test_the_first_view_of_a_long_job_is_small_and_then_complete(
     expect(page.locator("[data-selected]")).to_have_attribute(
         "data-selected", str(PARTICLES * ITERATIONS)
     )
+
+
+@pytest.mark.timeout(600)
+def test_the_pages_benchmark_measures_first_views_and_what_moves(
+    large_server: Server, long_job: str, pages: Pages
+) -> None:
+    found = measure(pages, large_server.url, long_job, rounds=1, steps=6)
+    assert len(found) == 5
+    for numbers in found.values():
+        if "seconds" in numbers:
+            assert numbers["seconds"] > 0.0 and 1.0 < numbers["kilobytes"] < 120.0
+        else:
+            # Between the first and the last picture of as many strokes or turns of a wheel.
+            assert 1000.0 / numbers["longest_ms"] < numbers["per_second"] < 121.0
 
 
 @pytest.mark.timeout(600)

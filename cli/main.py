@@ -187,7 +187,7 @@ def main() -> None:
 
 _COLLECTED: Final = (5_000, 10, 20)
 """When objects in cycles are looked for, as of `gc.set_threshold`. A search among all stops every
-thread of a server for a tenth of a second, and Python's own setting has one every few seconds."""
+thread of a server for up to a tenth of a second (docs/decisions/0064-answers-first.md)."""
 
 
 @cache

@@ -12,23 +12,26 @@
 #define NAMED_512
 /* The rounding that is set: to nearest. */
 #define AS_SET 4
+/* A mask that leaves no lane out. GCC takes some as unsigned char, and others signed. */
+#define ALL -1
+#define ALL_UNSIGNED ((unsigned char)0xff)
 #endif
 #endif
 
 #if defined(__AVX512F__) && DOUBLES == 8 && defined(NAMED_512)
-#define MAX_PD(a, b) __builtin_ia32_maxpd512_mask(a, b, (dvec){0}, -1, AS_SET)
-#define MAX_PS(a, b) __builtin_ia32_maxps512_mask(a, b, (vec){0}, -1, AS_SET)
-#define MIN_PD(a, b) __builtin_ia32_minpd512_mask(a, b, (dvec){0}, -1, AS_SET)
-#define MIN_PS(a, b) __builtin_ia32_minps512_mask(a, b, (vec){0}, -1, AS_SET)
-#define SQRT_PD(a) __builtin_ia32_sqrtpd512_mask(a, (dvec){0}, -1, AS_SET)
-#define SQRT_PS(a) __builtin_ia32_sqrtps512_mask(a, (vec){0}, -1, AS_SET)
-#define WIDENED_PS(half) __builtin_ia32_cvtps2pd512_mask(half, (dvec){0}, -1, AS_SET)
-#define FMA_PD(a, b, c) __builtin_ia32_vfmaddpd512_mask(a, b, c, -1, AS_SET)
-#define FMA_PS(a, b, c) __builtin_ia32_vfmaddps512_mask(a, b, c, -1, AS_SET)
-#define FMS_PD(a, b, c) __builtin_ia32_vfmsubpd512_mask(a, b, c, -1, AS_SET)
-#define FMS_PS(a, b, c) __builtin_ia32_vfmsubps512_mask(a, b, c, -1, AS_SET)
-#define FNMA_PD(a, b, c) __builtin_ia32_vfnmaddpd512_mask(a, b, c, -1, AS_SET)
-#define FNMA_PS(a, b, c) __builtin_ia32_vfnmaddps512_mask(a, b, c, -1, AS_SET)
+#define MAX_PD(a, b) __builtin_ia32_maxpd512_mask(a, b, (dvec){0}, ALL_UNSIGNED, AS_SET)
+#define MAX_PS(a, b) __builtin_ia32_maxps512_mask(a, b, (vec){0}, ALL, AS_SET)
+#define MIN_PD(a, b) __builtin_ia32_minpd512_mask(a, b, (dvec){0}, ALL_UNSIGNED, AS_SET)
+#define MIN_PS(a, b) __builtin_ia32_minps512_mask(a, b, (vec){0}, ALL, AS_SET)
+#define SQRT_PD(a) __builtin_ia32_sqrtpd512_mask(a, (dvec){0}, ALL, AS_SET)
+#define SQRT_PS(a) __builtin_ia32_sqrtps512_mask(a, (vec){0}, ALL, AS_SET)
+#define WIDENED_PS(half) __builtin_ia32_cvtps2pd512_mask(half, (dvec){0}, ALL, AS_SET)
+#define FMA_PD(a, b, c) __builtin_ia32_vfmaddpd512_mask(a, b, c, ALL_UNSIGNED, AS_SET)
+#define FMA_PS(a, b, c) __builtin_ia32_vfmaddps512_mask(a, b, c, ALL, AS_SET)
+#define FMS_PD(a, b, c) __builtin_ia32_vfmsubpd512_mask(a, b, c, ALL_UNSIGNED, AS_SET)
+#define FMS_PS(a, b, c) __builtin_ia32_vfmsubps512_mask(a, b, c, ALL, AS_SET)
+#define FNMA_PD(a, b, c) __builtin_ia32_vfnmaddpd512_mask(a, b, c, ALL_UNSIGNED, AS_SET)
+#define FNMA_PS(a, b, c) __builtin_ia32_vfnmaddps512_mask(a, b, c, ALL, AS_SET)
 #elif defined(__AVX512F__) && DOUBLES == 8
 #include <immintrin.h>
 #define MAX_PD(a, b) (dvec)_mm512_max_pd((__m512d)(a), (__m512d)(b))

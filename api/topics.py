@@ -6,9 +6,10 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import islice
+from typing import Final
 
-import anyio
 from anyio.to_thread import run_sync
 from fastapi.sse import format_sse_event
 
@@ -17,16 +18,30 @@ from services.optimizer.jobs.iteration import Iteration
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
 
+PAGE: Final = 200
+"""Most iterations that are read at once."""
+
+_LONGEST_WAIT: Final = 60.0
+"""Seconds after which a job is read again, whatever was told of it."""
+
+_AT_ONCE: Final = 8
+"""Streams that are answered in one go. Each takes the loop about 0.1 ms; requests come between."""
+
+_GAP: Final = 0.004
+"""Seconds until the next ones are."""
+
 
 @dataclass(frozen=True)
 class News:
     """A job, and what it has committed since; the events that tell of it are encoded once.
 
     Attributes:
+        version: Of the topic when the job was read; what has changed since is of a later one.
         job: As it was read.
-        iterations: In order.
+        iterations: In order; at most `PAGE`.
     """
 
+    version: int
     job: Job
     iterations: tuple[Iteration, ...]
 
@@ -44,6 +59,13 @@ class News:
         """The event `state`, as it is sent."""
         text = StateView.from_job(self.job).model_dump_json()
         return format_sse_event(event="state", data_str=text)
+
+
+_Waiters = dict[asyncio.Future[News | None], None]
+"""Streams that wait for one answer, in the order in which they came; None is that of the end."""
+
+_Question = tuple[int, int | None]
+"""A version of the topic, and after which iteration."""
 
 
 class Topic:
@@ -64,15 +86,20 @@ class Topic:
         self.streams = 0
         self._service = service
         self._job_id = job_id
-        self._changed = asyncio.Event()
-        self._reads: dict[tuple[int, int | None], asyncio.Task[News]] = {}
+        self._idle: dict[int | None, _Waiters] = {}
+        self._reads: dict[_Question, _Waiters] = {}
+        self._tasks: set[asyncio.Task[News]] = set()
+        self._latest: tuple[_Question, News] | None = None
+        self._ended = False
         self._loop = asyncio.get_running_loop()
+        self._timer = self._loop.call_later(_LONGEST_WAIT, self.advance)
         self._watch = ExitStack()
         changes = service.store.changes
         self._watch.enter_context(changes.watch(job_id, self._wake, poll_seconds=poll_seconds))
 
     def close(self) -> None:
         """Watch the job no more."""
+        self._timer.cancel()
         self._watch.close()
 
     def _wake(self) -> None:
@@ -81,60 +108,99 @@ class Topic:
             self._loop.call_soon_threadsafe(self.advance)
 
     def advance(self) -> None:
-        """Go on to the next version, and wake those who wait for it."""
+        """Go on to the next version, and read the job for those who wait for it."""
+        self._timer.cancel()
+        self._timer = self._loop.call_later(_LONGEST_WAIT, self.advance)
         self.version += 1
-        self._changed.set()
-        self._changed = asyncio.Event()
+        idle, self._idle = self._idle, {}
+        for after, waiters in idle.items():
+            if waiters:
+                self._read(after, waiters)
 
-    async def changed(self, version: int, *, seconds: float) -> None:
-        """Wait until the topic has another version.
+    def end(self) -> None:
+        """Answer all who wait, now and from now on, that the server stops."""
+        self._ended = True
+        for waiters in (*self._idle.values(), *self._reads.values()):
+            for waiter in waiters:
+                if not waiter.done():
+                    waiter.set_result(None)
 
-        Args:
-            version: that which is known already.
-            seconds: after so long the wait is over in any case [s].
-        """
-        with anyio.move_on_after(seconds):
-            if self.version == version:
-                await self._changed.wait()
-
-    async def news(self, after: int | None, *, limit: int) -> News:
+    async def news(self, after: int | None, *, known: int | None = None) -> News | None:
         """Read the job, and then what it has committed.
 
-        Streams that ask for the same at the same version share the answer while it is under way.
+        Streams that ask for the same at the same version share the answer. It is given to a few at
+        a time, so that many streams of one job hold up nothing else.
 
         Args:
             after: only iterations with a greater index; None for all.
-            limit: most iterations; the same for all streams.
+            known: version of the news before, and this waits for another one; None: read now.
 
         Returns:
             The job, and the iterations in order: whatever the job counts as committed is among
-            them, or on the next pages.
+            them, or on the next pages. None once the server stops.
 
         Raises:
             NotFound: the job is gone.
             StoreUnavailable: the database does not answer.
         """
-        key = (self.version, after)
-        task = self._reads.get(key)
-        if task is None:
-            task = asyncio.ensure_future(run_sync(self._read, after, limit))
-            self._reads[key] = task
-            task.add_done_callback(lambda done: self._forget(key, done))
-        # Who has gone must not take the answer from the others.
-        return await asyncio.shield(task)
+        if self._ended:
+            return None
+        question = (self.version, after)
+        if known == self.version:
+            waiters = self._idle.setdefault(after, {})
+        elif known is not None and self._latest is not None and self._latest[0] == question:
+            return self._latest[1]
+        elif question in self._reads:
+            waiters = self._reads[question]
+        else:
+            waiters = self._read(after, {})
+        waiter: asyncio.Future[News | None] = self._loop.create_future()
+        waiters[waiter] = None
+        try:
+            return await waiter
+        finally:
+            # Who has gone is not kept until the job changes.
+            waiters.pop(waiter, None)
 
-    def _read(self, after: int | None, limit: int) -> News:
+    def _read(self, after: int | None, waiters: _Waiters) -> _Waiters:
+        """Begin to read for those who wait, and for those who join them until it is done."""
+        question = (self.version, after)
+        self._reads[question] = waiters
+        task = asyncio.ensure_future(run_sync(self._look, self.version, after))
+        self._tasks.add(task)
+        task.add_done_callback(partial(self._read_is_done, question))
+        return waiters
+
+    def _look(self, version: int, after: int | None) -> News:
         job = self._service.job(self._job_id)
         if job.progress.iterations <= (-1 if after is None else after) + 1:
-            return News(job, ())
-        found = self._service.iterations(self._job_id, after=after, limit=limit)
-        return News(job, found.items)
+            return News(version, job, ())
+        found = self._service.iterations(self._job_id, after=after, limit=PAGE)
+        return News(version, job, found.items)
 
-    def _forget(self, key: tuple[int, int | None], task: asyncio.Task[News]) -> None:
-        del self._reads[key]
-        if not task.cancelled():
-            # Else it would be complained of where all who asked have gone.
-            task.exception()
+    def _read_is_done(self, question: _Question, task: asyncio.Task[News]) -> None:
+        self._tasks.discard(task)
+        waiters = self._reads.pop(question)
+        if task.cancelled():
+            # With the loop, and so are all who wait.
+            return
+        if task.exception() is None and question[0] == self.version:
+            self._latest = question, task.result()
+        self._answer(waiters, task)
+
+    def _answer(self, waiters: _Waiters, task: asyncio.Task[News]) -> None:
+        """Give the answer to some, and a little later to the next ones."""
+        for waiter in list(islice(waiters, _AT_ONCE)):
+            del waiters[waiter]
+            if waiter.done():
+                continue
+            failed = task.exception()
+            if failed is None:
+                waiter.set_result(task.result())
+            else:
+                waiter.set_exception(failed)
+        if waiters:
+            self._loop.call_later(_GAP, self._answer, waiters, task)
 
 
 class Topics:
@@ -170,11 +236,11 @@ class Topics:
                 topic.close()
 
     async def end_with(self, stopping: asyncio.Event) -> None:
-        """Wake all streams when the server begins to stop.
+        """Answer all streams when the server begins to stop.
 
         Args:
             stopping: set then.
         """
         await stopping.wait()
         for topic in self._topics.values():
-            topic.advance()
+            topic.end()

@@ -25,7 +25,7 @@ from api.dependencies import (
 )
 from api.documentation import problems
 from api.event_stream import EVENT_SCHEMA, EventStream
-from api.topics import Topic
+from api.topics import PAGE, Topic
 from gaitswarm.views import PREFIX
 from services.monitoring.metrics import OpenStream
 from services.optimizer.errors import NotFound, StoreUnavailable
@@ -47,12 +47,6 @@ data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"eva
 
 _RECONNECT: Final = 1000
 """After so long a client is to connect again that has lost its server [ms]."""
-
-_PAGE: Final = 200
-"""Iterations read at once."""
-
-_LONGEST_WAIT: Final = 60.0
-"""Seconds after which a stream looks for itself, whatever it was told."""
 
 
 @router.get(
@@ -146,26 +140,28 @@ async def _events(
     unless `follow`.
     """
     told: tuple[JobState, str | None] | None = None
+    known: int | None = None
     left = LARGEST_INDEX if limit is None else limit
     while not stopping.is_set():
-        # Before the look: what changes after it makes another version, and is looked for again.
-        version = topic.version
         try:
-            news = await topic.news(after, limit=_PAGE)
+            news = await topic.news(after, known=known)
         except StoreUnavailable:
             # The database is away: what is committed will still be there when it is back.
+            known = None
             await _pause(stopping, pause_seconds)
             continue
         except NotFound:
             yield format_sse_event(event="deleted", data_str=json.dumps({"id": job_id}))
             return
+        if news is None:
+            break
         sent = news.iterations[:left]
         texts = list(news.events[:left])
         left -= len(sent)
         for iteration in sent:
             after = iteration.index
             stream.sent(iteration.committed_at)
-        caught_up = left > 0 and len(news.iterations) < _PAGE
+        caught_up = left > 0 and len(news.iterations) < PAGE
         job = news.job
         if caught_up and (job.state, job.waiting) != told:
             told = (job.state, job.waiting)
@@ -174,8 +170,7 @@ async def _events(
             yield b"".join(texts)
         if left == 0 or (caught_up and (job.state.terminal or not follow)):
             return
-        if caught_up:
-            await topic.changed(version, seconds=_LONGEST_WAIT)
+        known = news.version if caught_up else None
     yield format_sse_event(comment="the server is ending", retry=_RECONNECT)
 
 

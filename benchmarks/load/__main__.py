@@ -23,8 +23,11 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, get_args
 
+from sqlalchemy import create_engine
+
 from benchmarks.load.filled import fill_with
 from benchmarks.load.trial import Found, Load, run
+from services.optimizer.store.connections.engine import parse_url
 from services.optimizer.store.schema.backup import backup, restore
 from services.runtime import open_store
 from services.worker import EvaluatorKind
@@ -111,7 +114,17 @@ def served_from(database: str, filled: Path, folder: Path) -> Iterator[str]:
     with postgres_server(server_binaries(), durable=True) as server:
         url = f"{server.url}/postgres"
         restore(url, filled)
+        _settle(url)
         yield url
+
+
+def _settle(url: str) -> None:
+    """Do now what a server does in the minutes after so many rows came at once."""
+    engine = create_engine(parse_url(url), isolation_level="AUTOCOMMIT")
+    with engine.connect() as connection:
+        connection.exec_driver_sql("VACUUM (ANALYZE)")
+        connection.exec_driver_sql("CHECKPOINT")
+    engine.dispose()
 
 
 def main() -> None:

@@ -15,8 +15,6 @@ from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 
-LIMIT = 100
-
 
 class Counted(JobService):
     """A service that counts how often a job is read, and lets no read end while it is held."""
@@ -54,16 +52,25 @@ def run(service: JobService, job: Job, use: Callable[[Topic], Awaitable[None]]) 
     asyncio.run(follow())
 
 
-async def read_by(streams: int, topic: Topic) -> list[asyncio.Task[News]]:
+async def asked_by(
+    streams: int, topic: Topic, known: int | None = None
+) -> list[asyncio.Task[News | None]]:
     """As many streams, each of which has asked."""
-    tasks = [asyncio.ensure_future(topic.news(None, limit=LIMIT)) for _ in range(streams)]
+    tasks = [asyncio.ensure_future(topic.news(None, known=known)) for _ in range(streams)]
     await asyncio.sleep(0)
     return tasks
 
 
+async def now(topic: Topic) -> News:
+    """What is read at once."""
+    found = await topic.news(None)
+    assert found is not None
+    return found
+
+
 def test_streams_that_ask_for_the_same_share_the_answer(counted: Counted, job: Job) -> None:
     async def use(topic: Topic) -> None:
-        tasks = await read_by(20, topic)
+        tasks = await asked_by(20, topic)
         counted.free.set()
         answers = await asyncio.gather(*tasks)
         assert {id(answer) for answer in answers} == {id(answers[0])}
@@ -76,25 +83,28 @@ def test_an_answer_of_before_a_change_is_not_given_to_who_asks_after_it(
     counted: Counted, store: SqlStore, job: Job
 ) -> None:
     async def use(topic: Topic) -> None:
-        (before,) = await read_by(1, topic)
+        (before,) = await asked_by(1, topic)
         version = topic.version
         await asyncio.to_thread(counted.read.wait, 10.0)
         store.command(job.id, Command.PAUSE)
-        await topic.changed(version, seconds=10.0)
-        (after,) = await read_by(1, topic)
+        topic.advance()
+        assert topic.version > version
+        (after,) = await asked_by(1, topic)
         counted.free.set()
         await before
-        assert (await after).job.state == "paused"
+        found = await after
+        assert found is not None and found.job.state == "paused"
 
     run(counted, job, use)
 
 
 def test_a_stream_that_leaves_takes_the_answer_from_nobody(counted: Counted, job: Job) -> None:
     async def use(topic: Topic) -> None:
-        leaves, stays = await read_by(2, topic)
+        leaves, stays = await asked_by(2, topic)
         leaves.cancel()
         counted.free.set()
-        assert (await stays).job.id == job.id
+        found = await stays
+        assert found is not None and found.job.id == job.id
 
     run(counted, job, use)
 
@@ -116,8 +126,63 @@ def test_a_read_that_failed_is_tried_anew(
 
     async def use(topic: Topic) -> None:
         with pytest.raises(StoreUnavailable):
-            await topic.news(None, limit=LIMIT)
-        iterations = (await topic.news(None, limit=LIMIT)).iterations
+            await topic.news(None)
+        iterations = (await now(topic)).iterations
         assert [iteration.index for iteration in iterations] == [0]
 
     run(service, job, use)
+
+
+def test_a_change_is_read_once_for_all_streams_that_wait_for_it(
+    counted: Counted, store: SqlStore, job: Job
+) -> None:
+    counted.free.set()
+
+    async def use(topic: Topic) -> None:
+        # The first look of who watches makes a version.
+        first = await topic.news(None, known=0)
+        assert first is not None
+        tasks = await asked_by(100, topic, first.version)
+        counted.reads.clear()
+        store.command(job.id, Command.PAUSE)
+        answers = await asyncio.gather(*tasks)
+        assert {answer and answer.job.state for answer in answers} == {"paused"}
+        # Who has been late asks for what has been read meanwhile.
+        assert answers[0] is await topic.news(None, known=first.version)
+
+    run(counted, job, use)
+    assert counted.reads == [job.id]
+
+
+def test_a_request_waits_for_few_of_the_streams_that_are_answered(
+    counted: Counted, job: Job
+) -> None:
+    counted.free.set()
+
+    async def use(topic: Topic) -> None:
+        tasks = await asked_by(100, topic)
+        most = before = 0
+        while before < len(tasks):
+            await asyncio.sleep(0)
+            done = sum(task.done() for task in tasks)
+            most, before = max(most, done - before), done
+        assert 0 < most <= 8
+
+    run(counted, job, use)
+
+
+def test_streams_that_wait_are_answered_when_the_server_stops(counted: Counted, job: Job) -> None:
+    async def follow() -> None:
+        topics, stopping = Topics(), asyncio.Event()
+        ending = asyncio.ensure_future(topics.end_with(stopping))
+        with topics.follow(counted, job.id, poll_seconds=10.0) as topic:
+            waiting = await asked_by(2, topic, topic.version)
+            # One of which the read has not ended, as of a server that is out of reach.
+            waiting += await asked_by(1, topic)
+            stopping.set()
+            await ending
+            assert await asyncio.gather(*waiting) == [None, None, None]
+            assert await topic.news(None) is None
+            counted.free.set()
+
+    asyncio.run(asyncio.wait_for(follow(), timeout=20.0))

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from typing import Any
 
 import pytest
-from sqlalchemy import Engine, event, text
+from sqlalchemy import Connection, Engine, event, text
 
-from services.optimizer.jobs.job import Command, JobOrder, JobState
+from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from services.optimizer.jobs.labels import LabelsChange
+from services.optimizer.store import sql_store
 from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.rows.job_rows import JobDocuments
 from services.optimizer.store.rows.job_views import RowMemory
@@ -153,15 +154,9 @@ def test_while_nothing_is_committed_the_jobs_that_are_sorted_are_read_once(
     other.close()
 
 
-@pytest.mark.slow
-def test_of_all_who_ask_a_server_at_once_one_reads_the_jobs_that_are_sorted(
-    emptied_postgresql: Callable[[], str],
-) -> None:
-    with (
-        closing(open_store(emptied_postgresql())) as store,
-        ThreadPoolExecutor(4) as threads,
-        statements() as sent,
-    ):
+def test_of_all_who_ask_at_once_one_reads_the_jobs_that_are_sorted(store: SqlStore) -> None:
+    store.jobs()
+    with ThreadPoolExecutor(4) as threads, statements() as sent:
         asked = [threads.submit(store.jobs, order=JobOrder.NAME, search="a") for _ in range(8)]
         assert all(not future.result().items for future in asked)
     assert len(_whole_lists(sent)) == 1, sent
@@ -177,6 +172,26 @@ def test_nobody_waits_long_for_another_that_reads_the_jobs(
     with memory.lock:
         assert [job.id for job in store.jobs(order=JobOrder.NAME).items] == [created.id]
     assert [job.id for job in store.jobs(order=JobOrder.NAME).items] == [created.id]
+
+
+def test_a_job_that_is_removed_after_it_was_sorted_is_not_on_the_page(
+    store: SqlStore, database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs = [store.create_job(spec(name=name))[0].id for name in "abc"]
+    store.command(jobs[1], Command.CANCEL)
+    assert len(store.jobs(order=JobOrder.NAME).items) == 3
+    read = sql_store.jobs_of
+
+    def removed_first(connection: Connection, ids: Sequence[str]) -> tuple[Job, ...]:
+        if jobs[1] in ids:
+            with closing(open_store(database_url)) as other:
+                other.delete_job(jobs[1])
+        return read(connection, ids)
+
+    monkeypatch.setattr(sql_store, "jobs_of", removed_first)
+    page = store.jobs(order=JobOrder.NAME, limit=2)
+    assert [job.id for job in page.items] == [jobs[0], jobs[2]]
+    assert page.next is None
 
 
 def _whole_lists(sent: list[tuple[str, Any]]) -> list[str]:

@@ -219,20 +219,26 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
         if plain and listed is not None:
             with self._database.transaction(write=False) as connection:
                 return listed(connection, among, after, limit)
-        with self._database.transaction(write=False) as connection:
-            found = sort_jobs(
-                connection,
-                among=among,
-                kind=kind,
-                search=search,
-                where=where,
-                order=order,
-                after=after,
-                reverse=reverse,
-            )
-            ids, more = found[:limit], len(found) > limit
-            items = jobs_of(connection, ids)
-        return Page(items, cursor_of(items[-1], order, reverse=reverse) if more else None)
+        while True:
+            version = self.at_once.version()
+            with self._database.transaction(write=False) as connection:
+                found = sort_jobs(
+                    connection,
+                    among=among,
+                    kind=kind,
+                    search=search,
+                    where=where,
+                    order=order,
+                    after=after,
+                    version=version,
+                    reverse=reverse,
+                )
+                ids, more = found[:limit], len(found) > limit
+                items = jobs_of(connection, ids)
+            # Else one was removed after it was sorted, and the version is another.
+            if len(items) == len(ids):
+                end = cursor_of(items[-1], order, reverse=reverse) if more else None
+                return Page(items, end)
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
         """Count jobs by what they are found by."""

@@ -109,28 +109,29 @@ class _Memory:
         self._version: Hashable = None
         self._entries: dict[Hashable, Sequence[JobEntry]] = {}
 
-    def entries(self, connection: Connection) -> dict[Hashable, Sequence[JobEntry]]:
-        """What is known of what is committed by now; with the lock held."""
-        version = _version(connection)
+    def entries(self, version: Hashable) -> dict[Hashable, Sequence[JobEntry]]:
+        """What is known of this version, or of a newer one; with the lock held."""
         if version != self._version:
             self._version, self._entries = version, {}
         return self._entries
 
 
-_REMEMBERED: Final = "gaitswarm_job_entries"
-
-_of_servers: Final = WeakKeyDictionary[Engine, _Memory]()
+_memories: Final = WeakKeyDictionary[Engine, _Memory]()
 
 
-def job_entries(connection: Connection, among: Among, kind: str | None) -> Sequence[JobEntry]:
+def job_entries(
+    connection: Connection, among: Among, kind: str | None, version: Hashable | None
+) -> Sequence[JobEntry]:
     """Read what jobs are found and sorted by.
 
     It is remembered while nothing is committed: to the file on SQLite, to the server on PostgreSQL.
 
     Args:
-        connection: An open transaction that only reads.
+        connection: An open transaction that has only read, and on SQLite nothing yet.
         among: Only jobs for which these hold.
         kind: Only jobs whose specs say that they are of this kind; None for any.
+        version: Of the database, from before the transaction; None if nothing tells it, and then
+            a PostgreSQL server is asked.
 
     Returns:
         The entries, in no order.
@@ -138,12 +139,16 @@ def job_entries(connection: Connection, among: Among, kind: str | None) -> Seque
     query = _ENTRIES.where(*among)
     if kind is not None:
         query = query.where(spec_field(connection, "kind") == kind)
-    memory = _memory(connection)
+    if version is None:
+        version = _seen(connection)
+    if version is None:
+        return _read_all(connection, query)
+    memory = _memory(connection.engine)
     # Whoever reads may wait for a server that is out of reach; that is not passed on.
     if not memory.lock.acquire(timeout=_PATIENCE):
         return _read_all(connection, query)
     try:
-        known, key = memory.entries(connection), (among, kind)
+        known, key = memory.entries(version), (among, kind)
         found = known.get(key)
         if found is None:
             if len(known) >= _QUESTIONS:
@@ -154,23 +159,16 @@ def job_entries(connection: Connection, among: Among, kind: str | None) -> Seque
         memory.lock.release()
 
 
-def _memory(connection: Connection) -> _Memory:
-    """Of the connection, or of all connections to a server."""
-    if connection.dialect.name == "sqlite":
-        found: _Memory = connection.info.setdefault(_REMEMBERED, _Memory())
-        return found
-    return _of_servers.setdefault(connection.engine, _Memory())
+def _memory(engine: Engine) -> _Memory:
+    return _memories.setdefault(engine, _Memory())
 
 
-def _version(connection: Connection) -> Hashable:
-    """What is another after any commit, to the same memory."""
-    if connection.dialect.name != "sqlite":
-        # The transactions that are seen; those that only read are none of them.
-        return str(connection.exec_driver_sql("SELECT pg_current_snapshot()::text").scalar_one())
-    # The first counts what others have committed, the second what this connection has changed.
-    others = connection.exec_driver_sql("PRAGMA data_version").scalar_one()
-    driver: Any = connection.connection.driver_connection
-    return others, driver.total_changes
+def _seen(connection: Connection) -> Hashable | None:
+    """What is another after any commit to a server."""
+    if connection.dialect.name != "postgresql":
+        return None
+    # The transactions that are seen; those that only read are none of them.
+    return str(connection.exec_driver_sql("SELECT pg_current_snapshot()::text").scalar_one())
 
 
 def job_entry(connection: Connection, job_id: str) -> JobEntry | None:

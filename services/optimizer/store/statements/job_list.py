@@ -156,8 +156,8 @@ def jobs_of(connection: Connection, ids: Sequence[str]) -> tuple[Job, ...]:
         ids: Of the jobs.
 
     Returns:
-        The jobs, in the order of the ids.
+        The jobs, in the order of the ids, without those that are removed.
     """
     rows = connection.execute(_OF_IDS, {"ids": list(ids)})
     found = {job.id: job for job in (shown_job(row, connection.dialect) for row in rows)}
-    return tuple(found[job_id] for job_id in ids)
+    return tuple(found[job_id] for job_id in ids if job_id in found)

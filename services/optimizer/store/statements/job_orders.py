@@ -6,7 +6,7 @@ than ASCII. Of every job only what is compared is read, and remembered.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -43,6 +43,7 @@ def sort_jobs(
     where: JobFilter,
     order: JobOrder,
     after: str | None,
+    version: Hashable | None,
     reverse: bool = False,
 ) -> list[str]:
     """Find all jobs that are asked for, in order.
@@ -55,6 +56,7 @@ def sort_jobs(
         where: Only jobs that this admits.
         order: By what they are sorted.
         after: Only jobs after this cursor.
+        version: As for `job_entries`.
         reverse: Whether the order is reversed; jobs without what they are sorted by stay last.
 
     Returns:
@@ -63,7 +65,7 @@ def sort_jobs(
     Raises:
         InvalidRequest: The cursor is none of this order; names the field `after`.
     """
-    found = job_entries(connection, among, kind)
+    found = job_entries(connection, among, kind, version)
     if where.needs_specs:
         columns = connection.execute(select(jobs.c.id, *facet_columns(connection)).where(*among))
         admitted = {row[0] for row in columns if where.admits(to_facets(row[1:]))}

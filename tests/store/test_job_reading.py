@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from typing import Any
 
 import pytest
-from sqlalchemy import Connection, Engine, event, text
+from sqlalchemy import Connection, Engine, create_engine, event, text
 
 from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
-from services.optimizer.jobs.labels import LabelsChange
+from services.optimizer.jobs.labels import JobFilter, LabelsChange
 from services.optimizer.store import sql_store
 from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.rows.job_rows import JobDocuments
 from services.optimizer.store.rows.job_views import RowMemory
 from services.optimizer.store.sql_store import SqlStore, open_store
 from services.optimizer.store.statements import job_entries
-from services.optimizer.store.statements.job_entries import _Memory
+from services.optimizer.store.statements.job_entries import JobEntry, _Memory
+from services.optimizer.store.statements.job_list import jobs_of
 from tests.store.examples import completed, spec
 from tests.store.test_job_list import with_fitness
 
@@ -154,6 +155,61 @@ def test_while_nothing_is_committed_the_jobs_that_are_sorted_are_read_once(
     other.close()
 
 
+def test_of_a_server_only_jobs_that_have_changed_are_read_anew(
+    store: SqlStore, database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = [store.create_job(spec(name=name))[0].id for name in "abcd"]
+    for job in made[:2]:
+        store.command(job, Command.CANCEL)
+    read = list[int]()
+    entries_of = job_entries.entries_of
+
+    def counted(connection: Connection, rows: Sequence[tuple[Any, ...]]) -> list[JobEntry]:
+        read.append(len(rows))
+        return entries_of(connection, rows)
+
+    monkeypatch.setattr(job_entries, "entries_of", counted)
+    with closing(open_store(database_url)) as other:
+        changes: list[Callable[[], object]] = [
+            lambda: None,
+            lambda: other.label(made[0], LabelsChange(name="e")),
+            lambda: other.create_job(spec(name="f")),
+            lambda: other.label(made[2], LabelsChange(archived=True)),
+            lambda: other.delete_job(made[1]),
+        ]
+        for change in changes:
+            change()
+            store.jobs(order=JobOrder.NAME, where=JobFilter(archived=False))
+    # What is no longer among those that are asked for is told by their number.
+    of_server = [4, 1, 1, 0, 4, 0, 3]
+    assert read == (of_server if "postgresql" in database_url else [4, 4, 5, 4, 3])
+
+
+def test_a_change_is_seen_that_was_begun_before_another_and_committed_after_it(
+    store: SqlStore, database_url: str
+) -> None:
+    if "postgresql" not in database_url:
+        pytest.skip("SQLite has one writer at a time")
+    for name in "ab":
+        store.create_job(spec(name=name))
+
+    def by_priority() -> list[str]:
+        return [job.id for job in store.jobs(order=JobOrder.PRIORITY).items]
+
+    first, second = by_priority()
+    engine = create_engine(parse_url(database_url))
+    try:
+        with engine.connect() as late:
+            raised = text("UPDATE jobs SET priority = priority + 1 WHERE id = :id")
+            late.execute(raised, {"id": second})
+            store.label(first, LabelsChange(name="c"))
+            assert by_priority() == [first, second]
+            late.commit()
+        assert by_priority() == [second, first]
+    finally:
+        engine.dispose()
+
+
 def test_of_all_who_ask_at_once_one_reads_the_jobs_that_are_sorted(store: SqlStore) -> None:
     store.jobs()
     with ThreadPoolExecutor(4) as threads, statements() as sent:
@@ -180,13 +236,12 @@ def test_a_job_that_is_removed_after_it_was_sorted_is_not_on_the_page(
     jobs = [store.create_job(spec(name=name))[0].id for name in "abc"]
     store.command(jobs[1], Command.CANCEL)
     assert len(store.jobs(order=JobOrder.NAME).items) == 3
-    read = sql_store.jobs_of
 
     def removed_first(connection: Connection, ids: Sequence[str]) -> tuple[Job, ...]:
         if jobs[1] in ids:
             with closing(open_store(database_url)) as other:
                 other.delete_job(jobs[1])
-        return read(connection, ids)
+        return jobs_of(connection, ids)
 
     monkeypatch.setattr(sql_store, "jobs_of", removed_first)
     page = store.jobs(order=JobOrder.NAME, limit=2)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime
 from functools import cached_property
 from typing import Any, Final
 from weakref import WeakKeyDictionary
 
-from sqlalchemy import Connection, Dialect, Engine, Select, select
+from sqlalchemy import Connection, Dialect, Engine, and_, func, select, text
 
 from services.optimizer.store.rows.job_rows import reference_of
 from services.optimizer.store.rows.job_views import LARGEST, RowMemory, as_stored, from_stored
@@ -88,6 +88,11 @@ _COLUMNS: Final = tuple(
 
 _ENTRIES: Final = select(*map(as_stored, _COLUMNS))
 
+_UNENDED: Final = "age(CAST(CAST(CAST(:unended AS text) AS xid8) AS xid))"
+
+_SINCE: Final = text(f"(age(jobs.xmin) <= {_UNENDED} OR {_UNENDED} < 0)")
+"""Whether a row is of no transaction before this one; of a server that was set back, any row."""
+
 _known: Final = WeakKeyDictionary[Engine, RowMemory["JobEntry"]]()
 """By their rows, without the names in their specs, which never change in a database."""
 
@@ -101,19 +106,20 @@ _PATIENCE: Final = 1.0
 """Seconds that are waited for entries that another thread reads."""
 
 
+@dataclass(frozen=True)
+class _Answer:
+    """Entries by id; of this version of the database, or of a later one."""
+
+    version: Hashable
+    entries: Mapping[str, JobEntry]
+
+
 class _Memory:
-    """Entries by question, as long as nothing is committed. Whoever asks first reads for all."""
+    """Entries by question. Whoever asks first reads for all."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self._version: Hashable = None
-        self._entries: dict[Hashable, Sequence[JobEntry]] = {}
-
-    def entries(self, version: Hashable) -> dict[Hashable, Sequence[JobEntry]]:
-        """What is known of this version, or of a newer one; with the lock held."""
-        if version != self._version:
-            self._version, self._entries = version, {}
-        return self._entries
+        self.answers: dict[Hashable, _Answer] = {}
 
 
 _memories: Final = WeakKeyDictionary[Engine, _Memory]()
@@ -125,6 +131,7 @@ def job_entries(
     """Read what jobs are found and sorted by.
 
     It is remembered while nothing is committed: to the file on SQLite, to the server on PostgreSQL.
+    Of a server only the jobs that have changed are read after that.
 
     Args:
         connection: An open transaction that has only read, and on SQLite nothing yet.
@@ -136,25 +143,26 @@ def job_entries(
     Returns:
         The entries, in no order.
     """
-    query = _ENTRIES.where(*among)
+    where = among
     if kind is not None:
-        query = query.where(spec_field(connection, "kind") == kind)
+        where = (*among, spec_field(connection, "kind") == kind)
     if version is None:
         version = _seen(connection)
     if version is None:
-        return _read_all(connection, query)
+        return _read_all(connection, where)
     memory = _memory(connection.engine)
     # Whoever reads may wait for a server that is out of reach; that is not passed on.
     if not memory.lock.acquire(timeout=_PATIENCE):
-        return _read_all(connection, query)
+        return _read_all(connection, where)
     try:
-        known, key = memory.entries(version), (among, kind)
-        found = known.get(key)
-        if found is None:
-            if len(known) >= _QUESTIONS:
-                known.clear()
-            found = known[key] = _read_all(connection, query)
-        return found
+        key = among, kind
+        known = memory.answers.get(key)
+        if known is None or known.version != version:
+            known = _Answer(version, _read_anew(connection, where, known))
+            if key not in memory.answers and len(memory.answers) >= _QUESTIONS:
+                memory.answers.clear()
+            memory.answers[key] = known
+        return tuple(known.entries.values())
     finally:
         memory.lock.release()
 
@@ -171,6 +179,29 @@ def _seen(connection: Connection) -> Hashable | None:
     return str(connection.exec_driver_sql("SELECT pg_current_snapshot()::text").scalar_one())
 
 
+def _read_anew(
+    connection: Connection, where: Among, known: _Answer | None
+) -> Mapping[str, JobEntry]:
+    """Entries by id; of a server that has told of the others, only those of changed jobs are read.
+
+    A row that was not seen then is of a transaction that had not ended, or of a later one. If there
+    are as many jobs now as are known with these, none of the others is gone.
+    """
+    if known is not None and connection.dialect.name == "postgresql":
+        unended = str(known.version).partition(":")[0]
+        count = select(func.count().label("jobs")).select_from(jobs).where(*where).subquery()
+        changed = and_(_SINCE.bindparams(unended=unended), *where)
+        # The number comes with each row, and alone if nothing has changed.
+        query = select(count.c.jobs, *_ENTRIES.selected_columns)
+        query = query.select_from(count.outerjoin(jobs, changed))
+        rows = connection.execute(query).all()
+        read = entries_of(connection, [tuple(row[1:]) for row in rows if row[1] is not None])
+        entries = {**known.entries, **{entry.id: entry for entry in read}}
+        if len(entries) == rows[0][0]:
+            return entries
+    return {entry.id: entry for entry in _read_all(connection, where)}
+
+
 def job_entry(connection: Connection, job_id: str) -> JobEntry | None:
     """Read what a job is found and sorted by.
 
@@ -181,13 +212,25 @@ def job_entry(connection: Connection, job_id: str) -> JobEntry | None:
     Returns:
         The entry; None if there is no such job.
     """
-    found = _read_all(connection, _ENTRIES.where(jobs.c.id == job_id))
+    found = _read_all(connection, (jobs.c.id == job_id,))
     return found[0] if found else None
 
 
-def _read_all(connection: Connection, query: Select[Any]) -> list[JobEntry]:
-    """Entries of jobs that are selected from `_ENTRIES`; those that have not changed are known."""
-    rows = list(map(tuple, connection.execute(query).all()))
+def _read_all(connection: Connection, where: Among) -> list[JobEntry]:
+    """Entries of all jobs for which these conditions hold."""
+    return entries_of(connection, list(map(tuple, connection.execute(_ENTRIES.where(*where)))))
+
+
+def entries_of(connection: Connection, rows: Sequence[tuple[Any, ...]]) -> list[JobEntry]:
+    """Tell what rows say that hold what an entry is made of; what has not changed is known.
+
+    Args:
+        connection: An open transaction.
+        rows: As they are stored, in the order of the columns of an entry.
+
+    Returns:
+        The entries, in the order of the rows.
+    """
     memory = _known.setdefault(connection.engine, RowMemory(LARGEST))
     found = memory.find_all(rows)
     new = [row[0] for row, entry in zip(rows, found, strict=True) if entry is None]

@@ -126,3 +126,15 @@ def test_the_benchmark_of_known_robots_runs_the_users_commands(told: Told) -> No
     assert row["standing"] == pytest.approx(1.0, rel=0.01)
     assert {walk["status"] for walk in row["walks"].values()} == {"ok"}
     assert all(walk["speed"] > 0.0 for walk in row["walks"].values())
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_statement_orders_compares_the_same_results(
+    told: Told, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("benchmarks.statement_order.ROBOTS", ("szabadka2",))
+    monkeypatch.setattr("benchmarks.statement_order.PRECISIONS", ("double",))
+    rows = told("statement_order", "--rounds", "1")
+    assert rows
+    for row in rows:
+        assert row["ratio"] == pytest.approx(row["as_derived"] / row["ordered"])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import casadi
 
 from sim.errors import SimulationError
+from sim.kernel.emitted.order import Statement, ordered
 
 _BINARY: Final[dict[str, str]] = {
     "OP_MUL": "{0} * {1}",
@@ -26,6 +27,9 @@ _UNARY: Final[dict[str, str]] = {
     "OP_INV": "SPLAT(1.0) / {0}",
 }
 
+_LATENCIES: Final[dict[str, int]] = {"OP_DIV": 13, "OP_INV": 13, "OP_SQRT": 13}
+"""Of operations that take longer than sums and products [operations that others could do]."""
+
 
 def emit_c(
     function: Any,
@@ -39,7 +43,8 @@ def emit_c(
 
     Inputs and outputs must not overlap, unless it is to work in place. The sine and cosine of one
     angle share their range reduction, a divisor used more than once is inverted once, and a
-    product that is only a term of sums is rounded with each of them (fused multiply-add).
+    product that is only a term of sums is rounded with each of them (fused multiply-add). The order
+    of statements is that of `order.ordered`.
 
     Args:
         function: A CasADi function of scalars (`SX`).
@@ -69,6 +74,10 @@ class _Uses:
     def fused(self, value: str) -> bool:
         """Whether a value is a product that is only ever a term of sums."""
         return value in self.products and self.operands[value] == self.terms[value] > 0
+
+    def factors(self, value: str) -> tuple[str, ...]:
+        """What is read where a value is: itself, or the factors of one that is fused."""
+        return self.products[value] if self.fused(value) else (value,)
 
 
 def _sum(op: str, operands: list[str], uses: _Uses) -> str:
@@ -111,7 +120,7 @@ class _Emitter:
             if n.startswith("OP_") and isinstance(getattr(casadi, n), int)
         }
         self._work: dict[int, str] = {}
-        self._lines: list[str] = []
+        self._statements: list[Statement] = []
         self._circular: set[str] = set()
         self._inverse: set[str] = set()
         self._read: set[str] = set()
@@ -134,7 +143,8 @@ class _Emitter:
             for name, size in zip(names, sizes, strict=True)
             if not size or name in unread
         ]
-        body = "\n".join(f"  {line}" for line in [*empty, *self._lines, *self._outputs])
+        lines = [*empty, *(s.text for s in ordered(self._statements)), *self._outputs]
+        body = "\n".join(f"  {line}" for line in lines)
         return f"static void {name}({', '.join(arguments)})\n{{\n{body}\n}}\n"
 
     def _uses(self) -> _Uses:
@@ -170,14 +180,27 @@ class _Emitter:
     def _emit(self, k: int, op: str, operands: list[str], uses: _Uses) -> None:
         if op == "OP_OUTPUT":
             output, element = self._function.instruction_output(k)
-            lines = self._outputs if self._in_place else self._lines
             assign = "+=" if self._added[output] else "="
-            lines.append(f"o{output}[{element}] {assign} {operands[0]};")
+            line = f"o{output}[{element}] {assign} {operands[0]};"
+            if self._in_place:
+                self._outputs.append(line)
+            else:
+                self._statements.append(Statement(line, reads=(operands[0],)))
         elif not uses.fused(f"t{k}"):
-            self._lines.append(f"const vec t{k} = {self._result(k, op, operands, uses)};")
+            self._define(f"t{k}", *self._result(k, op, operands, uses), op)
 
-    def _result(self, k: int, op: str, operands: list[str], uses: _Uses) -> str:
+    def _define(self, name: str, value: str, reads: Sequence[str], op: str) -> None:
+        operations = 0 if op in ("OP_CONST", "OP_INPUT") else 1
+        latency = _LATENCIES.get(op, 4) if operations else 0
+        text = f"const vec {name} = {value};"
+        self._statements.append(Statement(text, (name,), tuple(reads), operations, latency))
+
+    def _result(
+        self, k: int, op: str, operands: list[str], uses: _Uses
+    ) -> tuple[str, Sequence[str]]:
+        """What an operation comes to, and which values that reads."""
         f = self._function
+        reads: Sequence[str] = [x for value in operands for x in uses.factors(value)]
         if op == "OP_CONST":
             value = f"SPLAT({float(f.instruction_constant(k)).hex()})"
         elif op == "OP_INPUT":
@@ -188,8 +211,9 @@ class _Emitter:
                 value = f"SPLAT({value})"
         elif op in ("OP_SIN", "OP_COS"):
             value = self._circular_function(op, operands[0])
+            reads = [value]
         elif op == "OP_DIV":
-            value = self._quotient(operands, uses.divisors)
+            value, reads = self._quotient(operands, uses.divisors)
         elif op in ("OP_ADD", "OP_SUB"):
             value = _sum(op, operands, uses)
         elif op in _BINARY:
@@ -198,20 +222,22 @@ class _Emitter:
             value = _UNARY[op].format(*operands)
         else:
             raise SimulationError(f"the C emitter has no rule for CasADi's {op}")
-        return value
+        return value, reads
 
     def _circular_function(self, op: str, angle: str) -> str:
+        sine, cosine = f"s_{angle}", f"c_{angle}"
         if angle not in self._circular:
             self._circular.add(angle)
-            self._lines.append(f"vec s_{angle}, c_{angle};")
-            self._lines.append(f"vec_sincos({angle}, &s_{angle}, &c_{angle});")
-        return f"s_{angle}" if op == "OP_SIN" else f"c_{angle}"
+            text = f"vec {sine}, {cosine};\n  vec_sincos({angle}, &{sine}, &{cosine});"
+            self._statements.append(Statement(text, (sine, cosine), (angle,), 10, 40))
+        return sine if op == "OP_SIN" else cosine
 
-    def _quotient(self, operands: list[str], divisors: Counter[str]) -> str:
+    def _quotient(self, operands: list[str], divisors: Counter[str]) -> tuple[str, Sequence[str]]:
         dividend, divisor = operands
         if divisors[divisor] == 1:
-            return f"{dividend} / {divisor}"
+            return f"{dividend} / {divisor}", operands
+        inverse = f"r_{divisor}"
         if divisor not in self._inverse:
             self._inverse.add(divisor)
-            self._lines.append(f"const vec r_{divisor} = SPLAT(1.0) / {divisor};")
-        return f"{dividend} * r_{divisor}"
+            self._define(inverse, f"SPLAT(1.0) / {divisor}", (divisor,), "OP_INV")
+        return f"{dividend} * {inverse}", (dividend, inverse)

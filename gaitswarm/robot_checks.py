@@ -19,6 +19,7 @@ from sim.proposal.drive import GRAVITY
 from sim.proposal.gait import walk_of_robot
 from sim.proposal.legs import reach_below
 from sim.robot import Robot, RobotFiles, load_robot
+from sim.robot.inertia import unphysical
 from sim.robot.legs import ChainLeg
 from sim.robot.posture import feet_and_centre_of_mass, leg_points
 from sim.scenario import Scenario
@@ -92,7 +93,7 @@ def check_robot(
         centre_of_mass=mass.tolist(),
         standing=standing,
         meshes=[] if folder is None else _meshes(files.urdf, Path(folder), map(Path, packages)),
-        warnings=[*warnings, *_unphysical(robot)],
+        warnings=[*warnings, *unphysical(robot.urdf.bodies)],
     )
 
 
@@ -176,19 +177,3 @@ def _standing(robot: Robot, stood: Simulation) -> tuple[StandingStillView, list[
             " contact.stiffness and contact.damping"
         )
     return view, warnings
-
-
-def _unphysical(robot: Robot) -> list[str]:
-    """Links whose mass or inertia no body can have."""
-    warnings = []
-    for name, body in robot.urdf.bodies.items():
-        if body.mass == 0.0:
-            warnings.append(f"link {name!r} and what is fixed to it have no mass")
-            continue
-        moments = np.linalg.eigvalsh(body.rotational)
-        if moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-6):
-            warnings.append(
-                f"link {name!r}: no body of {body.mass:g} kg has the principal moments"
-                f" {', '.join(f'{moment:.3g}' for moment in moments)} kg m2"
-            )
-    return warnings

@@ -37,9 +37,9 @@ class UnreachablePose(SimulationInputError):
         self.scenario = scenario
         self.leg = leg
         self.miss = miss
+        self.reason = f"leg {leg!r} misses its foot trajectory by {miss * 1000:.1f} mm"
         super().__init__(
-            f"scenario {scenario!r}: leg {leg!r} misses its foot trajectory by"
-            f" {miss * 1000:.1f} mm; reduce stride, radius or hip_height"
+            f"scenario {scenario!r}: {self.reason}; reduce stride, radius or hip_height"
         )
 
     def __reduce__(self) -> tuple[type[UnreachablePose], tuple[str, str, float]]:
@@ -62,9 +62,10 @@ class BeyondJointLimit(SimulationInputError):
         self.leg = leg
         self.joint = joint
         self.excess = excess
+        self.reason = f"joint {joint!r} of leg {leg!r} would turn {excess:.3f} rad beyond its limit"
         super().__init__(
-            f"scenario {scenario!r}: joint {joint!r} of leg {leg!r} would turn {excess:.3f} rad"
-            " beyond its limit; reduce stride or height, or change hip_height or radius"
+            f"scenario {scenario!r}: {self.reason}; reduce stride or height, or change hip_height"
+            " or radius"
         )
 
     def __reduce__(self) -> tuple[type[BeyondJointLimit], tuple[str, str, str, float]]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
-from sim.gait.trajectory import require_reachable
 from sim.limited_process import Document, LimitedProcesses, serve
 from sim.proposal.document import Proposal, propose_robot
 from sim.proposal.drive import ActuatorChoice
-from sim.proposal.gait import walk_of_robot
+from sim.proposal.gait import walk_within_reach
 from sim.robot import bounds
 from sim.robot.robot import parse_robot
 
@@ -38,14 +38,17 @@ def walking_proposal(urdf: str, name: str, actuator: ActuatorChoice = "auto") ->
         Its files.
 
     Raises:
-        RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
-        SimulationInputError: A proposed walk is out of the legs' reach or limits.
+        RobotFileError: The URDF cannot be read, no legs are found that can be simulated, or these
+            have no room for steps.
     """
     proposal = propose_robot(urdf, name, actuator)
     robot = parse_robot(proposal.toml, proposal.urdf)
-    for scenario in proposal.job["scenarios"]:
-        require_reachable(robot, walk_of_robot(scenario, "robot.urdf"))
-    return proposal
+    fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]
+    return replace(
+        proposal,
+        job={**proposal.job, "scenarios": [walk for walk, _ in fitted]},
+        guesses=(*proposal.guesses, *(note for _, note in fitted if note)),
+    )
 
 
 def propose_apart(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Proposal:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import Any, Final
 from xml.etree import ElementTree as ET
 
@@ -27,12 +29,19 @@ from sim.proposal.drive import (
 from sim.proposal.gait import alternating_phases, propose_scenarios
 from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
 from sim.proposal.stance import Stance, choose_stance
+from sim.robot.inertia import unphysical
 from sim.robot.urdf import parse_urdf
 from sim.robot.urdf_errors import by_line
 
 _PREFERENCE: Final = "C"
 """The one without biases, whose size is that of one hexapod's objectives: it ranks walks of robots
 of any size alike."""
+
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}")
+"""Of a leg that may have gait parameters of its own."""
+
+_PART: Final = re.compile(r"[_\-. ]")
+"""What parts of a name are told apart by."""
 
 _TWO_LEGS: Final = (
     "two legs on point feet do not stand by themselves, and controllers here hold joints, not"
@@ -74,7 +83,7 @@ def propose_robot(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Pr
     with by_line(urdf):
         found = find_legs(parse_urdf(urdf))
     text, feet = _with_feet(urdf, found.legs)
-    tree = parse_urdf(text, found.held)
+    tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
     legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
     stance = choose_stance(legs)
@@ -90,20 +99,21 @@ def propose_robot(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Pr
             *_head(name, len(legs), tree.total_mass),
             *actuator_tables(kind, drives),
             *_ground(sole, sole_note, stance),
-            *_legs(found, feet, stance, alternating_phases(standing), drives),
+            *_legs(found, names, feet, stance, alternating_phases(standing), drives),
             *_held(found),
         ]
     )
     job = {
         **proposed_control(kind, drives),
         "preference": _PREFERENCE,
-        "scenarios": propose_scenarios(stance, sole.length, len(legs)),
+        "scenarios": propose_scenarios(stance, sole.length, names),
     }
     notes = [_TWO_LEGS] if len(legs) == 2 else []
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes.append(ACTUATOR_NOTES[kind])
     notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
+    notes += unphysical(tree.bodies)
     return Proposal(toml + "\n", text, job, tuple(dict.fromkeys(notes)))
 
 
@@ -150,6 +160,7 @@ def _ground(sole: SoleNumbers, note: str, stance: Stance) -> list[str]:
 
 def _legs(
     found: FoundLegs,
+    names: Sequence[str],
     feet: Sequence[str],
     stance: Stance,
     phases: Sequence[float],
@@ -161,7 +172,7 @@ def _legs(
         lines += [
             "",
             "[[legs]]",
-            f"name = {quoted(_leg_name(leg, k))}",
+            f"name = {quoted(names[k])}",
             f"joints = [{', '.join(map(quoted, leg.joints))}]",
             f"foot = {quoted(feet[k])}",
             f"stance = [{', '.join(map(repr, stance.angles[k]))}]    # rad, chosen",
@@ -178,10 +189,19 @@ def _held(found: FoundLegs) -> list[str]:
     return lines + [f"{quoted(name)} = {float(at)}" for name, at in found.held.items()]
 
 
-def _leg_name(leg: FoundLeg, number: int) -> str:
-    """What all joints' names begin with, else a number."""
-    shared = leg.joints[0]
-    for name in leg.joints[1:]:
-        while not name.startswith(shared):
-            shared = shared[:-1]
-    return shared.strip("_-. ")[:60] or f"leg{number + 1}"
+def _leg_names(legs: Sequence[FoundLeg]) -> list[str]:
+    """What the names of each leg's joints begin with, less how all of these end; else numbers."""
+    begins = [_shared_beginning(leg.joints) for leg in legs]
+    # Of leg1_j and leg2_j, whose joints are leg1_j1, leg1_j2 ..., the end is of the joints.
+    end = _shared_beginning([begin[::-1] for begin in begins])[::-1]
+    part = _PART.search(end)
+    cut = len(end) - part.start() if part else 0
+    names = [begin[: len(begin) - cut].strip("_-. ")[:60] for begin in begins]
+    if len(set(names)) < len(names) or not all(map(_NAME.fullmatch, names)):
+        return [f"leg{number}" for number in range(1, len(names) + 1)]
+    return names
+
+
+def _shared_beginning(names: Sequence[str]) -> str:
+    alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+    return "".join(letters[0] for letters in alike)

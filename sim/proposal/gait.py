@@ -8,12 +8,15 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from sim.errors import RobotFileError
+from sim.errors import BeyondJointLimit, RobotFileError, UnreachablePose
 from sim.gait.gaits import GAITS, lags_of
+from sim.gait.trajectory import require_reachable
 from sim.proposal.drive import GRAVITY
 from sim.proposal.stance import Stance
+from sim.robot import Robot
 from sim.robot.legs import ChainLeg
 from sim.scenario import Scenario
+from sim.wording import message_of
 
 _WALKS: Final = {"slow": (0.9, 0.25), "fast": (0.6, 0.35)}
 """Cycle time in units of a pendulum's of the hips' height, stride in units of the height; of robots
@@ -29,6 +32,12 @@ _LIFT: Final = 0.2
 
 _DUTY: Final = 0.6
 
+_SHARES: Final = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
+"""Of stride and lift that are tried, for legs that do not reach further."""
+
+_SAME: Final = 1e-4
+"""Difference of two feet's lateral distances that counts as none [m]."""
+
 
 def alternating_phases(legs: Sequence[ChainLeg]) -> list[float]:
     """Phases of a gait in which neighbours alternate: trot on four legs, tripod on six.
@@ -42,19 +51,25 @@ def alternating_phases(legs: Sequence[ChainLeg]) -> list[float]:
     return [(1.0 - lag) % 1.0 for lag in lags_of(GAITS["alternating"], legs)]
 
 
-def propose_scenarios(stance: Stance, sole: float, legs: int) -> list[dict[str, Any]]:
+def propose_scenarios(stance: Stance, sole: float, names: Sequence[str]) -> list[dict[str, Any]]:
     """A slow and a fast walk on level ground.
 
     Args:
         stance: Of the robot.
         sole: Length of the soles [m].
-        legs: How many it has.
+        names: Of the legs.
 
     Returns:
         Scenarios, as a job has them.
     """
     height = stance.height + sole
-    walks = _WALKS if legs // 2 >= 3 else _TIPPING_WALKS
+    walks = _WALKS if len(names) // 2 >= 3 else _TIPPING_WALKS
+    own = {
+        f"radius[{name}]": round(radius, 4)
+        for name, radius in zip(names, stance.radii, strict=True)
+        # A foot on the body's long axis is there whatever its radius is.
+        if radius > _SAME and abs(radius - stance.radius) > _SAME
+    }
     pendulum = 2.0 * math.pi * math.sqrt(height / GRAVITY)
     return [
         {
@@ -65,9 +80,40 @@ def propose_scenarios(stance: Stance, sole: float, legs: int) -> list[dict[str, 
             "stride": round(stride * height, 4),
             "height": round(_LIFT * height, 4),
             "duty_factor": _DUTY,
+            **({"by_group": own} if own else {}),
         }
         for name, (cycle, stride) in walks.items()
     ]
+
+
+def walk_within_reach(robot: Robot, values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """A proposed walk with steps as long and high as the legs reach.
+
+    Args:
+        robot: The robot.
+        values: Of the scenario's fields.
+
+    Returns:
+        The fields; and what became of the steps, nothing if they stayed as they were.
+
+    Raises:
+        RobotFileError: The legs reach no steps of a quarter of the length and height either; names
+            leg and joint.
+    """
+    refused = ""
+    for share in _SHARES:
+        steps = {name: round(share * values[name], 4) for name in ("stride", "height")}
+        try:
+            require_reachable(robot, walk_of_robot({**values, **steps}, "robot.urdf"))
+        except (UnreachablePose, BeyondJointLimit) as error:
+            refused = error.reason
+            continue
+        note = f"the walk {values['name']!r} has {share:.0%} of the usual stride and lift, as legs"
+        return {**values, **steps}, "" if share == 1.0 else f"{note} reach no further"
+    raise RobotFileError(
+        "robot.urdf: legs stand, but have no room for steps around their stance, not even of a"
+        f" quarter of the usual length: {refused}; look at this joint's limits"
+    )
 
 
 def walk_of_robot(values: Mapping[str, Any], file: str) -> Scenario:
@@ -88,9 +134,14 @@ def walk_of_robot(values: Mapping[str, Any], file: str) -> Scenario:
         return Scenario.model_validate(dict(values))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        field = str(first["loc"][0]) if first["loc"] else "scenario"
+        if not first["loc"]:
+            said = message_of(first)
+        else:
+            said = (
+                f"a walk of this robot has a {first['loc'][0]} of {first['input']:.4g}, which"
+                f" {first['msg'].removeprefix('Input ')}"
+            )
         raise RobotFileError(
-            f"{file}: a walk of this robot has a {field} of {first['input']:.4g}, which"
-            f" {first['msg'].removeprefix('Input ')}; lengths are metres: look at those of the"
-            " legs, at the stance and at contact.sole"
+            f"{file}: {said}; lengths are metres: look at those of the legs, at the stance and at"
+            " contact.sole"
         ) from error

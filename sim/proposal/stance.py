@@ -25,6 +25,10 @@ _MARGIN: Final = 0.15
 _BAND: Final = 0.06
 """How far the feet that are compared may lie from the wanted height, as a share of it."""
 
+_TURN, _SHIFT = 0.35, 0.15
+"""By which a hip may turn [rad], and a foot move as a share of its leg's length, for all feet to be
+as far from the body's long axis: of legs that are mounted about so."""
+
 
 @dataclass(frozen=True, slots=True)
 class Stance:
@@ -33,19 +37,26 @@ class Stance:
     Attributes:
         angles: of each leg's joints [rad].
         height: of the highest hip over the feet [m].
-        radius: lateral distance of the feet from the body's long axis [m].
+        radii: lateral distance of each foot from the body's long axis [m].
     """
 
     angles: tuple[tuple[float, float, float], ...]
     height: float
-    radius: float
+    radii: tuple[float, ...]
+
+    @property
+    def radius(self) -> float:
+        """Of the foot in the middle of all [m]."""
+        return float(np.median(self.radii))
 
 
 def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     """Choose a stance: feet below or beside their hips, at three quarters of the legs' reach.
 
     Of the angles that put a foot there those are taken that let it move freely in all directions,
-    with little torque, and away from the joints' limits; all feet are as far from the middle.
+    with little torque, and away from the joints' limits. All feet are as far from the body's long
+    axis, unless legs are mounted so that this would twist them: those of a round robot stay where
+    they point.
 
     Args:
         legs: Of the robot.
@@ -61,12 +72,17 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     chosen = [_best(leg, *of, ground) for leg, of in zip(legs, tried, strict=True)]
     feet = np.array([leg.foot(angles.tolist()) for leg, angles in zip(legs, chosen, strict=True)])
     radius = float(np.median(np.abs(feet[:, 1])))
-    stance = []
-    for leg, angles, foot in zip(legs, chosen, feet, strict=True):
-        target = np.array([foot[0], np.copysign(radius, foot[1]), ground])
-        stance.append(_reached(leg, angles, target))
+    beside = [_beside(*of, radius, ground) for of in zip(legs, chosen, feet, strict=True)]
     hips = max(leg.hip[2] for leg in legs)
-    return Stance(tuple(stance), hips - ground, radius)
+    if all(angles is not None for angles in beside):
+        even = tuple(_rounded(angles) for angles in beside if angles is not None)
+        return Stance(even, hips - ground, (radius,) * len(legs))
+    apart = []
+    for leg, angles, (x, y, _) in zip(legs, chosen, feet, strict=True):
+        level = _reached(leg, angles, np.array([x, y, ground]))
+        apart.append(_rounded(angles if level is None else level))
+    radii = (abs(leg.foot(angles)[1]) for leg, angles in zip(legs, apart, strict=True))
+    return Stance(tuple(apart), hips - ground, tuple(radii))
 
 
 def _best(leg: ChainLeg, angles: Floats, feet: Floats, slopes: Floats, ground: float) -> Floats:
@@ -84,23 +100,41 @@ def _best(leg: ChainLeg, angles: Floats, feet: Floats, slopes: Floats, ground: f
     torque = (slopes[:, 2, :] ** 2).sum(axis=1) / length**2
     to_limits = np.minimum(angles - leg.limits[:, 0], leg.limits[:, 1] - angles).min(axis=1)
     tight = np.maximum(0.0, 1.0 - to_limits / _MARGIN)
-    ahead = ((feet[:, 0] - leg.hip[0]) / length) ** 2
+    # A leg whose hip turns about a vertical axis points where it is mounted.
+    ahead = np.zeros(len(feet)) if _is_upright(leg) else ((feet[:, 0] - leg.hip[0]) / length) ** 2
     # A hip that is turned from the file's own zero spreads or crosses the legs.
     spread, folded = angles[:, 0] ** 2, (angles[:, 1:] ** 2).sum(axis=1)
     worth = freedom - 20.0 * torque - 5.0 * tight - 20.0 * ahead - 40.0 * spread - 0.02 * folded
     return np.asarray(angles[int(worth.argmax())])
 
 
-def _reached(leg: ChainLeg, angles: Floats, target: Floats) -> tuple[float, float, float]:
-    """The angles at which the foot is at the target, near others; those where it cannot be."""
-    at = replace(leg, stance=angles)
-    # First below the hip, where the thesis's and most legs are at rest, else where they were found.
-    for x in (leg.hip[0], float(target[0])):
-        wanted = np.array([[x, target[1], target[2]]])
-        found, miss = chain_angles(at, wanted)
-        within = (found >= leg.limits[:, 0]) & (found <= leg.limits[:, 1])
-        if not miss.any() and within.all():
-            angles = found[0]
-            break
+def _is_upright(leg: ChainLeg) -> bool:
+    """Whether the first joint's axis is rather vertical than not."""
+    return bool(abs((leg.rotations[0] @ leg.axes[0])[2]) > np.sqrt(0.5))
+
+
+def _beside(
+    leg: ChainLeg, angles: Floats, foot: Floats, radius: float, ground: float
+) -> Floats | None:
+    """Angles that put a foot as far aside as all others; None of a leg not mounted for that."""
+    if _is_upright(leg) and abs(abs(foot[1]) - radius) > _SHIFT * sum(leg.lengths):
+        return None
+    # First below the hip, where the thesis's and most legs are at rest, else where it was found.
+    for x in (leg.hip[0], foot[0]):
+        found = _reached(leg, angles, np.array([x, np.copysign(radius, foot[1]), ground]))
+        if found is not None and not (_is_upright(leg) and abs(found[0] - angles[0]) > _TURN):
+            return found
+    # A leg that hangs keeps the angles that were found for it.
+    return None if _is_upright(leg) else angles
+
+
+def _reached(leg: ChainLeg, angles: Floats, target: Floats) -> Floats | None:
+    """The angles near others at which the foot is at a target; None if it cannot be there."""
+    found, miss = chain_angles(replace(leg, stance=angles), target[None])
+    within = (found >= leg.limits[:, 0]) & (found <= leg.limits[:, 1])
+    return np.asarray(found[0]) if within.all() and not miss.any() else None
+
+
+def _rounded(angles: Floats) -> tuple[float, float, float]:
     first, second, third = np.round(angles, 6).tolist()
     return first, second, third

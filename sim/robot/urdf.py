@@ -205,6 +205,11 @@ def _parsed(text: str, held: Mapping[str, float]) -> Urdf:
         )
     in_order = {name: links[name] for name in _from_the_body(links, list(joints.values()))}
     bodies, places = _rigid_bodies(in_order, list(joints.values()))
+    if not any(body.mass for body in bodies.values()):
+        raise RobotFileError(
+            f"robot.urdf: link {next(iter(in_order))!r} and all that hangs on it have no mass; give"
+            " links an <inertial> with <mass> [kg] and <inertia> [kg m2]"
+        )
     return Urdf(text, in_order, tuple(joints.values()), bodies, places)
 
 

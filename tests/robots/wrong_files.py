@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -64,6 +65,18 @@ WRONG_URDFS: Final = (
         '<mass value="0.3"/>\n  <inert',
         _needs("a <mass> and an <inertia>"),
         'link name="FL_hip"',
+    ),
+    Wrong(
+        "weightless",
+        re.sub(r"<inertial>.*?</inertial>", "", SOURCE, flags=re.DOTALL),
+        "'trunk' and all that hangs on it have no mass; give links an <inertial>",
+        'link name="trunk"',
+    ),
+    Wrong(
+        "masses of 0",
+        re.sub(r'mass value="[^"]*"', 'mass value="0"', SOURCE),
+        "have no mass; give links an <inertial>",
+        'link name="trunk"',
     ),
     _urdf("mass of NaN", 'value="0.3"', 'value="nan"', "'nan' of <mass> is not a number", "<mass"),
     _urdf("mass below 0", 'value="0.3"', 'value="-1"', "must not be less than 0", "FL_hip"),

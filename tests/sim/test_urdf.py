@@ -77,6 +77,10 @@ def test_links_come_parents_before_their_children() -> None:
     assert all(names.index(j.parent) < names.index(j.child) for j in shuffled.joints)
 
 
+BALL = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
 A, B, C = (f'<link name="{name}"/>' for name in "abc")
 TENSOR = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
 
@@ -145,9 +149,10 @@ def test_what_cannot_be_read_is_named(robot: str, said: str) -> None:
 def test_an_axis_is_made_a_unit_vector_and_a_fixed_joint_needs_none() -> None:
     hinge = joint("j", "a", "b", '<axis xyz="0 3 -4"/>')
     weld = joint("k", "b", "c", '<axis xyz="0 0 0"/>').replace("<joint", '<joint type="fixed"')
-    found = parse_urdf(f"<robot>{A + B + C + hinge + weld}</robot>").joints[0].axis
+    trunk = A.replace("/>", ">" + BALL + "</link>")
+    found = parse_urdf(f"<robot>{trunk + B + C + hinge + weld}</robot>").joints[0].axis
     np.testing.assert_allclose(found, [0.0, 0.6, -0.8], rtol=1e-15)
-    plain = parse_urdf(f"<robot>{A + B + joint('j', 'a', 'b')}</robot>").joints[0].axis
+    plain = parse_urdf(f"<robot>{trunk + B + joint('j', 'a', 'b')}</robot>").joints[0].axis
     np.testing.assert_array_equal(plain, [1.0, 0.0, 0.0])
 
 

@@ -1,0 +1,113 @@
+"""Robots with legs all round: each leg stands where it points, and walks as far as it reaches."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gaitswarm.robot_checks import check_robot
+from sim.errors import RobotFileError
+from sim.gait.trajectory import require_reachable
+from sim.outcome import Status
+from sim.proposal.apart import walking_proposal
+from sim.proposal.document import Proposal
+from sim.robot import Robot, RobotFiles, parse_robot
+from sim.robot.legs import ChainLeg
+from sim.scenario import Scenario
+from sim.simulate import simulate
+from tests.robots.radial import radial_robot
+
+LAYOUTS = {
+    "two": (2, math.pi / 2.0),
+    "three": (3, 0.0),
+    "four, ahead": (4, 0.0),
+    "four": (4, math.pi / 4.0),
+    "five": (5, 0.3),
+    "six, ahead": (6, 0.0),
+    "six": (6, math.pi / 6.0),
+    "eight, ahead": (8, 0.0),
+    "eight": (8, math.pi / 8.0),
+    "twelve": (12, math.pi / 12.0),
+}
+
+
+def made(layout: str, limit: float = 0.8) -> tuple[Proposal, Robot]:
+    proposal = walking_proposal(radial_robot(*LAYOUTS[layout], limit), "round")
+    return proposal, parse_robot(proposal.toml, proposal.urdf)
+
+
+@pytest.mark.parametrize("limit", [0.8, 1.57])
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_every_leg_stands_where_it_points_and_both_walks_are_in_reach(
+    layout: str, limit: float
+) -> None:
+    proposal, robot = made(layout, limit)
+    assert len(robot.legs) == LAYOUTS[layout][0]
+    feet = []
+    for leg in robot.legs:
+        assert isinstance(leg, ChainLeg)
+        assert abs(leg.stance[0]) < 0.01, "no hip is turned"
+        feet.append(leg.foot(leg.stance.tolist()))
+    assert np.ptp([math.hypot(x, y) for x, y, _ in feet]) < 1e-5, "all are as far from the middle"
+    assert np.ptp([z for *_, z in feet]) < 1e-5, "all are level"
+    for walk in proposal.job["scenarios"]:
+        require_reachable(robot, Scenario.model_validate(walk))
+
+
+def test_neighbours_of_a_round_hexapod_step_in_turns() -> None:
+    for layout in ("six", "six, ahead"):
+        _, robot = made(layout)
+        phases = [leg.phase for leg in robot.description.legs]
+        assert phases in ([0.0, 0.5] * 3, [0.5, 0.0] * 3)
+
+
+@pytest.mark.parametrize("layout", ["three", "six", "eight, ahead"])
+def test_a_round_robot_carries_its_weight_on_its_feet(layout: str) -> None:
+    proposal, _ = made(layout)
+    checked = check_robot(RobotFiles(toml=proposal.toml, urdf=proposal.urdf), folder=None)
+    assert checked.warnings == []
+    assert checked.standing.normal_forces == pytest.approx(checked.standing.weight, rel=0.02)
+
+
+def test_a_round_hexapod_walks_both_of_its_walks() -> None:
+    proposal, robot = made("six")
+    for walk in proposal.job["scenarios"]:
+        scenario = Scenario.model_validate(walk)
+        walked = simulate(
+            scenario, "pid", ["P", "I", "D"], np.array([[0.5, 0.1, 0.0]]), robot=robot, log=True
+        )
+        assert Status(int(walked.outcome.statuses[0])) is Status.OK
+        (log,) = walked.logs
+        assert log is not None
+        wanted = scenario.stride * scenario.cycles
+        assert log.base_position[-1, 0] - log.base_position[0, 0] > 0.5 * wanted
+
+
+def test_steps_are_as_long_as_narrow_joints_allow_and_that_is_told() -> None:
+    proposal, robot = made("six", limit=0.15)
+    usual, _ = made("six")
+    for walk, whole in zip(proposal.job["scenarios"], usual.job["scenarios"], strict=True):
+        assert walk["stride"] < whole["stride"] and walk["height"] < whole["height"]
+        require_reachable(robot, Scenario.model_validate(walk))
+        (note,) = (note for note in proposal.guesses if f"the walk {walk['name']!r}" in note)
+        assert "of the usual stride and lift, as legs reach no further" in note
+
+
+def test_legs_without_room_for_steps_are_refused_by_joint() -> None:
+    said = (
+        r"robot\.urdf: legs stand, but have no room for steps .* joint 'leg\d_coxa' of leg"
+        r" 'leg\d' would turn 0\.\d+ rad beyond its limit; look at this joint's limits"
+    )
+    with pytest.raises(RobotFileError, match=said):
+        made("six", limit=0.01)
+
+
+def test_legs_are_named_by_what_their_joints_share() -> None:
+    _, robot = made("six")
+    assert [leg.name for leg in robot.legs] == [f"leg{k}" for k in range(6)]
+    text = radial_robot(6).replace("_coxa", "_j1").replace("_femur", "_j2").replace("_tibia", "_j3")
+    proposal = walking_proposal(text, "round")
+    robot = parse_robot(proposal.toml, proposal.urdf)
+    assert [leg.name for leg in robot.legs] == [f"leg{k}" for k in range(6)]

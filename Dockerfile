@@ -23,12 +23,23 @@ COPY web /src/web
 COPY --from=code /openapi.json /src/web/openapi.json
 RUN cd /src/web && npm run types && npm run build
 
+FROM code AS manual
+COPY requirements/manual.lock /src/requirements/
+RUN pip install --no-deps --require-hashes --only-binary :all: -r /src/requirements/manual.lock
+COPY ARCHITECTURE.md CHANGELOG.md docker-compose.yml /src/
+COPY docs /src/docs
+COPY examples /src/examples
+COPY deploy/kubernetes/kustomization.yaml /src/deploy/kubernetes/
+COPY scripts/manual.py /src/scripts/
+RUN cd /src && python -m sphinx -q -b html -d /tmp/manual -c docs . api/manual
+
 FROM code AS build
 # Kernels for every level of this architecture, whatever machine builds the image.
 RUN apt-get update && apt-get install --yes --no-install-recommends gcc libc6-dev
 COPY scripts/prebuilt.py /src/scripts/
 RUN cd /src && python -m scripts.prebuilt
 COPY --from=page /src/api/page /src/api/page
+COPY --from=manual /src/api/manual /src/api/manual
 RUN pip install --no-deps --no-build-isolation /src
 
 FROM python:3.13-slim-bookworm

@@ -17,7 +17,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page manual wheel bench test test-firefox unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev page-if-possible
+.PHONY: help demo serve page manual wheel bench test test-firefox unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev setup-manual page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -33,11 +33,11 @@ serve: setup page-if-possible ## Serve page and REST API on http://127.0.0.1:800
 page: setup ## Build the page that is served (with node and npm, or those of a wheel).
 	@scripts/page.sh
 
-manual: setup-dev ## Build the manual that is served on /manual from docs/.
+manual: setup-manual ## Build the manual that is served on /manual from docs/.
 	@rm -rf api/manual
 	@$(BIN)/python -m sphinx -q -W -b html -d build/manual -c docs . api/manual
 
-wheel: setup page-if-possible ## Build a wheel into dist/, with the page and compiled kernels.
+wheel: setup page-if-possible manual ## Build a wheel into dist/, with the page, the manual and compiled kernels.
 	@$(BIN)/python -m scripts.prebuilt
 	@$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@rm -rf sim/compiler/prebuilt
@@ -91,6 +91,7 @@ lock: ## Choose versions anew, after a change of the dependencies in pyproject.t
 	$(COMPILE) pyproject.toml --extra postgres --extra search --extra rivals --extra mujoco --extra telemetry --group dev -c requirements/run.lock -o requirements/dev.lock
 	$(COMPILE) pyproject.toml --extra postgres --extra search --extra mujoco --extra telemetry --extra cluster --group build -c requirements/run.lock -o requirements/image.lock
 	sed -n 's/^compiler = \["\(.*\)"\]/\1/p' pyproject.toml | $(COMPILE) - -o requirements/compiler.lock
+	$(COMPILE) --group manual -c requirements/dev.lock -o requirements/manual.lock
 	$(COMPILE) --group node -o requirements/node.lock
 	$(COMPILE) --group installer -o requirements/installer.lock
 	$(COMPILE) --group robots -o requirements/robots.lock
@@ -104,6 +105,10 @@ setup:
 
 setup-dev:
 	@scripts/setup.sh dev
+
+# The developers' lock has the manual's in it.
+setup-manual: setup
+	@test -e .venv/installed-dev || scripts/setup.sh manual
 
 page-if-possible: setup
 	@scripts/page.sh --if-possible

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Make .venv hold what one lock file says, and nothing half-installed: setup.sh run|dev
+# Make .venv hold what one lock file says, and nothing half-installed: setup.sh run|dev|manual
 #
 # Does nothing if it already does. Needs a Python with venv and pip, and a package index that its
 # pip is configured for; PYTHON=/path/to/python overrides which Python is taken.
 set -eu
 cd "$(dirname "$0")/.."
 
-lock="requirements/${1:?which lock: run or dev}.lock"
+lock="requirements/${1:?which lock: run, dev or manual}.lock"
 venv=.venv
 say() { printf 'set-up: %s\n' "$*" >&2; }
 

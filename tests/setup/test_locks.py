@@ -45,9 +45,10 @@ def test_locks_pin_all_that_is_asked_for() -> None:
     development = {_name(r) for r in PROJECT["dependency-groups"]["dev"] if isinstance(r, str)}
     assert asked - set(run) == set()
     engines = {_name(r) for r in extras["mujoco"]}
+    development |= {_name(r) for r in PROJECT["dependency-groups"]["manual"]}
     assert (asked | development | engines) - set(dev) == set()
     assert (asked | engines | {_name(r) for r in extras["cluster"]}) - set(image) == set()
-    for group in ("node", "installer", "robots"):
+    for group in ("manual", "node", "installer", "robots"):
         wanted = {_name(r) for r in PROJECT["dependency-groups"][group]}
         assert wanted - set(_pins(ROOT / "requirements" / f"{group}.lock")) == set()
 
@@ -58,3 +59,8 @@ def test_what_is_developed_and_shipped_has_the_versions_that_run(other: str) -> 
     assert {
         name: versions for name, versions in run.items() if compared.get(name) != versions
     } == {}
+
+
+def test_the_manual_is_built_with_the_versions_that_it_is_developed_with() -> None:
+    built, developed = (_pins(ROOT / "requirements" / f"{name}.lock") for name in ("manual", "dev"))
+    assert {name: v for name, v in built.items() if not v <= developed.get(name, set())} == {}

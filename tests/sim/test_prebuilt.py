@@ -34,6 +34,9 @@ from sim.simulate import prepare
 print(prepare(RobotVariant(contact_law="karnopp")))
 """
 
+# What the server shows to people: `make page` and `make manual` make it.
+BUILT = ("api/page/index.html", "api/manual/docs/index.html")
+
 # ELF's names for machines: EM_X86_64 and EM_AARCH64.
 MACHINES = {X86: 62, ARM: 183}
 
@@ -51,12 +54,15 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Our packages from a wheel with this machine's kernels, unpacked."""
     folder = tmp_path_factory.mktemp("installed")
     source = folder / "source"
-    ignored = shutil.ignore_patterns("__pycache__", "prebuilt", "page", "node_modules")
+    ignored = shutil.ignore_patterns("__pycache__", "prebuilt", "page", "manual", "node_modules")
     for name in ("sim", "services", "gaitswarm", "api", "cli"):
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
     # With what git ignores, so that a wheel brings it only because it is told to.
     for name in ("pyproject.toml", "README.md", ".gitignore"):
         shutil.copy(ROOT / name, source)
+    for built in BUILT:
+        (source / built).parent.mkdir(parents=True)
+        (source / built).write_text("<h1>Built</h1>", encoding="utf-8")
     arguments = ["--targets", host_target(), "--robots", DEFAULT_ROBOT]
     main([*arguments, "--directory", str(source / "sim" / "compiler" / "prebuilt")])
     command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation"]
@@ -110,6 +116,11 @@ def test_a_damaged_kernel_of_a_wheel_is_refused_with_what_to_do(
     assert done.returncode == 1
     assert f"{kernel} is damaged" in done.stderr
     assert "install gcc or clang" in done.stderr
+
+
+@pytest.mark.parametrize("built", BUILT)
+def test_a_wheel_brings_what_was_built_for_people(installed: Path, built: str) -> None:
+    assert (installed / built).is_file()
 
 
 def test_every_library_of_a_wheel_has_its_checksum(installed: Path) -> None:

@@ -30,7 +30,7 @@ COPY ARCHITECTURE.md CHANGELOG.md docker-compose.yml /src/
 COPY docs /src/docs
 COPY examples /src/examples
 COPY deploy/kubernetes/kustomization.yaml /src/deploy/kubernetes/
-COPY scripts/manual.py /src/scripts/
+COPY scripts/manual /src/scripts/manual
 RUN cd /src && python -m sphinx -q -b html -d /tmp/manual -c docs . api/manual
 
 FROM code AS build

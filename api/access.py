@@ -81,7 +81,7 @@ class AccessMiddleware:
         try:
             response = await self._refusal(scope, path)
         except StoreUnavailable as error:
-            response = problem(scope["path"], 503, "unavailable", str(error))
+            response = problem(scope["path"], "unavailable", str(error))
         await (response or self.app)(scope, receive, send)
 
     async def _refusal(self, scope: Scope, path: str) -> Response | None:

@@ -171,7 +171,7 @@ class LimitedProtocol(H11Protocol):
     def _one_too_many(self) -> Response | None:
         if len(self.connections) > self._limits.connections:
             detail = "too many connections are open; try again later"
-            return problem("/", 503, "unavailable", detail, headers={"Retry-After": "5"})
+            return problem("/", "unavailable", detail, headers={"Retry-After": "5"})
         if self._counted is not None and self._clients[self._counted] > self._limits.of_client:
             detail = "too many connections are open from this address; close some"
             return too_many_requests("/", 5.0, detail)
@@ -219,7 +219,7 @@ class LimitedProtocol(H11Protocol):
             self._refuse(headers_too_large(self._limits.header_bytes))
         else:
             detail = "this is no request of HTTP/1.1"
-            self._refuse(problem("/", 400, "malformed-request", detail))
+            self._refuse(problem("/", "malformed-request", detail))
 
     @property
     def _request(self) -> RequestResponseCycle | None:
@@ -256,7 +256,7 @@ class LimitedProtocol(H11Protocol):
             return
         detail = f"the {self._owes} of the request took too long to come; send it at once"
         path = self.scope["path"] if self._owes == "body" else "/"
-        self._refuse(problem(path, 408, "too-slow", detail))
+        self._refuse(problem(path, "too-slow", detail))
 
     def _refuse(self, answer: Response) -> None:
         """Answer, if it is not too late for an answer, and end the connection."""

@@ -60,7 +60,7 @@ def add_manual(app: FastAPI, folder: Path) -> None:
         path = (root / request.path_params["path"]).resolve()
         if not (path.is_relative_to(root) and path.is_file()):
             detail = "the manual has no such page; begin at /manual"
-            return problem(request.url.path, HTTPStatus.NOT_FOUND, "not-found", detail)
+            return problem(request.url.path, "not-found", detail)
         if path.suffix != ".html":
             return FileResponse(path, headers={"Cache-Control": "no-cache"})
         text = path.read_bytes()
@@ -76,8 +76,7 @@ def _unbuilt(request: Request) -> Response:
     """What to do about it: a page for browsers, a problem for programs."""
     headers = {"Cache-Control": "no-cache", "Vary": "Accept"}
     if "text/html" not in request.headers.get("accept", ""):
-        path, status = request.url.path, HTTPStatus.NOT_FOUND
-        return problem(path, status, "not-found", _UNBUILT, headers=headers)
+        return problem(request.url.path, "not-found", _UNBUILT, headers=headers)
     text = _UNBUILT_PAGE.format(root=escape(request.scope.get("root_path", "")))
     return HTMLResponse(text, HTTPStatus.NOT_FOUND, headers)
 

@@ -128,7 +128,7 @@ class BodyLimitMiddleware:
             if most > self.max_bytes:
                 advice = "leave out cycles, or raise GAITSWARM_API_MAX_LOG_BYTES on the server"
             detail = f"the body is larger than {most} bytes; {advice}"
-            refusal = problem(scope["path"], 413, "body-too-large", detail)
+            refusal = problem(scope["path"], "body-too-large", detail)
             await refusal(scope, receive, send)
             return
         received = 0

@@ -62,7 +62,7 @@ def add_metrics(app: FastAPI, metrics: Metrics, access: MetricsAccess) -> None:
         try:
             allowed = access.allows(request.headers.get("authorization", ""))
         except StoreUnavailable as error:
-            return problem(request.url.path, 503, "unavailable", str(error))
+            return problem(request.url.path, "unavailable", str(error))
         if not allowed:
             return unauthorized(request.url.path, REFUSAL)
         text, media_type = metrics.exposition(request.headers.get("accept", ""))

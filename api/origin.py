@@ -52,7 +52,7 @@ class HostMiddleware:
                 f"this server does not go by the name {host!r}; if it should, add the name to"
                 " GAITSWARM_API_ALLOWED_HOSTS where it is started"
             )
-            response = problem(scope["path"], 421, "unknown-host", detail)
+            response = problem(scope["path"], "unknown-host", detail)
             await response(scope, receive, send)
             return
         await self.app(scope, receive, send)
@@ -86,7 +86,7 @@ class SameOriginMiddleware:
             headers = Headers(scope=scope)
             if not self._is_own(headers):
                 detail = "a page of another origin may not do this; use the page of this server"
-                response = problem(scope["path"], 403, "cross-origin", detail)
+                response = problem(scope["path"], "cross-origin", detail)
                 await response(scope, receive, send)
                 return
         await self.app(scope, receive, send)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import mimetypes
 import re
-from http import HTTPStatus
 from pathlib import Path
 from typing import Final
 
@@ -56,7 +55,7 @@ def add_page(app: FastAPI, folder: Path) -> None:
             instead = _without_page(request)
             if instead is not None:
                 return RedirectResponse(instead)
-            return problem(request.url.path, HTTPStatus.NOT_FOUND, "not-found", _UNBUILT)
+            return problem(request.url.path, "not-found", _UNBUILT)
         # It names assets that a newer build no longer has: ask every time.
         return HTMLResponse(text, headers={"Cache-Control": "no-cache"})
 
@@ -66,7 +65,7 @@ def add_page(app: FastAPI, folder: Path) -> None:
         # The router gives no slash in a name; `..` remains.
         if name.startswith(".") or not path.is_file():
             detail = "the page has no such asset; reload the page, it was built anew"
-            return problem(request.url.path, HTTPStatus.NOT_FOUND, "not-found", detail)
+            return problem(request.url.path, "not-found", detail)
         media_type = _MEDIA_TYPES.get(path.suffix) or mimetypes.guess_type(name)[0]
         headers = {"Cache-Control": "public, max-age=31536000, immutable"}
         return FileResponse(path, headers=headers, media_type=media_type)

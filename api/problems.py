@@ -73,43 +73,44 @@ _LONGEST_MESSAGE: Final = 1000
 _LONGEST_DETAIL: Final = 5000
 """Characters: what is wrong may quote a whole body."""
 
-_TITLES: Final = {
-    "malformed-json": "The body is not JSON",
-    "invalid-request": "The request is not valid",
-    "unauthorized": "The server does not know who is asking",
-    "forbidden": "Whoever asks may not do that",
-    "cross-origin": "The request comes from another origin",
-    "not-found": "There is no such thing",
-    "method-not-allowed": "The method is not allowed here",
-    "conflict": "The present state does not allow it",
-    "idempotency-conflict": "The idempotency key was used for another request",
-    "quota-exceeded": "The owner has too much under way",
-    "unreadable": "This version cannot read the job",
-    "malformed-request": "This is no request",
-    "too-slow": "The request took too long to come",
-    "headers-too-large": "The head of the request is too large",
-    "body-too-large": "The body is too large",
-    "unknown-host": "The server does not go by this name",
-    "too-many-requests": "Whoever asks does so too often",
-    "unavailable": "The service cannot do it now",
-    "draining": "The server is ending",
-    "internal-error": "Something went wrong on the server",
+PROBLEMS: Final[dict[str, tuple[int, str]]] = {
+    "malformed-json": (400, "The body is not JSON"),
+    "invalid-request": (422, "The request is not valid"),
+    "unauthorized": (401, "The server does not know who is asking"),
+    "forbidden": (403, "Whoever asks may not do that"),
+    "cross-origin": (403, "The request comes from another origin"),
+    "not-found": (404, "There is no such thing"),
+    "method-not-allowed": (405, "The method is not allowed here"),
+    "conflict": (409, "The present state does not allow it"),
+    "idempotency-conflict": (409, "The idempotency key was used for another request"),
+    "quota-exceeded": (409, "The owner has too much under way"),
+    "unreadable": (409, "This version cannot read the job"),
+    "malformed-request": (400, "This is no request"),
+    "too-slow": (408, "The request took too long to come"),
+    "headers-too-large": (431, "The head of the request is too large"),
+    "body-too-large": (413, "The body is too large"),
+    "unknown-host": (421, "The server does not go by this name"),
+    "too-many-requests": (429, "Whoever asks does so too often"),
+    "unavailable": (503, "The service cannot do it now"),
+    "draining": (503, "The server is ending"),
+    "internal-error": (500, "Something went wrong on the server"),
 }
+"""Status and title of every type of problem, by the last part of its URN."""
 
-_KINDS: Final[tuple[tuple[type[Exception], HTTPStatus, str], ...]] = (
-    (InvalidRequest, HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request"),
-    (NotFound, HTTPStatus.NOT_FOUND, "not-found"),
-    (Unauthorized, HTTPStatus.UNAUTHORIZED, "unauthorized"),
-    (Forbidden, HTTPStatus.FORBIDDEN, "forbidden"),
-    (IdempotencyConflict, HTTPStatus.CONFLICT, "idempotency-conflict"),
-    (QuotaExceeded, HTTPStatus.CONFLICT, "quota-exceeded"),
-    (Unreadable, HTTPStatus.CONFLICT, "unreadable"),
-    (Conflict, HTTPStatus.CONFLICT, "conflict"),
-    (LeaseLost, HTTPStatus.CONFLICT, "conflict"),
-    (StoreUnavailable, HTTPStatus.SERVICE_UNAVAILABLE, "unavailable"),
-    (EvaluatorUnavailable, HTTPStatus.SERVICE_UNAVAILABLE, "unavailable"),
-    (SimulationInputError, HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request"),
-    (SimulationError, HTTPStatus.SERVICE_UNAVAILABLE, "unavailable"),
+_KINDS: Final[tuple[tuple[type[Exception], str], ...]] = (
+    (InvalidRequest, "invalid-request"),
+    (NotFound, "not-found"),
+    (Unauthorized, "unauthorized"),
+    (Forbidden, "forbidden"),
+    (IdempotencyConflict, "idempotency-conflict"),
+    (QuotaExceeded, "quota-exceeded"),
+    (Unreadable, "unreadable"),
+    (Conflict, "conflict"),
+    (LeaseLost, "conflict"),
+    (StoreUnavailable, "unavailable"),
+    (EvaluatorUnavailable, "unavailable"),
+    (SimulationInputError, "invalid-request"),
+    (SimulationError, "unavailable"),
 )
 """Domain errors, the more special first."""
 
@@ -127,10 +128,10 @@ _HTTP: Final = {
 
 def problem(
     request_path: str,
-    status: int,
     kind: str,
     detail: str,
     *,
+    status: int | None = None,
     errors: Sequence[FieldErrorView] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
@@ -138,25 +139,26 @@ def problem(
 
     Args:
         request_path: path that was asked for.
-        status: HTTP status.
         kind: last part of the problem's type.
         detail: what went wrong and what to do about it.
+        status: HTTP status, where the kind is none of `PROBLEMS`.
         errors: every offending field.
         headers: of the response, beside its media type.
 
     Returns:
         The response.
     """
+    known, title = PROBLEMS.get(kind) or (status or 500, HTTPStatus(status or 500).phrase)
     view = ProblemView(
         type=f"urn:gaitswarm:problem:{kind}",
-        title=_TITLES.get(kind, HTTPStatus(status).phrase),
-        status=status,
+        title=title,
+        status=known,
         detail=shortened(detail, _LONGEST_DETAIL),
         instance=request_path,
         errors=list(errors),
     )
     body = view.model_dump_json()
-    return Response(body, status, dict(headers or {}), media_type=MEDIA_TYPE)
+    return Response(body, known, dict(headers or {}), media_type=MEDIA_TYPE)
 
 
 def unauthorized(request_path: str, detail: str) -> Response:
@@ -169,8 +171,8 @@ def unauthorized(request_path: str, detail: str) -> Response:
     Returns:
         The response, with the header that RFC 9110 asks for.
     """
-    status, headers = HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"}
-    return problem(request_path, status, "unauthorized", detail, headers=headers)
+    headers = {"WWW-Authenticate": "Bearer"}
+    return problem(request_path, "unauthorized", detail, headers=headers)
 
 
 def unavailable(
@@ -192,8 +194,7 @@ def unavailable(
         The response.
     """
     _log.error("%s: %s", request_path, detail)
-    status = HTTPStatus.SERVICE_UNAVAILABLE
-    return problem(request_path, status, kind, detail, errors=errors, headers=_RETRY)
+    return problem(request_path, kind, detail, errors=errors, headers=_RETRY)
 
 
 def too_many_requests(request_path: str, seconds: float, detail: str | None = None) -> Response:
@@ -212,7 +213,7 @@ def too_many_requests(request_path: str, seconds: float, detail: str | None = No
         detail or f"there are too many requests with this token or from this address; wait {wait} s"
     )
     headers = {"Retry-After": str(wait)}
-    return problem(request_path, 429, "too-many-requests", text, headers=headers)
+    return problem(request_path, "too-many-requests", text, headers=headers)
 
 
 MOST_HEADERS: Final = 100
@@ -232,7 +233,7 @@ def headers_too_large(most_bytes: int) -> Response:
         f"the head of the request has more than {MOST_HEADERS} headers or {most_bytes} bytes; send"
         " fewer, and what is long in the body"
     )
-    return problem("/", 431, "headers-too-large", detail)
+    return problem("/", "headers-too-large", detail)
 
 
 def internal_error(request_path: str, request_id: str) -> Response:
@@ -247,7 +248,6 @@ def internal_error(request_path: str, request_id: str) -> Response:
     """
     return problem(
         request_path,
-        500,
         "internal-error",
         f"try again; if it stays, report it with the request id {request_id}, by which the"
         " server's log names the cause",
@@ -284,7 +284,8 @@ async def domain_problem(request: Request, error: Exception) -> Response:
     found = next((row for row in _KINDS if isinstance(error, row[0])), None)
     if found is None:
         raise error
-    _, status, name = found
+    _, name = found
+    status, _ = PROBLEMS[name]
     detail = str(error)
     errors = []
     if isinstance(error, InvalidRequest | QuotaExceeded):
@@ -294,10 +295,10 @@ async def domain_problem(request: Request, error: Exception) -> Response:
         errors = [_short(FieldErrorView.from_message("", detail))]
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
         _log.error("%s %s: %s", request.method, request.url.path, detail)
-        return problem(request.url.path, status, name, detail, headers=_RETRY)
+        return problem(request.url.path, name, detail, headers=_RETRY)
     if status == HTTPStatus.UNAUTHORIZED:
         return unauthorized(request.url.path, detail)
-    return problem(request.url.path, status, name, detail, errors=errors)
+    return problem(request.url.path, name, detail, errors=errors)
 
 
 async def _on_http_error(request: Request, raised: Exception) -> Response:
@@ -308,7 +309,7 @@ async def _on_http_error(request: Request, raised: Exception) -> Response:
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
         # Starlette names the methods of the first route of a path alone.
         headers = {"Allow": ", ".join(_methods(request))}
-    return problem(request.url.path, error.status_code, kind, advice, headers=headers)
+    return problem(request.url.path, kind, advice, status=error.status_code, headers=headers)
 
 
 def _methods(request: Request) -> list[str]:
@@ -330,13 +331,13 @@ async def _on_invalid(request: Request, raised: Exception) -> Response:
         reason = entry.get("ctx", {}).get("error", "it cannot be parsed")
         message = f"{reason} at character {entry['loc'][-1]}; send one JSON object"
         errors = [FieldErrorView(field="body", message=message)]
-        return problem(request.url.path, 400, "malformed-json", f"body: {message}", errors=errors)
+        return problem(request.url.path, "malformed-json", f"body: {message}", errors=errors)
     errors = _in_the_words_of_the_request(found, error.body)
     shown = [_short(entry) for entry in errors[:_MOST_ERRORS]]
     detail = "; ".join(f"{e.field}: {e.message}" if e.field else e.message for e in shown)
     if len(errors) > _MOST_ERRORS:
         detail += f"; and {len(errors) - _MOST_ERRORS} more"
-    return problem(request.url.path, 422, "invalid-request", detail, errors=shown)
+    return problem(request.url.path, "invalid-request", detail, errors=shown)
 
 
 def _short(error: FieldErrorView) -> FieldErrorView:

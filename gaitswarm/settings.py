@@ -55,32 +55,43 @@ class Settings(BaseSettings):
     )
     token: str | None = Field(
         default=None,
-        description="Token that is sent to `server`, or where there is none to the one that is"
-        " named otherwise.",
+        description="Token that is sent to the server, where it asks for one: to that of"
+        " GAITSWARM_SERVER if it is set, and to no other.",
         repr=False,
     )
     token_over_http: bool = Field(
-        default=False, description="Whether a token may leave this machine over plain HTTP."
+        default=False,
+        description="Whether a token may leave this machine over plain HTTP, where anybody on the"
+        " way can read it.",
     )
     db: str | None = Field(
         default=None,
         description="Database of the jobs: a file name, sqlite:///FILE or"
-        " postgresql://USER:PASSWORD@HOST/DATABASE. Default: `default_database`.",
+        " postgresql://USER:PASSWORD@HOST/DATABASE. Default: gaitswarm/gaitswarm.db in the user's"
+        " data directory.",
     )
-    evaluator: EvaluatorKind = Field(default="ray", description="Where walks run.")
+    evaluator: EvaluatorKind = Field(
+        default="ray",
+        description="Where walks run: `in-process` is threads of the process throughout.",
+    )
     ray_address: str | None = Field(
-        default=None, description="Ray cluster for all walks; else one is started in long jobs."
+        default=None,
+        description="Ray cluster for all walks: HOST:PORT of its head, of which the machine becomes"
+        " a node, or `auto` on a node. Without one, walks run in threads of the process, and long"
+        " jobs on a Ray that it starts.",
     )
     cpus: int | None = Field(
         default=None, ge=1, description="Walks to compute at once on this machine; default all."
     )
     cache: bool = Field(
-        default=True, description="Whether a design is walked only if no job has walked it before."
+        default=True,
+        description="Whether a design is walked only if no job of the database has walked it"
+        " before.",
     )
     kernel_cache_bytes: int = Field(
         default=DEFAULT_SIZE,
         ge=0,
-        description="What compiled kernels may take together [B]; `sim.compiler.cache` reads it.",
+        description="What compiled kernels may take together [B].",
     )
     concurrent_jobs: int = Field(default=2, ge=1, le=256, description="Jobs to run at once.")
     lease_seconds: float = Field(
@@ -97,14 +108,19 @@ class Settings(BaseSettings):
     )
     robots: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(_paths)] = Field(
         default=(),
-        description="Folders of robots, or of such folders, whose meshes a server gives out.",
+        description="Folders of robots, or of such folders, with `:` between, whose meshes a server"
+        " gives out to whoever may read its jobs.",
     )
     webhook_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=(),
-        description="Hosts, with or without port, that may be told of ended jobs; none: nobody is.",
+        description="Hosts, each with or without port and with commas between, that may be told of"
+        " ended jobs; none: nobody is.",
     )
     webhook_secret: str | None = Field(
-        default=None, description="Signs what they are told.", repr=False
+        default=None,
+        description="Signs what the hosts of GAITSWARM_WEBHOOK_HOSTS are told; any text, or"
+        " `whsec_` and base64.",
+        repr=False,
     )
     drain_seconds: float = Field(
         default=60.0,
@@ -120,28 +136,33 @@ class Settings(BaseSettings):
     )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
     log_format: Literal["console", "json"] = Field(
-        default="console", description="Lines for people, or an object of JSON for each message."
+        default="console",
+        description="`console`: lines for people; `json`: an object for each message.",
     )
     metrics_port: int | None = Field(
         default=None,
         ge=0,
         le=65535,
-        description="Port on which a runner serves its metrics; 0 takes a free one, none: it does"
-        " not.",
+        description="Port on which `runner` serves its metrics; 0 takes a free one, which the log"
+        " names; none: it does not.",
     )
-    metrics_host: str = Field(default="127.0.0.1", description="Address of that port.")
+    metrics_host: str = Field(
+        default="127.0.0.1",
+        description="Address of the port of metrics; beyond the machine itself, they need a token.",
+    )
     api_host: str = Field(default="127.0.0.1", description="Address to listen on.")
     api_port: int = Field(
         default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one."
     )
     api_access: Literal["auto", "token"] = Field(
         default="auto",
-        description="Whether requests need a token: always, or where the server listens beyond its"
-        " own machine.",
+        description="`auto`: requests need a token where the server listens beyond its own machine;"
+        " `token`: always.",
     )
     api_allowed_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=(),
-        description="Names, with or without port, that the server is reached by, beside its own.",
+        description="Names, each with or without port and with commas between, that the server is"
+        " reached by beside its addresses, `localhost`, its host and the machine's name.",
     )
     api_max_body_bytes: int = Field(
         default=1 << 20, ge=1, description="Largest request body that is read [B]."
@@ -149,76 +170,99 @@ class Settings(BaseSettings):
     api_max_log_bytes: int = Field(
         default=1 << 24,
         ge=1,
-        description="The same of a body with a measured log, a second of which takes about a"
-        " megabyte [B].",
+        description="Largest body with a measured log, a second of which takes about a megabyte"
+        " [B].",
     )
     api_event_poll_seconds: float = Field(
         default=0.5,
         gt=0.0,
         le=60.0,
-        description="How often jobs that streams follow are looked at, where nothing tells [s].",
+        description="How often jobs that event streams follow are looked at, all at once, where the"
+        " database tells of no changes: SQLite, or a PostgreSQL whose listener is lost [s].",
     )
     api_simulation_workers: int = Field(
-        default=2, ge=1, le=64, description="Walks on request that compute at the same time."
+        default=2, ge=1, le=64, description="Simulations on request that compute at once."
     )
     api_simulation_queue: int = Field(
-        default=16, ge=0, description="Further ones that may wait; more are told to come later."
+        default=16,
+        ge=0,
+        description="Further simulations that may wait; more are told to come later.",
     )
     api_analysis_workers: int = Field(
-        default=2, ge=1, le=64, description="Questions about whole histories computed at a time."
+        default=2,
+        ge=1,
+        le=64,
+        description="Questions about whole histories (fronts, certificates, evidence, forks) that"
+        " compute at once.",
     )
     api_analysis_queue: int = Field(
-        default=64, ge=0, description="Further ones that may wait; more are told to come later."
+        default=64,
+        ge=0,
+        description="Further questions that may wait; more are told to come later.",
     )
     api_max_fork_seconds: float = Field(
         default=20.0,
         gt=0.0,
-        description="How long bringing a search to where it was may take, for a fork [s].",
+        description="How long bringing a search to where it was may take, for a fork [s]; 409"
+        " beyond it.",
     )
     api_max_simulated_seconds: float = Field(
         default=300.0, gt=0.0, description="Longest walk of one request, all scenarios added [s]."
     )
     api_max_logged_seconds: float = Field(
-        default=40.0, gt=0.0, description="The same for a request that asks for logs [s]."
+        default=40.0, gt=0.0, description="Longest walk of a request that asks for logs [s]."
     )
     api_max_sampled_seconds: float = Field(
         default=10_000.0,
         gt=0.0,
-        description="The same for a request that walks a sample of designs [s].",
+        description="Longest walk of a request that walks a sample of designs, all designs added"
+        " [s].",
     )
     api_max_job_seconds: float = Field(
         default=1e10,
         gt=0.0,
-        description="Longest job that is taken, all walks of all designs added [s].",
+        description="Longest job that is taken, all walks of all designs added [s]: by default"
+        " three months of one core at 1200 x real time.",
     )
     api_request_rate: float = Field(
         default=100.0,
         gt=0.0,
-        description="Requests with one token, or from one address, that are answered a second.",
+        description="Requests with one token, or from one address without, that are answered a"
+        " second; on a server that asks for no token, those of its own machine are not counted.",
     )
     api_request_burst: int = Field(
-        default=1000, ge=1, description="Of these requests, those that may come at once."
+        default=1000,
+        ge=1,
+        description="Requests with one token, or from one address without, that may come at once.",
     )
     api_max_streams: int = Field(
         default=256, ge=1, description="Event streams that one token or address may have open."
     )
     api_max_unfinished_jobs: int = Field(
-        default=10_000, ge=1, description="Jobs of one owner that may be queued, running or paused."
+        default=10_000,
+        ge=1,
+        description="Jobs of one owner that may be queued, running or paused; `admin` may submit"
+        " more.",
     )
     api_max_unfinished_seconds: float = Field(
         default=1e11,
         gt=0.0,
-        description="Simulated time that these jobs may come to, all walks of all designs added"
-        " [s].",
+        description="Simulated time that unfinished jobs of one owner may come to, all walks of all"
+        " designs added [s].",
     )
     api_max_connections: int = Field(
         default=512, ge=1, description="Connections that may be open; more are told to come later."
     )
     api_max_client_connections: int = Field(
-        default=256, ge=1, description="The same for one address, but of a trusted proxy."
+        default=256,
+        ge=1,
+        description="Connections of one address that may be open, unless it is a trusted proxy's.",
     )
     api_max_header_bytes: int = Field(
-        default=32_768, ge=1024, le=1 << 20, description="Largest head of a request [B]."
+        default=32_768,
+        ge=1024,
+        le=1 << 20,
+        description="Largest head of a request [B]; it may have 100 headers.",
     )
     api_head_seconds: float = Field(
         default=10.0, gt=0.0, description="How long a client may take to send a request's head [s]."
@@ -231,8 +275,8 @@ class Settings(BaseSettings):
     )
     api_trusted_proxies: Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=("127.0.0.1", "::1"),
-        description="Addresses or networks of proxies, whose word is taken for who asks and by"
-        " which scheme.",
+        description="Addresses or networks, with commas between, of proxies whose word is taken for"
+        " who asks and by which scheme.",
     )
     api_shutdown_seconds: int = Field(
         default=5, ge=1, le=600, description="How long open requests may finish on shutdown [s]."

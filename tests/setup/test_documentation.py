@@ -34,20 +34,21 @@ def test_every_make_target_that_is_written_exists() -> None:
     assert written - targets == set()
 
 
-def test_every_setting_is_documented_and_no_other() -> None:
-    documented = set(re.findall(r"`(GAITSWARM_[A-Z_]+)", documentation()))
-    assert documented == settings_classes.variables()
+def test_every_setting_that_is_written_exists() -> None:
+    written = set(re.findall(r"`(GAITSWARM_[A-Z_]+)", documentation()))
+    known = settings_classes.variables()
+    groups = {word for word in written if word.endswith("_")}
+    assert len(written) > 40
+    assert written - groups - known == set()
+    assert [word for word in groups if not any(name.startswith(word) for name in known)] == []
 
 
-def test_every_route_is_documented_and_no_other() -> None:
-    routes = {
-        f"{method.upper()} {path}"
-        for path, item in api_document()["paths"].items()
-        for method in item
-    }
-    table = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (GET|POST|PUT|PATCH|DELETE) \| `([^`]+)` \|", table, re.MULTILINE)
-    assert {f"{method} {path}" for method, path in rows} == routes
+def test_every_route_that_is_written_exists() -> None:
+    paths = [re.sub(r"\{\w+\}", "{}", path) for path in api_document()["paths"]]
+    text = re.sub(r"\{\w+\}|\bID\b", "{}", documentation())
+    written = set(re.findall(r"[` ](/v1/[\w/{}-]+)", text))
+    assert len(written) > 30
+    assert [path for path in written if path.rstrip("/") not in paths] == []
 
 
 def test_pages_of_the_manual_that_the_page_leads_to_exist() -> None:

@@ -56,6 +56,9 @@ def test_reference_is_made_from_the_code(manual: Path) -> None:
     assert "gaitswarm optimize [OPTIONS]" in text("commands.html")
     assert "open-circuit voltage [V]" in text("robot-file.html")
     assert 'id="gaitswarm.simulate"' in text("python.html")
+    assert "GET /v1/jobs/{job_id}/events" in text("rest.html")
+    assert 'href="schemas.html#schema-jobview"' in text("rest.html")
+    assert "GAITSWARM_LEASE_SECONDS" in text("settings.html")
 
 
 @pytest.mark.slow

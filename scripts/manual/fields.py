@@ -1,0 +1,70 @@
+"""The reference of Pydantic models: files that people write, and settings of a process."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from gaitswarm.settings import Settings
+from scripts.manual.tables import code, head, kind_of, row
+
+
+def models(model: type[BaseModel]) -> Iterator[str]:
+    """The fields of a model, and of the models within: lines of Markdown.
+
+    Args:
+        model: The outermost.
+    """
+    found: list[type[BaseModel]] = [model]
+    for one in found:
+        yield f"\n## {one.__name__}\n\n{(one.__doc__ or '').strip().splitlines()[0]}\n"
+        yield from head("field", "type", "default", "meaning")
+        for name, field in one.model_fields.items():
+            yield _row(name, field)
+            found += [inner for inner in _inner(field.annotation) if inner not in found]
+
+
+def settings() -> Iterator[str]:
+    """Every setting by the variable that it is read from: lines of Markdown."""
+    prefix = Settings.model_config["env_prefix"]
+    yield from head("variable", "type", "default", "meaning")
+    for name, schema in Settings.model_json_schema()["properties"].items():
+        variable = code(f"{prefix}{name}".upper())
+        # Where a setting may be null, that is the variable that is not set.
+        kind = kind_of(schema).removesuffix(" or null")
+        yield row([variable, kind, _variable(schema.get("default")), schema["description"]])
+
+
+def _variable(default: object) -> str:
+    """A default as the variable would be set to it."""
+    if isinstance(default, list):
+        return code(",".join(default))
+    if isinstance(default, float):
+        return code(f"{default:.12g}")
+    if isinstance(default, bool):
+        return code(str(default).lower())
+    return code("" if default is None else default)
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    value = None if field.is_required() else field.get_default(call_default_factory=True)
+    kind = getattr(field.annotation, "__name__", None) if not get_args(field.annotation) else None
+    shown = kind or str(field.annotation).replace("typing.", "")
+    for module in ("sim.robot.description.", "collections.abc."):
+        shown = shown.replace(module, "")
+    default = code("" if value is None else value)
+    return row([code(name), code(shown), default, field.description or ""])
+
+
+def _inner(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models in an annotation."""
+    if get_origin(annotation) is None:
+        is_class = isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias)
+        if is_class and issubclass(annotation, BaseModel):
+            yield annotation
+    for part in get_args(annotation):
+        yield from _inner(part)

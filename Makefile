@@ -81,7 +81,8 @@ format: setup-dev ## Format the code and fix what can be fixed.
 	@$(BIN)/ruff format .
 	@scripts/npm.sh --if-possible run format
 
-pictures: architecture ## Draw the pictures in docs/images anew: the page's, two walks, and the architecture.
+pictures: architecture ## Draw the pictures in docs/images anew: the page's, two walks, the concepts, and the architecture.
+	@$(BIN)/python -m scripts.concepts
 	@$(BIN)/python -m scripts.walks
 	@scripts/page.sh
 	@GAITSWARM_REQUIRE_PAGE=1 GAITSWARM_SCREENSHOTS=docs/images $(BIN)/python -m pytest -q tests/web/test_pictures.py $(ARGS)

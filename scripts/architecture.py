@@ -12,9 +12,10 @@ import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
-from xml.sax.saxutils import escape
 
 import grimp
+
+from scripts.boxes import Box, Edge, Picture
 
 ROOT: Final = Path(__file__).parents[1]
 
@@ -34,12 +35,8 @@ ROWS: Final = (
 )
 """Where a room is drawn, from the top. Every arrow must lead downwards or along its row."""
 
-_WIDTH, _HEIGHT, _GAP_X, _GAP_Y, _MARGIN = 360, 50, 60, 42, 16
-
 _LONGEST: Final = 64
 """Characters of a sentence that a box has room for."""
-
-Edge = tuple[str, str]
 
 
 def edges() -> frozenset[Edge]:
@@ -75,28 +72,9 @@ def sentence(room: str) -> str:
 
 def drawn(arrows: Iterable[Edge], sentences: Mapping[str, str]) -> str:
     """The picture as SVG. Raises ValueError for an arrow that leads upwards."""
-    width = 2 * _MARGIN + 2 * _WIDTH + _GAP_X
-    height = 2 * _MARGIN + len(ROWS) * _HEIGHT + (len(ROWS) - 1) * _GAP_Y
-    corners = {
-        room: (_left(len(row), column, width), _MARGIN + k * (_HEIGHT + _GAP_Y))
-        for k, row in enumerate(ROWS)
-        for column, room in enumerate(row)
-    }
-    parts = [
-        (
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" role="img"'
-            ' aria-label="Rooms of the code and their imports" font-family="sans-serif">'
-        ),
-        (
-            '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8"'
-            ' markerHeight="8" orient="auto"><path d="M0 0 8 4 0 8z" fill="#4a6b8a"/></marker>'
-            "</defs>"
-        ),
-        f'<rect width="{width}" height="{height}" rx="8" fill="#ffffff"/>',
-    ]
-    parts += [_arrow(corners[a], corners[b], f"{a} imports {b}") for a, b in sorted(arrows)]
-    parts += [_box(room, *corners[room], sentences[room]) for row in ROWS for room in row]
-    return "\n".join([*parts, "</svg>", ""])
+    boxes = {room: _box(room, text) for room, text in sentences.items()}
+    picture = Picture("Rooms of the code and their imports", ROWS, boxes)
+    return picture.drawn(dict.fromkeys(arrows, "imports"))
 
 
 def _room_of(module: str, rooms: Iterable[str]) -> str | None:
@@ -118,48 +96,10 @@ def _reaches(arrows: Iterable[Edge], start: str, end: str) -> bool:
     return end in seen
 
 
-def _left(count: int, column: int, width: int) -> int:
-    occupied = count * _WIDTH + (count - 1) * _GAP_X
-    return (width - occupied) // 2 + column * (_WIDTH + _GAP_X)
-
-
-def _arrow(start: tuple[int, int], end: tuple[int, int], title: str) -> str:
-    """From the lower edge of a box to the upper edge of another, past the boxes between them."""
-    (x1, y1), (x2, y2) = start, end
-    if y1 > y2:
-        raise ValueError(f"{title}, which leads upwards")
-    if y1 == y2:
-        side = 1 if x2 > x1 else -1
-        ends = [
-            x + (_WIDTH if (side > 0) == first else 0) for x, first in ((x1, True), (x2, False))
-        ]
-        path = f"M{ends[0]} {y1 + _HEIGHT // 2}H{ends[1]}"
-    else:
-        # Where an arrow passes a row, it bends away from the box in the middle.
-        aside = 0 if y2 - y1 <= _HEIGHT + _GAP_Y else (1 if x2 >= x1 else -1) * _WIDTH // 3
-        a, b = x1 + _WIDTH // 2 + aside, x2 + _WIDTH // 2 + aside
-        top, bottom = y1 + _HEIGHT, y2
-        middle = (top + bottom) // 2
-        path = f"M{a} {top}C{a} {middle} {b} {middle} {b} {bottom}"
-    return (
-        f'<path d="{path}" fill="none" stroke="#4a6b8a" stroke-width="1.5"'
-        f' marker-end="url(#tip)"><title>{title}</title></path>'
-    )
-
-
-def _box(room: str, x: int, y: int, text: str) -> str:
-    middle = x + _WIDTH // 2
-    name = room.removeprefix("services.optimizer.") if ".optimizer." in room else room
-    inside = "#e8f0f8" if room.startswith("services") else "#f3efe4"
-    label = name if name == room else f"services.optimizer / {name}"
-    return (
-        f'<g><rect x="{x}" y="{y}" width="{_WIDTH}" height="{_HEIGHT}" rx="6" fill="{inside}"'
-        ' stroke="#4a6b8a"/>'
-        f'<text x="{middle}" y="{y + 20}" text-anchor="middle" font-size="14" font-weight="bold"'
-        f' fill="#1c2b3a">{escape(label)}</text>'
-        f'<text x="{middle}" y="{y + 38}" text-anchor="middle" font-size="11" fill="#33475b">'
-        f"{escape(text)}</text></g>"
-    )
+def _box(room: str, text: str) -> Box:
+    name = room.removeprefix("services.optimizer.")
+    label = room if name == room else f"services.optimizer / {name}"
+    return Box(label, [text], "#e8f0f8" if room.startswith("services") else "#f3efe4")
 
 
 def main() -> int:

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from services.optimizer.jobs.documents import SPECS
-from sim.scenario import PRESETS
+from sim.scenario import PRESETS, Scenario
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
@@ -62,6 +62,14 @@ def test_pages_of_the_manual_that_the_page_leads_to_exist() -> None:
 @pytest.mark.parametrize("scenario", PRESETS, ids=lambda s: s.name)
 def test_every_scenario_is_documented(scenario: object) -> None:
     assert f"`{getattr(scenario, 'name', '')}`" in documentation()
+
+
+def test_every_scenario_that_is_shown_is_valid() -> None:
+    shown = [json.loads(body) for body in blocks("json")]
+    scenarios = [example for example in shown if "cycle_time" in example]
+    assert scenarios
+    for scenario in scenarios:
+        Scenario.model_validate(scenario)
 
 
 def test_every_job_spec_that_is_shown_is_valid() -> None:

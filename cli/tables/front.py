@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from cli.tables.views import SHORT, number
+from gaitswarm.places import place_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +40,7 @@ def marked_table(view: FrontView) -> Table:
     for label, design in _marked(view).items():
         table.add_row(
             label,
-            f"{design.iteration}/{design.particle}",
+            place_of(design.iteration, design.particle),
             *(number(value) for value in design.objectives.values()),
             number(design.fitness),
         )
@@ -167,7 +168,7 @@ def fits_table(view: PreferenceForView) -> Table:
             ", ".join("the job" if owner == "job" else owner for owner in fit.biases_of),
             str(fit.rank),
             number(None if fit.margin is None else 100.0 * fit.margin, 3),
-            number(None) if rival is None else f"{rival.iteration}/{rival.particle}",
+            number(None) if rival is None else place_of(rival.iteration, rival.particle),
             " ".join(number(value, 3) for value in fit.preference.bias),
             " ".join(number(value, 4) for value in fit.preference.exponent),
         )
@@ -176,12 +177,12 @@ def fits_table(view: PreferenceForView) -> Table:
 
 def verdict(view: PreferenceForView) -> str:
     """Whether a design wins under any preference, in a sentence."""
-    own, best = f"{view.chosen.iteration}/{view.chosen.particle}", view.fits[0]
+    own, best = place_of(view.chosen.iteration, view.chosen.particle), view.fits[0]
     if view.wins:
         return f"design {own} wins{_by(best)} under {best.preference.model_dump_json()}"
     tried = "" if view.certain else " that were tried"
     dominated = "" if view.on_front else ", which is dominated"
-    rival = "another" if best.rival is None else f"{best.rival.iteration}/{best.rival.particle}"
+    rival = "another" if best.rival is None else place_of(best.rival.iteration, best.rival.particle)
     return (
         f"no exponents{tried} with these biases make design {own} win{dominated}; under"
         f" {best.preference.model_dump_json()} it has rank {best.rank}, and {rival} is better"

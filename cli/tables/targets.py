@@ -14,12 +14,13 @@ def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
     """The result of the commands `calibrate` and `targets`."""
     from cli.output import note, stdout_console
     from cli.tables.parameters import parameters_table
+    from gaitswarm.places import place_of
 
     console = stdout_console()
     console.print(targets_table(reached))
     console.print(
         f"misfit {reached.fitness:.3f} tolerances, root mean square over what is fitted: job"
-        f" {reached.job}, design {reached.particle} of iteration {reached.iteration}",
+        f" {reached.job}, design {place_of(reached.iteration, reached.particle)}",
         markup=False,
     )
     for job, fitness in zip(parameters.jobs, parameters.fitness, strict=True):

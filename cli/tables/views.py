@@ -226,9 +226,11 @@ def search_line(best: BestView) -> str | None:
 
 
 def ranking_table(ranking: RankingView) -> Table:
-    """The best designs by another preference, best first, beside their places before."""
+    """The best designs by another preference, best first, beside their ranks before."""
+    from gaitswarm.places import place_of
+
     table = Table(box=None)
-    columns = ["rank", "before", "iteration", "design", "fitness", "before"]
+    columns = ["rank", "before", "design", "fitness", "before"]
     maximized = any(design.figure_of_merit is not None for design in ranking.top)
     for column in columns + (["F (eq. 3.1)"] if maximized else []):
         table.add_column(column, justify="right")
@@ -236,8 +238,7 @@ def ranking_table(ranking: RankingView) -> Table:
         table.add_row(
             str(design.rank),
             MISSING if design.rank_before is None else str(design.rank_before),
-            str(design.iteration),
-            str(design.particle),
+            place_of(design.iteration, design.particle),
             number(design.fitness),
             number(design.fitness_before),
             *([number(design.figure_of_merit)] if maximized else []),

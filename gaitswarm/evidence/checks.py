@@ -15,6 +15,7 @@ from gaitswarm.evidence.certificates import SUMMARY, summary_differs
 from gaitswarm.evidence.contents import BEST, CHAIN, best_of
 from gaitswarm.evidence.history import chain_check
 from gaitswarm.evidence.reading import Evidence, by_iteration
+from gaitswarm.places import place_of
 from gaitswarm.views import BestView
 from services.optimizer.analysis.search_path import retraced
 from services.optimizer.analysis.verification import BrokenChain, Chain, judged
@@ -105,13 +106,12 @@ def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
     fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
     if (said.iteration, said.particle, said.fitness) != (*where, fitness):
         return False, (
-            f"particle {where[1]} of iteration {where[0]} is the best with {fitness!r}, not the one"
-            " that is named"
+            f"design {place_of(*where)} is the best with {fitness!r}, not the one that is named"
         )
     shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
     if parsed_json(members.get(BEST, b""), BEST) != shown:
-        return False, f"{BEST} does not show particle {where[1]} of iteration {where[0]}"
-    return True, f"particle {where[1]} of iteration {where[0]}, {fitness!r}, is the least of all"
+        return False, f"{BEST} does not show design {place_of(*where)}"
+    return True, f"design {place_of(*where)}, {fitness!r}, is the least of all"
 
 
 def best_row(evidence: Evidence) -> tuple[int | None, EvaluationColumns]:

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from gaitswarm.evidence.archive import FORMAT, MANIFEST, VERSION
 from gaitswarm.evidence.certificates import Certified, how_to_make_one
+from gaitswarm.places import place_of
 from gaitswarm.views import BestView
 from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView, WorldView
 from services.optimizer.jobs.job import Job
@@ -106,7 +107,7 @@ def _result(job: Job, best: BestView | None) -> Iterator[str]:
         yield from _table(["", ""], facts.items())
         return
     facts["Best fitness"] = (
-        f"{best.fitness!r}, minimized, of particle {best.particle} of iteration {best.iteration}"
+        f"{best.fitness!r}, minimized, of design {place_of(best.iteration, best.particle)}"
     )
     yield from _table(["", ""], facts.items())
     units = {v.name: v.unit for v in spec.design_space().variables}
@@ -144,7 +145,7 @@ def _certificate(certificate: CertificateOnPage) -> Iterator[str]:
     yield f"<h2>Certificate: {view.worlds} worlds</h2>"
     facts = {"Job": view.job, "Worlds": f"{view.worlds}, drawn by seed {view.seed}"}
     if certified is not None:
-        place = f"particle {certified.particle} of iteration {certified.iteration}"
+        place = f"design {place_of(certified.iteration, certified.particle)}"
         facts["Design"] = f"the best, {place}" if certified.of_best else f"{place}, not the best"
     facts["Robot"] = _robot_name(view)
     facts["A walk failed in"] = _chance(view.failed)

@@ -36,6 +36,7 @@ from gaitswarm.evidence.replay import (
     simulated_differences,
     why_no_replay,
 )
+from gaitswarm.places import place_of
 from gaitswarm.views.verification import DIGEST, CheckView, DifferenceView, VerificationView
 from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
 from services.optimizer.jobs.kinds.tuning import JobSpec
@@ -176,7 +177,7 @@ def _design(evidence: Evidence, certificate: Evidence) -> Answer:
         return False, "it is of no design that this job tried"
     is_best = best is not None and place == (best.iteration, best.particle)
     what = "the best" if is_best else "not the best"
-    return True, f"it is of particle {place[1]} of iteration {place[0]}, {what}"
+    return True, f"it is of design {place_of(*place)}, {what}"
 
 
 def _check_run(

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from gaitswarm.places import place_of
 from gaitswarm.requests.targets import Histories
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from services.optimizer.analysis.trade_offs.front import pareto_front
@@ -73,12 +74,12 @@ def run_preference_for(
     spec, columns = _tuning(histories, job_id)
     rows = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
     if not len(rows):
-        raise NotFound(f"job {job_id} has no design {particle} in iteration {iteration}")
+        raise NotFound(f"job {job_id} has no design {place_of(iteration, particle)}")
     row = int(rows[0])
     if not np.isfinite(objective_vectors(columns.rows(rows), worlds=spec.worlds)).all():
         raise Conflict(
-            f"design {particle} of iteration {iteration} fails in a scenario, so that it wins under"
-            " no preference"
+            f"design {place_of(iteration, particle)} fails in a scenario, so that it wins under no"
+            " preference"
         )
     fits = preference_fits(columns, row, spec.resolved_preference(), worlds=spec.worlds)
     return PreferenceForView.from_fits(row, fits, columns, spec)

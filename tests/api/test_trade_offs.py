@@ -69,7 +69,7 @@ def test_a_design_that_is_dominated_is_told_its_best_rank(
         ("front", {"most": 0}, 422, "most"),
         ("front", {"most": 10_001}, 422, "most"),
         ("preference-for", {"iteration": 0}, 422, "particle"),
-        ("preference-for", {"iteration": 0, "particle": 4}, 404, "has no design 4"),
+        ("preference-for", {"iteration": 0, "particle": 4}, 404, "has no design 0.4"),
         ("preference-for", {"iteration": 0, "particle": 0}, 409, "fails in a scenario"),
     ],
 )

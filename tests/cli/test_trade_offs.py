@@ -98,7 +98,7 @@ def test_the_preference_that_is_told_makes_the_design_the_best_of_the_job(
     margin = (second["fitness"] / first["fitness"]) ** power - 1.0
     assert view["fits"][0]["margin"] == pytest.approx(margin)
     told = gaitswarm(*asked, f"{iteration}/{particle}")
-    assert f"design {iteration}/{particle} wins by {100.0 * margin:.3g} %" in told.out
+    assert f"design {iteration}.{particle} wins by {100.0 * margin:.3g} %" in told.out
 
 
 def test_a_design_that_cannot_win_is_told_what_beats_it(
@@ -116,7 +116,7 @@ def test_a_design_that_cannot_win_is_told_what_beats_it(
         "preferences", finished.id, "--db", finished.db, "--for", f"{place[0]}.{place[1]}"
     )
     assert told.code == 0, told.err
-    assert f"make design {place[0]}/{place[1]} win, which is dominated; under" in told.out
+    assert f"make design {place[0]}.{place[1]} win, which is dominated; under" in told.out
 
 
 def test_a_job_in_worlds_trades_what_it_makes_of_all_of_them(
@@ -155,7 +155,7 @@ def test_a_job_in_worlds_trades_what_it_makes_of_all_of_them(
     [
         ("3", 2, "for: must be the iteration and the number of a design in it, such as 24.7"),
         ("3.x", 2, "for: must be"),
-        ("999.0", 3, "has no design 0 in iteration 999"),
+        ("999.0", 3, "has no design 999.0"),
     ],
 )
 def test_a_design_is_an_iteration_and_a_number(

@@ -72,11 +72,11 @@ def test_a_single_job_run_twice_has_the_same_head(proved: Proved, tmp_path: Path
     [
         (
             "UPDATE evaluations SET design = '[0.5, 0.25]' WHERE iteration = 1 AND particle = 2",
-            "the design of particle 2 is not what was asked for",
+            "design 2 is not what was asked for",
         ),
         (
             "UPDATE evaluations SET fitness = fitness * 1.001 WHERE iteration = 1 AND particle = 0",
-            "the fitness of particle 0 does not follow from its objectives and statuses",
+            "the fitness of design 0 does not follow from its objectives and statuses",
         ),
         ("UPDATE iterations SET mean = mean * 2 WHERE iteration = 1", "its mean does not follow"),
     ],
@@ -230,4 +230,4 @@ def test_the_command_line_names_the_first_iteration_that_differs(
     assert done.code == ExitCode.JOB_FAILED
     assert done.json["broken_at"] == 2
     done = run_command(*arguments)
-    assert "iteration 2: the fitness of particle 3" in " ".join(done.out.split())
+    assert "iteration 2: the fitness of design 3" in " ".join(done.out.split())

@@ -26,7 +26,7 @@ def front_of(server: ServerProcess, job_id: str) -> Any:
 
 
 def place(design: dict[str, Any]) -> str:
-    return f"{design['iteration']}/{design['particle']}"
+    return f"{design['iteration']}.{design['particle']}"
 
 
 def preference_of(server: ServerProcess, job_id: str, design: dict[str, Any]) -> Any:
@@ -114,7 +114,7 @@ def test_a_design_that_is_pointed_at_has_its_preference_which_ranks_and_starts_j
     page = visit(server.url).go(f"/jobs/{finished_job}/trade-offs")
     expect(page.get_by_role("heading", name="No design chosen")).to_be_visible()
     page.get_by_role("button", name=re.compile("^Show as table.*Pareto front")).click()
-    name = f"design {chosen['particle']} of iteration {chosen['iteration']}"
+    name = f"design {place(chosen)}"
     row = table(page, "Designs of the front").get_by_role("row").filter(has_text=name)
     row.get_by_role("button").click()
     expect(page.locator("[data-wins='true']")).to_contain_text("is the best of the job")
@@ -159,7 +159,7 @@ def test_a_design_that_fails_is_told_why_it_has_no_preference(
     )
     notice = page.get_by_role("alert")
     expect(notice).to_contain_text("Its preference cannot be told.")
-    expect(notice).to_contain_text("has no design 4000 in iteration 0")
+    expect(notice).to_contain_text("has no design 0.4000")
 
 
 def test_a_job_that_waits_has_no_front_yet(

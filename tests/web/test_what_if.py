@@ -32,7 +32,7 @@ def test_the_preference_of_chapter_3_has_a_sixth_objective_to_weigh(
     page.get_by_role("button", name="chapter-3", exact=True).click()
     expect(sixth).to_have_value("0.03")
     expect(page.locator("[data-winner]")).to_have_attribute(
-        "data-winner", f"{winner['iteration']}/{winner['particle']}"
+        "data-winner", f"{winner['iteration']}.{winner['particle']}"
     )
     page.get_by_role("link", name="Start a job from here").click()
     chosen = page.get_by_role("button", name="chapter-3", exact=True)
@@ -65,7 +65,7 @@ def test_another_preference_ranks_the_history_anew_without_a_walk(
     visited = visit(server.url)
     page = visited.go(f"/jobs/{finished_job}/preferences")
     shown = page.locator("[data-winner]")
-    expect(shown).to_have_attribute("data-winner", f"{best['iteration']}/{best['particle']}")
+    expect(shown).to_have_attribute("data-winner", f"{best['iteration']}.{best['particle']}")
     expect(shown).to_have_attribute("data-evaluations", str(ranking["evaluations"]))
     asked_before = len(visited.requested)
     # Only fast walks count.
@@ -73,7 +73,7 @@ def test_another_preference_ranks_the_history_anew_without_a_walk(
         page.get_by_label(f"exponent of {objective}, number").fill(str(exponent))
         page.keyboard.press("Tab")
 
-    expect(shown).to_have_attribute("data-winner", f"{winner['iteration']}/{winner['particle']}")
+    expect(shown).to_have_attribute("data-winner", f"{winner['iteration']}.{winner['particle']}")
     expect(page.get_by_role("heading", name="Another design wins")).to_be_visible()
     asked = {urlsplit(url).path for url in visited.requested[asked_before:]}
     assert f"/v1/jobs/{finished_job}/ranking" in asked

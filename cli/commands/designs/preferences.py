@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
@@ -34,7 +33,7 @@ def preferences(
         str | None,
         typer.Option(
             "--for",
-            metavar="ITERATION.PARTICLE",
+            metavar="ITERATION.DESIGN",
             help="Find the preference under which this design of the job wins instead; no walk is"
             " run.",
         ),
@@ -80,8 +79,9 @@ def _suit(
     from cli.output import print_json, stdout_console
     from cli.tables.front import fits_table, verdict
     from gaitswarm.jobs.open import open_jobs
+    from gaitswarm.places import read_place
 
-    iteration, particle = _place(for_design)
+    iteration, particle = read_place(for_design, field="for")
     with open_jobs(server, db) as jobs:
         view = jobs.preference_for(job_id, iteration, particle)
     if as_json:
@@ -92,22 +92,11 @@ def _suit(
     console.print(verdict(view), markup=False)
 
 
-def _place(design: str) -> tuple[int, int]:
-    """Iteration and particle; tables print them with a slash between. Raises InvalidRequest."""
-    from services.optimizer.errors import InvalidRequest
-
-    found = re.fullmatch(r"(\d{1,9})[./](\d{1,9})", design, re.ASCII)
-    if found is None:
-        raise InvalidRequest(
-            "must be the iteration and the number of a design in it, such as 24.7", field="for"
-        )
-    return int(found[1]), int(found[2])
-
-
 def _print(view: RobustPreferencesView) -> None:
     from cli.output import stdout_console
     from cli.tables.fitted import Table
     from cli.tables.views import MISSING, number
+    from gaitswarm.places import place_of
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     heads = ("design", "index", "95 %", "wins under", "fitness", "loss %", "bias", "exponent")
@@ -117,7 +106,7 @@ def _print(view: RobustPreferencesView) -> None:
         index = found.index
         share = f"{100.0 * found.share:.0f} %"
         table.add_row(
-            f"{found.iteration}/{found.particle}",
+            place_of(found.iteration, found.particle),
             number(None if index is None else index.value, 3),
             MISSING if index is None else f"{number(index.low, 3)}–{number(index.high, 3)}",
             ", ".join([*found.named, share]),

@@ -127,6 +127,7 @@ def _print(found: VerificationView | HistoryVerificationView) -> None:
     from cli.output import stdout_console
     from cli.tables.fitted import Table
     from cli.tables.views import number
+    from gaitswarm.places import place_of
     from gaitswarm.views.verification import VerificationView
 
     console = stdout_console()
@@ -141,7 +142,7 @@ def _print(found: VerificationView | HistoryVerificationView) -> None:
         values = (number(difference.stored, 17), number(difference.simulated, 17))
         whose = "" if difference.certificate is None else f"certificate {difference.certificate}, "
         console.print(
-            f"{whose}iteration {difference.iteration}, particle {difference.particle},"
+            f"{whose}design {place_of(difference.iteration, difference.particle)},"
             f" {difference.case}, {difference.what}: stored {values[0]}, simulated {values[1]}",
             markup=False,
         )

@@ -41,6 +41,7 @@ def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = Fa
     from cli.output import print_json, stdout_console
     from cli.tables.views import print_best, worth
     from gaitswarm.jobs.open import open_jobs
+    from gaitswarm.places import place_of
 
     with open_jobs(server, db) as jobs:
         found = jobs.best(job_id)
@@ -49,8 +50,8 @@ def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = Fa
             return
         job = jobs.job(job_id)
         stdout_console().print(
-            f"job {job_id}: fitness {worth(found, digits=6)}, design {found.particle} of iteration"
-            f" {found.iteration}",
+            f"job {job_id}: fitness {worth(found, digits=6)}, design"
+            f" {place_of(found.iteration, found.particle)}",
             markup=False,
         )
         print_best(found, job)

@@ -335,7 +335,7 @@ def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
         designs = spec.design_space().designs(link.positions)
         (rows,) = np.nonzero((designs != outcomes.designs).any(axis=1))
         if len(rows):
-            return f"the design of particle {rows[0]} is not what was asked for"
+            return f"design {rows[0]} is not what was asked for"
         index = np.full(len(designs), link.iteration)
         columns = EvaluationColumns(
             index,
@@ -350,5 +350,5 @@ def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
     except Exception:  # noqa: BLE001 - whatever comes of numbers that nobody has computed
         return generic
     if len(rows):
-        return f"the fitness of particle {rows[0]} does not follow from its objectives and statuses"
+        return f"the fitness of design {rows[0]} does not follow from its objectives and statuses"
     return generic

@@ -7,6 +7,7 @@ import { ChartFrame } from '../components/chart-frame'
 import { Empty } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { change, formatCount, formatNumber } from '../format/number'
+import { placeWord } from '../format/place'
 import { formatValue } from '../format/value'
 import { withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
@@ -75,7 +76,7 @@ function Winners({
     <section
       class="card"
       aria-labelledby="new-winner"
-      data-winner={`${winner.iteration}/${winner.particle}`}
+      data-winner={placeWord(winner)}
       data-evaluations={ranking.evaluations}
     >
       <header class="row spread">

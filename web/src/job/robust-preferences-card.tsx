@@ -7,6 +7,7 @@ import type { Job, PreferenceWinner, RobustPreferences } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { formatCount, formatExact, formatNumber, NONE, percent } from '../format/number'
+import { placeWord } from '../format/place'
 import { jobPath, withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
 import { preferenceQuery } from './preference'
@@ -79,7 +80,7 @@ function ask(id: string, key: string, samples: number): Promise<RobustPreference
 }
 
 function mostRobust({ candidates: [first] }: RobustPreferences): string {
-  return first ? `${first.iteration}/${first.particle}` : ''
+  return first ? placeWord(first) : ''
 }
 
 function Winners({ job, found }: { job: Job; found: RobustPreferences }) {

@@ -2,6 +2,7 @@
 
 import type { Job } from '../api/types'
 import { type Column, Table } from '../components/table'
+import { placeWord } from '../format/place'
 import { formatValue, named } from '../format/value'
 import { inWords } from '../format/words'
 import { jobPath, withQuery } from '../router/routes'
@@ -57,7 +58,7 @@ export function SelectedDesigns({
   )
 }
 
-/** Iteration and design, leading to its walk; where nothing walks, to its iteration. */
+/** Place of a design, leading to its walk; where nothing walks, to its iteration. */
 export function Where({
   job,
   iteration,
@@ -74,7 +75,7 @@ export function Where({
       : jobPath(job.id, `iterations/${iteration}`)
   return (
     <a href={target} class="nowrap">
-      design {particle} of iteration {iteration}
+      design {placeWord({ iteration, particle })}
     </a>
   )
 }

@@ -6,6 +6,7 @@ import type { Job, TargetResult, Targets } from '../api/types'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { change, formatExact, formatNumber, percent, quantity } from '../format/number'
+import { placeWord } from '../format/place'
 import { inWords } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
 import { isWithin, LEFT_OUT, type LeaveOut, leaveOutOf, withinCount } from './targets'
@@ -75,7 +76,7 @@ function TargetsTable({ found, predicts }: { found: Targets; predicts: boolean }
   return (
     <>
       <p data-within={within} data-fitted={fitted}>
-        The best design, number {found.particle} of iteration {found.iteration}, meets{' '}
+        The best design, {placeWord(found)}, meets{' '}
         <strong>
           {within} of {fitted}
         </strong>{' '}

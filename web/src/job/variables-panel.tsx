@@ -15,6 +15,7 @@ import {
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount } from '../format/number'
+import { type Place, placeOf, placeWord } from '../format/place'
 import { ignore } from '../router/ignored'
 import { type Codec, flag, useDelayedQuery, useQueryValue } from '../router/query-value'
 import { BrushFields } from './brush-fields'
@@ -154,7 +155,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         brushes={brushes}
         onBrush={setBrushes}
         chosen={marked}
-        onChoose={(row) => setChosen(placeOf(particles, row))}
+        onChoose={(row) => setChosen(placeIn(particles, row))}
       />
       <section class="card" aria-labelledby="selected">
         <h2 id="selected">The best of those selected</h2>
@@ -189,20 +190,12 @@ function useBrushes(model: ParallelModel): readonly [Brushes, (brushes: Brushes)
 }
 
 const DESIGN: Codec<Place | null> = {
-  read: (text) => {
-    const [, iteration, particle] = /^(\d+)\/(\d+)$/.exec(text) ?? []
-    return particle ? { iteration: Number(iteration), particle: Number(particle) } : undefined
-  },
-  write: (place) => place && `${place.iteration}/${place.particle}`,
+  read: (text) => placeOf(text) ?? undefined,
+  write: (place) => place && placeWord(place),
 }
 
-/** Where a design is in its job: rows change when newer ones come. */
-interface Place {
-  readonly iteration: number
-  readonly particle: number
-}
-
-function placeOf(particles: Particles, row: number): Place {
+/** Rows change when newer designs come; places do not. */
+function placeIn(particles: Particles, row: number): Place {
   const [iteration, particle] = ['iteration', 'particle'].map(
     (name) => columnNamed(particles, name)!.values[row],
   )

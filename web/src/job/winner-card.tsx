@@ -5,6 +5,7 @@ import { BrokenName } from '../components/broken-name'
 import { ChartFrame } from '../components/chart-frame'
 import { Table } from '../components/table'
 import { formatExact, percent } from '../format/number'
+import { placeWord } from '../format/place'
 import { exactValueQuantity } from '../format/value'
 import { withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
@@ -18,7 +19,7 @@ export function WinnerCard({ job }: { job: Job }) {
   return (
     <ChartFrame
       title="The winner"
-      note={`Design ${best.particle} of iteration ${best.iteration}. Each bar is the range that was searched.${
+      note={`Design ${placeWord(best)}. Each bar is the range that was searched.${
         held.length > 0 ? ` At a bound: ${held.map(({ name }) => name).join(', ')}.` : ''
       }`}
       tools={

@@ -4,6 +4,7 @@ import { get } from '../api/client'
 import { ApiProblem } from '../api/problem'
 import { readableJob } from '../api/readable'
 import type { Controller, Evaluation, Job, JobSpec, Scenario } from '../api/types'
+import { placeWord } from '../format/place'
 import type { Design } from '../format/value'
 import type { DesignSource } from './design-source'
 
@@ -61,10 +62,7 @@ async function ofJob(
   const name = spec.name || job.id
   return {
     source,
-    label:
-      source.kind === 'best'
-        ? `Best of ${name}`
-        : `${name}, design ${evaluation.particle} of iteration ${evaluation.iteration}`,
+    label: source.kind === 'best' ? `Best of ${name}` : `${name}, design ${placeWord(evaluation)}`,
     // The evaluations of a certificate are worlds, in which its one design walks.
     ...(spec.kind === 'certificate'
       ? { design: spec.design, world: worldOf(evaluation) }

@@ -1,12 +1,11 @@
 import { describe, expect, test } from 'vitest'
 import type { Front } from '../../src/api/types'
+import { placeOf, placeWord } from '../../src/format/place'
 import {
   allCloud,
   axesOf,
   frontCloud,
   marksOf,
-  placeOf,
-  placeWord,
   publishedDesign,
   publishedMarks,
 } from '../../src/job/trade-offs/designs'
@@ -30,6 +29,8 @@ const FRONT = {
 
 test('a design is named in the address, and anything else is none', () => {
   expect(placeOf(placeWord({ iteration: 24, particle: 7 }))).toEqual({ iteration: 24, particle: 7 })
+  expect(placeWord({ iteration: 24, particle: 7 })).toBe('24.7')
+  expect(placeOf('24/7'), 'as in older addresses').toEqual({ iteration: 24, particle: 7 })
   expect(placeOf('24')).toBeNull()
   expect(placeOf(null)).toBeNull()
 })

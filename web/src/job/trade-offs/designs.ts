@@ -2,28 +2,12 @@
 
 import type { Front, ScenarioResult } from '../../api/types'
 import type { Cloud, Mark } from '../../charts/scatter'
+import { placeWord } from '../../format/place'
 import { columnNamed, type Particles } from '../particles'
 import type { Reference } from '../reference'
 
-/** Where a design is in its job. */
-export interface Place {
-  readonly iteration: number
-  readonly particle: number
-}
-
 /** Axes at first: shaking less costs speed. */
 const USUAL = ['reciprocal_speed', 'acceleration']
-
-/** `24/7`: design 7 of iteration 24. */
-export function placeWord({ iteration, particle }: Place): string {
-  return `${iteration}/${particle}`
-}
-
-/** What `placeWord` wrote; null for anything else. */
-export function placeOf(word: string | null): Place | null {
-  const found = /^(\d+)\/(\d+)$/.exec(word ?? '')
-  return found && { iteration: Number(found[1]), particle: Number(found[2]) }
-}
 
 /** Whose preference it is, in words. */
 export function ownerWords(owner: string): string {

@@ -3,9 +3,10 @@
 import type { Front, FrontDesign, Job, Objective } from '../../api/types'
 import { type Column, Table } from '../../components/table'
 import { formatNumber, NONE } from '../../format/number'
+import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { Where } from '../selected-designs'
-import { type Place, type PublishedDesign, placeWord } from './designs'
+import type { PublishedDesign } from './designs'
 
 /** What every design of a front is told by. */
 interface ByObjective {
@@ -108,7 +109,7 @@ export function chooseColumn<R extends Place>(
         type="button"
         class="compact"
         aria-pressed={chosen !== null && placeWord(chosen) === placeWord(design)}
-        aria-label={`Which preference chooses design ${design.particle} of iteration ${design.iteration}`}
+        aria-label={`Which preference chooses design ${placeWord(design)}`}
         onClick={() => onChoose(design)}
       >
         Which?

@@ -6,11 +6,12 @@ import type { Job, PreferenceFit, PreferenceFor } from '../../api/types'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { type Column, Table } from '../../components/table'
 import { formatCount, formatExact, formatNumber, NONE, percent } from '../../format/number'
+import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { jobPath, withQuery } from '../../router/routes'
 import { preferenceQuery, weighed } from '../preference'
 import { Where } from '../selected-designs'
-import { ownerWords, type Place, placeWord } from './designs'
+import { ownerWords } from './designs'
 
 export function PreferenceCard({ job, chosen }: { job: Job; chosen: Place | null }) {
   const key = chosen && `${job.id} ${job.iterations} ${placeWord(chosen)}`

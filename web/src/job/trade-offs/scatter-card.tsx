@@ -8,21 +8,13 @@ import { Scatter } from '../../charts/scatter'
 import { ChartFrame, LegendEntry } from '../../components/chart-frame'
 import { ErrorNotice } from '../../components/feedback'
 import { formatCount } from '../../format/number'
+import { type Place, placeWord } from '../../format/place'
 import { capitalized, inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { flag, useQueryValue } from '../../router/query-value'
 import type { Particles } from '../particles'
 import { publishedWalks } from '../reference'
-import {
-  allCloud,
-  axesOf,
-  frontCloud,
-  marksOf,
-  type Place,
-  placeWord,
-  publishedDesign,
-  publishedMarks,
-} from './designs'
+import { allCloud, axesOf, frontCloud, marksOf, publishedDesign, publishedMarks } from './designs'
 import { FrontTable, PublishedTable } from './front-table'
 
 export function ScatterCard({

@@ -3,9 +3,10 @@
 import type { Front, FrontWinner, Job } from '../../api/types'
 import { Table } from '../../components/table'
 import { formatCount, percent } from '../../format/number'
+import { type Place, placeWord } from '../../format/place'
 import { capitalized } from '../../format/words'
 import { Where } from '../selected-designs'
-import { ownerWords, type Place } from './designs'
+import { ownerWords } from './designs'
 import { chooseColumn, objectiveColumns } from './front-table'
 
 export function WinnersCard({
@@ -24,9 +25,9 @@ export function WinnersCard({
         caption="Best designs under the known preferences"
         rows={front.winners}
         rowKey={({ preference }) => preference}
-        rowData={({ preference, iteration, particle }) => ({
-          'data-preference': preference,
-          'data-place': `${iteration}/${particle}`,
+        rowData={(winner) => ({
+          'data-preference': winner.preference,
+          'data-place': placeWord(winner),
         })}
         columns={[
           {

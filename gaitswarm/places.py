@@ -1,0 +1,48 @@
+"""How texts name a design of a job: `8.12` is design 12 of iteration 8, both counted from 0.
+
+| text    | iteration | number | written by                    |
+| ------- | --------- | ------ | ----------------------------- |
+| `8.12`  | 8         | 12     | this version                  |
+| `8.120` | 8         | 120    | this version: it is no decimal |
+| `8/12`  | 8         | 12     | former versions               |
+"""
+
+from __future__ import annotations
+
+import re
+
+from services.optimizer.errors import InvalidRequest
+
+
+def place_of(iteration: int, particle: int) -> str:
+    """The place of a design as texts have it.
+
+    Args:
+        iteration: Its iteration, from 0.
+        particle: Its number in the iteration, from 0.
+
+    Returns:
+        Both with a point between.
+    """
+    return f"{iteration}.{particle}"
+
+
+def read_place(text: str, *, field: str) -> tuple[int, int]:
+    """Read what `place_of` wrote, or a former version.
+
+    Args:
+        text: A place.
+        field: That is to blame if it is none.
+
+    Returns:
+        Iteration, and number of the design in it.
+
+    Raises:
+        InvalidRequest: It is no place.
+    """
+    found = re.fullmatch(r"(\d{1,9})[./](\d{1,9})", text, re.ASCII)
+    if found is None:
+        raise InvalidRequest(
+            "must be the iteration and the number of a design in it, such as 24.7", field=field
+        )
+    return int(found[1]), int(found[2])

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 
 from gaitswarm import CONTROLLERS
 from scripts.walks import PICTURE
+from tests.examples.paths import ROOT
 from tests.golden.numbers import fitness_of, read
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -20,3 +21,9 @@ def test_the_picture_has_the_published_optimums_numbers_and_both_walks_move() ->
     assert f"body shaken by {shaken:.2f} m/s²" in words
     legs = [line for line in root.iter(f"{SVG}polyline") if line.find(f"{SVG}animate") is not None]
     assert len(legs) == 2 * 6
+
+
+def test_the_headline_below_it_has_the_same_numbers() -> None:
+    published = fitness_of(dict(CONTROLLERS["fuzzy-pi"].published["A"]))
+    headline = f"**From {published:.2f} (the thesis's optimum) to {read().best.fitness:.2f} in "
+    assert headline in (ROOT / "README.md").read_text(encoding="utf-8")
